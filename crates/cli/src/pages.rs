@@ -31,6 +31,11 @@ impl Pages {
         self.html.with_extension("md")
     }
 
+    /// Returns the name of the page without its ending.
+    pub(crate) fn stem(&self) -> String {
+        self.html.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
     /// Writes a report. Every file is replaced as a whole, and the page last: if it is new, all the
     /// others are.
     ///

@@ -196,6 +196,23 @@ pub(crate) fn leader_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color:
     svg.circle(center, 0.45 * radius, format_args!(r#"class="leader" fill="{color}""#));
 }
 
+/// Draws the head of an arrow, `head_px` long, that comes from one point and ends at another.
+pub(crate) fn arrowhead(
+    svg: &mut Svg,
+    from: (f64, f64),
+    (x, y): (f64, f64),
+    head_px: f64,
+    color: &str,
+) {
+    let far = (x - from.0).hypot(y - from.1);
+    let (ux, uy) = (head_px * (x - from.0) / far, head_px * (y - from.1) / far);
+    let wing = |side: f64| (x - ux + side * 0.5 * uy, y - uy - side * 0.5 * ux);
+    let [(ax, ay), (bx, by)] = [wing(1.0), wing(-1.0)].map(|(x, y)| (Num(x), Num(y)));
+    let data = format!("M{ax} {ay}L{} {}L{bx} {by}Z", Num(x), Num(y));
+    let rim = r##"stroke="#FFFFFF" stroke-width="0.6""##;
+    svg.path(&data, format_args!(r#"class="direction" fill="{color}" {rim}"#));
+}
+
 /// Draws the mark where a track ends.
 pub(crate) fn end_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: &str) {
     svg.circle(center, radius + 1.0, format_args!(r##"fill="{color}" stroke="#FFFFFF""##));

@@ -338,10 +338,11 @@ impl Report {
             figure(title, ["airplanes", y_label], BOTH.map(of))
         };
         let title = format!("Flights of {} airplanes", self.tracks_m.len());
-        let flown: Vec<Series> = self.tracks_m.iter().map(|track| flight(track)).collect();
+        let flown =
+            (0..).zip(&self.tracks_m).map(|(id, track)| flight(id, track)).collect::<Vec<_>>();
         let flights = figure(&title, ["east, km", "north, km"], flown);
         vec![
-            Figure { kind: FigureKind::Ways, ..flights },
+            Figure { kind: FigureKind::Ways, note: WAYS.into(), ..flights },
             over("Time of all optimizations, with transmission", "seconds", "elapsed_s"),
             over("Messages of a whole flight", "messages", "messages"),
             over("Bytes of a whole flight", "bytes", "bytes"),
@@ -398,9 +399,12 @@ impl Report {
     }
 }
 
-fn flight(track_m: &[AirPoint]) -> Series {
+/// What the marks of flights say.
+const WAYS: &str = "A ring is where an airplane starts, an arrowhead where it arrives.";
+
+fn flight(id: u32, track_m: &[AirPoint]) -> Series {
     let km = |at: &AirPoint| Point::new(at[0] / 1000.0, at[1] / 1000.0);
-    Series { name: String::new(), points: track_m.iter().map(km).collect() }
+    Series { name: format!("airplane {id}"), points: track_m.iter().map(km).collect() }
 }
 
 #[cfg(test)]

@@ -3,8 +3,10 @@
 mod chart;
 mod html;
 pub mod markdown;
+mod print;
 
 pub use chart::chart_svg;
+pub use print::Print;
 
 use sidestep_document::Document;
 use sidestep_document::document::Block;

@@ -1,12 +1,15 @@
 //! Arms of robot models: the options that choose one and its posture, and both as text and JSON.
 
+use super::arm_picture::ArmPicture;
 use crate::console::aligned;
 use clap::Args;
 use serde::Serialize;
 use sidestep::import::urdf::srdf::Semantics;
 use sidestep::import::urdf::{Model, Solids};
 use sidestep::kernel::InputError;
-use sidestep::worlds::chain::kinematics::{ArmBody, Pose, Rod, SerialChain, Variable, Vector};
+use sidestep::worlds::chain::kinematics::{
+    ArmBody, Pose, Rod, SerialChain, Sphere, Variable, Vector,
+};
 use std::path::PathBuf;
 
 /// The options that choose an arm and its posture.
@@ -192,6 +195,15 @@ fn rod(rod: &Rod) -> RodSize {
 }
 
 impl Placed {
+    /// Returns the arm as a picture, with where its tip shall be and what is in the way.
+    pub(crate) fn picture<'a>(
+        &'a self,
+        target: Option<Vector>,
+        obstacles: &'a [Sphere],
+    ) -> ArmPicture<'a> {
+        ArmPicture { robot: &self.robot, connectors: &self.connectors, target, obstacles }
+    }
+
     /// Returns the positions as text for people.
     pub(crate) fn text(&self) -> String {
         let joints: Vec<_> =

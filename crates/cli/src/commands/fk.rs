@@ -4,6 +4,7 @@ use super::arm::ArmArgs;
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use clap::Args;
+use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -11,6 +12,7 @@ Examples:
   sidestep fk arm.urdf --joints 0.1,-0.2,0.3 --json
   sidestep fk panda.urdf --tip panda_link8 --posture default --srdf panda.srdf
   sidestep fk panda.urdf --group arm --srdf panda.srdf
+  sidestep fk arm.urdf --joints 0.1,-0.2,0.3 --png arm.png
 
 Values are in rad or m, one for each moving joint from the base to the tip; without any, each is as \
 near to zero as its limits allow. Values outside the limits are computed too, with a warning. The \
@@ -24,6 +26,10 @@ of the base. Expand xacro files first.";
 pub(crate) struct FkArgs {
     #[command(flatten)]
     arm: ArmArgs,
+
+    /// Draw the arm into this file
+    #[arg(long, value_name = "FILE")]
+    png: Option<PathBuf>,
 }
 
 /// Runs the command.
@@ -33,6 +39,9 @@ pub(crate) struct FkArgs {
 pub(crate) fn fk(args: &FkArgs, console: Console) -> Result<ExitCode, Failure> {
     let arm = args.arm.load()?;
     let placed = arm.at(&arm.values);
+    if let Some(path) = &args.png {
+        placed.picture(None, &[]).write(path)?;
+    }
     console.result(&placed, || placed.text());
     if !placed.outside_limits.is_empty() {
         console.warn(format!("outside limits: {}", placed.outside_limits.join(", ")));

@@ -1,6 +1,7 @@
 //! One file per command.
 
 mod arm;
+mod arm_picture;
 mod check;
 mod compare;
 mod completions;

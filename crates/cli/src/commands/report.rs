@@ -5,10 +5,14 @@ use crate::exit::{ExitCode, Failure};
 use crate::pages::{Pages, Raster};
 use crate::watch::Watch;
 use crate::worlds;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde_json::json;
 use sidestep::kernel::InputError;
+use sidestep_document::Document;
+use sidestep_report::{Print, SvgFile};
 use sidestep_session::report::document;
+use sidestep_session::{replace, write_png};
+use std::io::Write;
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -16,6 +20,8 @@ Examples:
   sidestep report runs/office           runs/office/report.html and report.md
   sidestep report runs/office --out office.html
   sidestep report sweeps/methods        intervals, comparisons, figures
+  sidestep report sweeps/methods --figure svg,png --figure-size 85x60 \
+      --label 'mean delay (%)=Delay in percent'
 
 The page is one file that needs no network. A run that is not complete can be reported too; its \
 report says so.";
@@ -31,6 +37,40 @@ pub(crate) struct ReportArgs {
     /// Output file; the Markdown version is written beside it [default: DIR/report.html]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+
+    #[command(flatten)]
+    print: PrintArgs,
+}
+
+/// Options of figures for print.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Figures for print")]
+struct PrintArgs {
+    /// Write every figure by itself too, without title, in these formats: svg, png
+    #[arg(long = "figure", value_name = "FORM,...", value_delimiter = ',')]
+    forms: Vec<Form>,
+
+    /// Width and height of these figures in mm
+    #[arg(long, value_name = "WxH", default_value = "85x60", requires = "forms")]
+    figure_size: String,
+
+    /// Size of their text in points
+    #[arg(long, value_name = "PT", default_value_t = 8.0, requires = "forms")]
+    figure_font: f64,
+
+    /// Write a label of an axis or the name of a series in other words; repeatable
+    #[arg(long = "label", value_name = "WORDS=OTHERS", requires = "forms")]
+    labels: Vec<String>,
+}
+
+/// Formats of figures for print.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Form {
+    Svg,
+    Png,
+    /// Refused, with what gives it.
+    #[value(hide = true)]
+    Pdf,
 }
 
 /// Runs the command.
@@ -40,12 +80,92 @@ pub(crate) struct ReportArgs {
 /// written.
 pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Failure> {
     let pages = pages(args)?;
+    args.print.figures()?;
     let document = document(worlds(), &args.folder, &Watch::new(console))?;
     pages.store(&document, Raster::None)?;
+    let figures = args.print.figures()?;
+    let figures = figures.map(|print| args.print.store(&print, &document, &pages)).transpose()?;
     let (html, markdown) = (pages.html.display(), pages.markdown());
-    let json = json!({ "html": html.to_string(), "markdown": markdown.display().to_string() });
-    console.result(&json, || format!("{html}\n{}\n", markdown.display()));
+    let shown = figures.as_ref().map(|folder| folder.display().to_string());
+    let json = json!({
+        "html": html.to_string(),
+        "markdown": markdown.display().to_string(),
+        "figures": shown,
+    });
+    let more = shown.map_or(String::new(), |folder| format!("{folder}\n"));
+    console.result(&json, || format!("{html}\n{}\n{more}", markdown.display()));
     Ok(ExitCode::Done)
+}
+
+impl PrintArgs {
+    /// Returns how figures for print look; `None` if none are asked for.
+    ///
+    /// # Errors
+    /// When a size, a label or a format is wrong.
+    fn figures(&self) -> Result<Option<Print>, InputError> {
+        if self.forms.contains(&Form::Pdf) {
+            let remedy = "write svg, of which `rsvg-convert -f pdf` or Inkscape make PDF";
+            return Err(InputError::new("--figure", "no figure is written as PDF", remedy));
+        }
+        if self.forms.is_empty() {
+            return Ok(None);
+        }
+        if !(4.0..=40.0).contains(&self.figure_font) {
+            let cause = format!("is {} pt", self.figure_font);
+            return Err(InputError::new("--figure-font", cause, "give 4 to 40"));
+        }
+        let labels = self.labels.iter().map(|label| renamed(label)).collect::<Result<_, _>>()?;
+        let size_mm = size_mm(&self.figure_size)?;
+        Ok(Some(Print { size_mm, font_pt: self.figure_font, labels }))
+    }
+
+    /// Writes the figures beside the page, and returns their folder.
+    ///
+    /// # Errors
+    /// When a label is in no figure, or something cannot be drawn or written.
+    fn store(&self, print: &Print, document: &Document, pages: &Pages) -> Result<PathBuf, Failure> {
+        if let Some(label) = print.unused(document).first() {
+            let cause = format!("no figure has the words `{label}`");
+            let remedy = "write them as the figure's axis or legend does";
+            return Err(InputError::new("--label", cause, remedy).into());
+        }
+        let folder = pages.html.with_file_name(format!("{}-print", pages.stem()));
+        std::fs::create_dir_all(&folder).map_err(|e| Failure::write(&folder, &e))?;
+        for SvgFile { stem, svg } in print.figures(document)? {
+            let at = |ending: &str| folder.join(format!("{stem}.{ending}"));
+            if self.forms.contains(&Form::Svg) {
+                replace(&at("svg"), |file| file.write_all(svg.as_bytes()))?;
+            }
+            if self.forms.contains(&Form::Png) {
+                write_png(&at("png"), &svg)?;
+            }
+        }
+        Ok(folder)
+    }
+}
+
+/// Reads width and height in mm.
+fn size_mm(text: &str) -> Result<[f64; 2], InputError> {
+    let sides: Vec<f64> = text.split('x').filter_map(|side| side.trim().parse().ok()).collect();
+    match sides[..] {
+        [width, height] if [width, height].iter().all(|mm| (30.0..=500.0).contains(mm)) => {
+            Ok([width, height])
+        }
+        _ => {
+            let cause = format!("`{text}` is no size");
+            Err(InputError::new("--figure-size", cause, "write WxH, 30 to 500 mm each: 85x60"))
+        }
+    }
+}
+
+/// Reads words and the ones that stand in their place.
+fn renamed(text: &str) -> Result<(String, String), InputError> {
+    let parts = text.split_once('=').filter(|(from, _)| !from.is_empty());
+    let (from, to) = parts.ok_or_else(|| {
+        let cause = format!("`{text}` names no words");
+        InputError::new("--label", cause, "write what stands there = what shall stand there")
+    })?;
+    Ok((from.into(), to.into()))
 }
 
 /// Returns the files of the report.

@@ -60,6 +60,7 @@
       tick.textContent,
       tick.getBoundingClientRect(),
     ]);
+    found.beyond = beyond(found.width);
     const isCut = ([, box]) =>
       box.left < edge.left - 1 || box.right > edge.right + 1 || box.bottom > edge.bottom + 1;
     const touch = ([, a], [, b]) =>
@@ -85,7 +86,19 @@
     return [isZoomed, ticks(plot) === whole];
   }
 
+  // Parts of the page that reach beyond its right side, but those inside what scrolls on its own.
+  const beyond = (width) =>
+    all("header *, main *, footer *")
+      .filter((part) => part.getBoundingClientRect().right > width + 1)
+      .filter((part) => !part.closest("pre, .scrolled, svg"))
+      .map((part) => part.outerHTML.slice(0, 80));
+
   async function look() {
+    if (globalThis.probeWidth) {
+      // No window of this browser is as narrow as a phone.
+      document.documentElement.style.width = `${globalThis.probeWidth}px`;
+      await later(500);
+    }
     const plots = all(".plot .drawn");
     for (
       let k = 0;
@@ -102,11 +115,30 @@
     found.silent = plots.filter((plot) => firstMark(plot) && hover(plot) === "").length;
     found.pictures = all(".picture img").map((picture) => picture.naturalWidth);
     found.tables = all("table").length;
-    found.captions = all("caption").map((caption) => caption.textContent);
+    found.captions = all("caption, details.table > summary").map((title) => title.textContent);
+    found.width = document.documentElement.getBoundingClientRect().width;
+    // Wide tables with all of their columns behind an edge, folded ones too.
+    all("details").forEach((details) => (details.open = true));
+    await later(300);
+    const isCut = (place) => place.scrollWidth > place.clientWidth + 1;
+    found.cut = all(".scrolled").filter(isCut).map((place) => place.getAttribute("aria-label"));
+    found.offered = all(".more:not([hidden])").length;
+    found.cards = all("table.cards").length;
+    const more = all(".more:not([hidden])").find((button) => button.closest(".wide").offsetWidth > 0);
+    if (more) {
+      more.click();
+      await later(200);
+      const table = more.closest(".wide").querySelector("table");
+      const cells = [...table.tBodies[0].rows[0].cells];
+      found.shown_by_more = cells.every((cell) => getComputedStyle(cell).display !== "none" || cell.textContent === "");
+      found.cut_by_more = all(".scrolled").filter(isCut).length;
+      more.click();
+      await later(200);
+    }
+    all("details").forEach((details) => (details.open = false));
     found.heads = all("h1, h2").map((head) => head.textContent);
     found.badges = all("tbody .badge").map((badge) => badge.textContent);
     found.words = document.querySelector("main").innerText;
-    found.wider_than_window = document.documentElement.scrollWidth > innerWidth;
 
     const table = document.querySelector("table.sortable");
     if (table) {

@@ -42,6 +42,20 @@ fn assert_near(found: &Value, expected: [f64; 3]) {
 }
 
 #[test]
+fn an_arm_is_drawn_by_fk_and_with_its_target_by_ik() {
+    let place = place();
+    place.json(&["fk", "arm.urdf", "--joints", "0.3,0.4,0.25", "--png", "fk.png"]);
+    place.json(&["ik", "arm.urdf", "--target", "1.2,0.9,0", "--png", "ik.png"]);
+    for name in ["fk.png", "ik.png"] {
+        let picture = image::open(place.path(name)).expect("a picture").to_rgb8();
+        let inked = picture.pixels().filter(|pixel| pixel.0 != [255; 3]).count();
+        assert!(inked > 2000, "{name}: only {inked} pixels are drawn");
+    }
+    let many = ["ik", "arm.urdf", "--targets", "none.csv", "--png", "x.png"];
+    assert_eq!(place.run(&many).code(), 2);
+}
+
+#[test]
 fn tip_joints_and_connectors_are_told() {
     let place = place();
     let fk = place.json(&["fk", "arm.urdf", "--joints", "-1.5707963267948966,0,0.25"]);

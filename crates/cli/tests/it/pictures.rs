@@ -54,6 +54,59 @@ fn every_shipped_scenario_is_drawn_with_a_meter_as_long_both_ways() {
     assert!(drawn >= 14, "{drawn}");
 }
 
+/// The elements of a picture that have this class.
+fn of_class<'a>(svg: &'a str, class: &str) -> Vec<&'a str> {
+    let mark = format!("class=\"{class}\"");
+    svg.lines().filter(|line| line.contains(&mark)).collect()
+}
+
+#[test]
+fn a_chain_shows_who_leads_and_where_to_go() {
+    let place = Place::new();
+    let scenario = "format = 1\nworld = \"chain\"\ncycles = 60\n\
+                    [[chains]]\nconnectors = 7\nat_m = [0.0, 0.0]\nrod_m = 0.5\n\
+                    [[chains.tasks]]\nkind = \"targets\"\nconnector = 6\nspeed_m_s = 1.0\n\
+                    targets_m = [[4.0, 1.0], [4.0, -1.0]]\n";
+    place.write("led.toml", scenario);
+    place.json(&["run", "led.toml", "--out", "r"]);
+    let svg = place.read("r/trajectories.svg");
+    // In the picture and in the legend.
+    assert_eq!(of_class(&svg, "leader").len(), 2, "{svg}");
+    assert_eq!(of_class(&svg, "target").len(), 2, "{svg}");
+    assert!(svg.contains(">leader<") && svg.contains(">2</text>"), "{svg}");
+}
+
+#[test]
+fn a_picture_in_space_has_numbers_on_its_axes() {
+    let place = Place::new();
+    let file = format!("{SCENARIOS}/chain/arm.toml");
+    place.json(&["run", &file, "--set", "cycles=20", "--out", "r"]);
+    let svg = place.read("r/trajectories.svg");
+    for axis in ["x (m)", "y (m)", "z (m)"] {
+        assert!(svg.contains(axis), "{axis}");
+    }
+    let is_number = |line: &&str| {
+        let words = line.split('>').nth(1).and_then(|rest| rest.split('<').next());
+        line.starts_with("<text")
+            && words.is_some_and(|w| w.replace('−', "-").parse::<f64>().is_ok())
+    };
+    assert!(svg.lines().filter(is_number).count() >= 9, "{svg}");
+}
+
+#[test]
+fn recorded_traffic_is_drawn_with_callsigns_and_directions() {
+    let place = Place::new();
+    let scenario = "format = 1\nworld = \"airspace\"\ncycles = 40\n\
+                    [[airplanes]]\nname = \"KLM204\"\nat_m = [0, 0]\nheading_deg = 0\n\
+                    way_points_m = [[9000, 0]]\n\
+                    [[airplanes]]\nat_m = [0, 4000]\nheading_deg = 0\nway_points_m = [[9000, 4000]]\n";
+    place.write("sky.toml", scenario);
+    place.json(&["run", "sky.toml", "--out", "r"]);
+    let svg = place.read("r/trajectories.svg");
+    assert!(svg.contains("KLM204") && svg.contains("airplane 1"), "{svg}");
+    assert_eq!(of_class(&svg, "direction").len(), 2, "each way has an arrowhead");
+}
+
 #[test]
 fn airplanes_are_drawn_with_their_zones_starts_and_goals() {
     let place = Place::new();

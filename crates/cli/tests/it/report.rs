@@ -38,6 +38,10 @@ fn a_run_of_every_world_becomes_a_page_and_its_twin() {
         for words in ["n = 1", "sidestep run r/scenario.toml", "sidestep replay r", "## Results"] {
             assert!(text.contains(words), "{words}: {text}");
         }
+        let order =
+            ["## Where everybody went", "## Results", "## What happened", "## What was run"];
+        let places = order.map(|head| text.find(head).unwrap_or_else(|| panic!("{head}: {text}")));
+        assert!(places.is_sorted(), "the picture first, then numbers: {places:?}");
         assert!(!text.contains("not complete") && !text.contains("NaN"), "{text}");
         assert!(place.read("r/report.html").len() < MOST_BYTES, "{name}");
         let pictures = names(&place.path("r/report-figures"));
@@ -58,6 +62,79 @@ fn a_run_of_every_world_becomes_a_page_and_its_twin() {
         }
         assert!(found["heads"].to_string().contains("Results"));
     }
+}
+
+#[test]
+fn metrics_are_told_in_words_with_their_unit_and_meaning() {
+    let text = reported(SIX).read("r/report.md");
+    let row = "| m | closest approach of any two; none if no two came near each other | \
+               min_separation_m |";
+    assert!(text.contains("| Closest approach | ") && text.contains(row), "{text}");
+    assert!(text.contains("### Metrics that stayed 0") && text.contains("| flight alone (s) |"));
+}
+
+#[test]
+fn figures_for_print_have_a_size_and_words_of_their_own_and_no_title() {
+    let place = reported(SIX);
+    let told = place.json(&[
+        "report",
+        "r",
+        "--figure",
+        "svg,png",
+        "--figure-size",
+        "127x63.5",
+        "--label",
+        "cycle=Time in cycles",
+    ]);
+    assert_eq!(told["figures"], "r/report-print");
+    let files = names(&place.path("r/report-print"));
+    assert!(files.iter().any(|name| name.ends_with(".png")), "{files:?}");
+    let svg = files.iter().find(|name| name.ends_with(".svg")).expect("a figure");
+    let svg = place.read(&format!("r/report-print/{svg}"));
+    assert!(svg.contains("width=\"480\"") && svg.contains("Time in cycles"), "{svg}");
+    assert!(!svg.contains("Events over time</text>"), "no title");
+    for (option, value, says) in [
+        ("--figure-size", "9x9", "30 to 500 mm"),
+        ("--figure-font", "99", "4 to 40"),
+        ("--label", "none such=x", "no figure has the words"),
+        ("--label", "=x", "names no words"),
+    ] {
+        let ended = place.run(&["report", "r", "--figure", "svg", option, value]);
+        assert_eq!(ended.code(), 2, "{option} {value}");
+        assert!(ended.err().contains(says), "{}", ended.err());
+    }
+    let ended = place.run(&["report", "r", "--figure", "pdf"]);
+    assert_eq!((ended.code(), ended.err().contains("write svg")), (2, true), "{}", ended.err());
+}
+
+#[test]
+fn a_hypercube_is_drawn_as_points_in_its_box_and_has_no_baseline() {
+    let place = Place::new();
+    let sweep = "format = 1\nscenario = \"c.toml\"\nname = \"cube\"\nreplicates = 1\n\
+                 metrics = [\"rotations\"]\n[set]\ncycles = 40\n\
+                 [latin_hypercube]\nsamples = 12\nseed = 1\n[latin_hypercube.range]\n\
+                 chain.dt_s = { low = 0.01, high = 0.02 }\n\
+                 chains.connectors = { low = 8, high = 12, integer = true }\n";
+    place.write("c.toml", CHAIN);
+    place.write("cube.toml", sweep);
+    place.json(&["sweep", "cube.toml", "--out", "d"]);
+    place.json(&["report", "d"]);
+    let text = place.read("d/report.md");
+    assert!(text.contains("### What the metrics depend on") && !text.contains("against"), "{text}");
+    assert_eq!(text.matches("where the samples are](").count(), 1, "{text}");
+}
+
+#[test]
+fn a_picture_of_thousands_of_balls_stays_small() {
+    let place = Place::new();
+    let scenario = "format = 1\nworld = \"chain\"\ncycles = 4\n[chain]\ndimensions = 3\n\
+                    [[fields]]\nlo_m = [-9.0, -9.0, -9.0]\nhi_m = [9.0, 9.0, 9.0]\npart = 0.1\n\
+                    radius_m = 0.3\n[[chains]]\nconnectors = 12\nat_m = [0.0, 0.0, 0.0]\nrod_m = 0.3\n\
+                    [[chains.tasks]]\nkind = \"wander\"\n";
+    place.write("balls.toml", scenario);
+    place.json(&["run", "balls.toml", "--out", "r"]);
+    place.json(&["report", "r"]);
+    assert!(place.read("r/report.html").len() < MOST_BYTES);
 }
 
 #[test]
@@ -91,7 +168,18 @@ fn a_sweep_becomes_a_page_with_intervals_figures_and_pictures() {
     place.json(&["sweep", "sweep.toml", "--out", "d"]);
     place.json(&["report", "d"]);
     let text = place.read("d/report.md");
-    for words in ["# crowds", "18 runs of 6 variants", "## Contacts", "## Coverage", "minus"] {
+    let wanted = [
+        "# crowds",
+        "18 runs of 6 variants",
+        "## Results",
+        "## Share of the floor covered",
+        "| metric | variant | mean | difference | p (Holm) | n |",
+        "## How the numbers were made",
+    ];
+    assert!(text.find("## Results") < text.find("## What was run"), "results come first");
+    let footnote = "by Student's t and by the bootstrap";
+    assert_eq!(text.matches(footnote).count(), 1, "a footnote stands once");
+    for words in wanted {
         assert!(text.to_lowercase().contains(&words.to_lowercase()), "{words}: {text}");
     }
     assert!(text.contains("sidestep run d/variants/0000/scenario.toml --seed 5"), "{text}");

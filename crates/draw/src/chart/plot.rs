@@ -4,8 +4,9 @@ use crate::axis::{Axis, Fitted, Scale};
 use crate::chart::error_bar;
 use crate::chart::frame::{Across, Frame, Words, most_ticks, polyline};
 use crate::error::DrawError;
-use crate::legend::{Entry, Marker, Symbol, dashes};
+use crate::legend::{Entry, Marker, Symbol, arrowhead, dashes, start_mark};
 use crate::style::{FAINT_INK, Style, series_color, series_dash};
+use crate::svg::Svg;
 
 /// Straight pieces of an ideal line, which is a curve if one axis is logarithmic.
 const IDEAL_PIECES: u32 = 64;
@@ -44,6 +45,8 @@ pub enum Mark {
     Line,
     /// A line alone, within a band of the intervals.
     Band,
+    /// A way in the plane: a line alone, with a ring where it starts and an arrowhead where it ends.
+    Way,
     /// Markers only.
     Points,
 }
@@ -79,7 +82,7 @@ impl Series {
         match self.mark {
             Mark::Points => true,
             Mark::Line => self.points.len() <= MOST_MARKERS,
-            Mark::Band => false,
+            Mark::Band | Mark::Way => false,
         }
     }
 }
@@ -199,7 +202,7 @@ impl Plot {
             let (color, marker) = (series_color(index), Marker::of_series(index));
             let symbol = match series.mark {
                 Mark::Points => Symbol::Marker { color, marker },
-                Mark::Line | Mark::Band => {
+                Mark::Line | Mark::Band | Mark::Way => {
                     let marker = series.shows_markers().then_some(marker);
                     Symbol::Line { color: color.into(), marker, dash: series_dash(index) }
                 }
@@ -229,6 +232,10 @@ impl Plot {
                 let look = r#"fill="none" stroke-width="2" stroke-linejoin="round""#;
                 let dash = series_dash(index);
                 frame.svg.path(&data, format_args!(r#"stroke="{color}" {look}{dash}"#));
+                if series.mark == Mark::Way {
+                    let places: Vec<Px> = run.iter().map(|p| (x.px(p.x), y.px(p.y))).collect();
+                    draw_ends(&mut frame.svg, &places, color, 0.7 * style.font_px);
+                }
             }
         }
         for point in series.points.iter().filter(|p| self.holds(p)) {
@@ -302,5 +309,17 @@ fn draw_ideal(frame: &mut Frame, ideal: &Ideal, x: &Fitted, x_scale: Scale, y_ax
     let data = polyline(points);
     if !data.is_empty() {
         frame.svg.path(&data, dashes(FAINT_INK));
+    }
+}
+/// A point in pixels, y downward.
+type Px = (f64, f64);
+
+/// Marks where a way starts, and where and in which direction it ends.
+fn draw_ends(svg: &mut Svg, places: &[Px], color: &str, head_px: f64) {
+    let [start, .., end] = places else { return };
+    start_mark(svg, *start, 0.4 * head_px, color);
+    let is_apart = |p: &&Px| (p.0 - end.0).hypot(p.1 - end.1) > 0.5;
+    if let Some(before) = places.iter().rev().find(is_apart) {
+        arrowhead(svg, *before, *end, head_px, color);
     }
 }

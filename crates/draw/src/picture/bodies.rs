@@ -29,7 +29,9 @@ const MOST_NUMBERED: usize = 12;
 /// Number of balls in space above which those of one size and about one depth are one path, without rims.
 const MOST_BALLS: usize = 400;
 /// Shades of such balls.
-const SHADES: f64 = 24.0;
+const SHADES: f64 = 16.0;
+/// The look that lines share.
+const LINE_LOOK: &str = r#"fill="none" stroke-linecap="round" stroke-linejoin="round""#;
 /// Time whose way a moving body's arrow shows, seconds.
 const ARROW_S: f64 = 1.0;
 /// Corners of a circle that is seen from the side.
@@ -98,12 +100,14 @@ pub(super) fn draw_by_depth<'a>(
     let are_many = parts.iter().filter(|(_, body, _)| is_ball(body)).count() > MOST_BALLS;
     let like =
         |a: &Body, b: &Body| is_ball(a) && is_ball(b) && dot_look(canvas, a) == dot_look(canvas, b);
+    svg.raw(format_args!(r#"<g class="parts" {LINE_LOOK}>"#));
     for alike in parts.chunk_by(|(_, a, _), (_, b, _)| are_many && like(a, b)) {
         match alike {
             [(_, first, _), ..] if are_many && is_ball(first) => draw_dots(svg, canvas, alike),
             _ => alike.iter().for_each(|part| draw_part(svg, scene, canvas, part)),
         }
     }
+    svg.close_group();
 }
 
 fn draw_part(
@@ -132,9 +136,7 @@ fn dot_look(canvas: &Canvas, body: &Body) -> String {
     let shade = (canvas.nearness(body.pose.at_m) * SHADES).round() / SHADES;
     let (color, opacity) = (hex(paler(look.color, shade)), look.opacity);
     let width = Num(2.0 * (radius_m * canvas.px_per_m).max(LEAST_RADIUS_PX));
-    format!(
-        r#"fill="none" stroke="{color}" stroke-opacity="{opacity}" stroke-width="{width}" stroke-linecap="round""#
-    )
+    format!(r#"stroke="{color}" stroke-opacity="{opacity}" stroke-width="{width}""#)
 }
 
 /// Draws balls of one look as one path: thousands of circles would be most of a picture's bytes.
@@ -244,9 +246,9 @@ fn draw_line(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body, poi
     let width = Num((thickness_m * canvas.px_per_m).max(LEAST_LINE_PX));
     let hides = if opacity < 1.0 { r#" stroke-opacity="0.45""# } else { "" };
     let data = path_data(points_m.iter().map(|&p| canvas.at(p)));
-    let ends = r#"stroke-linecap="round" stroke-linejoin="round""#;
-    let color = hex(color);
-    let look = format!(r#"fill="none" stroke="{color}" stroke-width="{width}"{hides} {ends}"#);
+    // In space the group around all parts says the rest.
+    let ends = if canvas.is_above() { format!(" {LINE_LOOK}") } else { String::new() };
+    let look = format!(r#"stroke="{}" stroke-width="{width}"{hides}{ends}"#, hex(color));
     svg.path(&data, look);
 }
 

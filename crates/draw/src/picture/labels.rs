@@ -3,9 +3,9 @@
 use super::canvas::{Canvas, Px};
 use super::trails::Shown;
 use super::{Scene, key};
-use crate::legend::{end_mark, start_mark};
+use crate::legend::{arrowhead, end_mark, start_mark};
 use crate::style::{Style, hex};
-use crate::svg::{Anchor, Num, Rect, Svg, TextLook};
+use crate::svg::{Anchor, Rect, Svg, TextLook};
 use crate::text::{self, Weight};
 use sidestep_kernel::view::{Body, Kind, Shape};
 
@@ -83,15 +83,7 @@ fn draw_direction(svg: &mut Svg, trail: &Shown<'_>, canvas: &Canvas, color: &str
         gone >= half && length(pair) > 0.0
     });
     let Some(&[(x0, y0), (x, y)]) = middle else { return };
-    let far = length(&[(x0, y0), (x, y)]);
-    let (ux, uy) = (HEAD_PX * (x - x0) / far, HEAD_PX * (y - y0) / far);
-    let wing = |side: f64| (x - ux + side * 0.5 * uy, y - uy - side * 0.5 * ux);
-    let [(ax, ay), (bx, by)] = [wing(1.0), wing(-1.0)].map(|(x, y)| (Num(x), Num(y)));
-    let data = format!("M{ax} {ay}L{} {}L{bx} {by}Z", Num(x), Num(y));
-    svg.path(
-        &data,
-        format_args!(r##"class="direction" fill="{color}" stroke="#FFFFFF" stroke-width="0.6""##),
-    );
+    arrowhead(svg, (x0, y0), (x, y), HEAD_PX, color);
 }
 
 fn radius_m(body: &Body) -> f64 {

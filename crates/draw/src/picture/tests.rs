@@ -79,13 +79,16 @@ fn shapes_are_where_they_are() {
 fn pair() -> Vec<Body> {
     let ends = [[4.0, 5.0, 0.0], [2.0, 5.0, 0.0]];
     let rod = Shape::Line { points_m: ends.to_vec(), thickness_m: 0.4 };
-    let connector = |part: u32| ball(Kind::Connector, 0, ends[part as usize], 0.5).part(part);
+    let connector = |part: u32| {
+        let ball = ball(Kind::Connector, 0, ends[part as usize], 0.5);
+        ball.part(part).when(part == 0, Condition::Leading)
+    };
     vec![Body::new(Kind::Rods, 0, Pose::at([0.0; 3]), rod), connector(0), connector(1)]
 }
 
 #[test]
 fn a_leader_is_a_ring_and_its_followers_are_discs() {
-    let places = [[4.0, 5.0], [2.0, 5.3], [3.0, 5.15], [3.0, 5.3]];
+    let places = [[4.25, 5.0], [2.0, 5.3], [3.0, 5.15], [3.0, 5.3]];
     let [leader, follower, rod, beside] = colors(pair(), vec![], places);
     assert_eq!((leader, beside), ([255; 3], [255; 3]));
     assert_eq!((follower, rod), (COLORS[0], COLORS[0]));

@@ -87,7 +87,7 @@ impl Body {
             (Kind::Person, _) => "mobile object",
             (Kind::Obstacle, _) if self.moves() => "moving obstacle (arrow: way of 1 s)",
             (Kind::Obstacle, _) => "obstacle",
-            (Kind::Start, _) => "start",
+            (Kind::Start, _) => "start, as wide as its zone of separation",
             (Kind::Goal, _) => "goal",
             (Kind::Robot | Kind::Connector | Kind::Rods | Kind::Airplane, _) => "",
         }

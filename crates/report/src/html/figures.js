@@ -345,6 +345,7 @@ const figures = (() => {
     }
     if (isBanded(figure)) group.append(...bands(points, color));
     if (isJoined(figure)) group.append(...lines(points, color, dashOf(chart, series.index)));
+    if (figure.kind === "ways" && there.length > 1) group.append(...wayEnds(there, color));
     if (!isBanded(figure)) group.append(...sure.map((p) => errorBar(p, 4, { stroke: color })));
     if (hasMarkers(figure, series)) {
       const look = { class: "marker", fill: color };
@@ -366,6 +367,19 @@ const figures = (() => {
       const d = pathThrough(run.map((point) => [point.x, point.y]));
       return drawn("path", { class: "line", d, stroke, "stroke-dasharray": dash });
     });
+  }
+
+  // A ring where a way starts, and an arrowhead where it ends.
+  function wayEnds(there, color) {
+    const [start, end] = [there[0], there.at(-1)];
+    const ring = drawn("circle", { class: "start", cx: start.x, cy: start.y, r: 3.5, stroke: color });
+    const before = there.findLast((p) => Math.hypot(end.x - p.x, end.y - p.y) > 0.5);
+    if (!before) return [ring];
+    const far = Math.hypot(end.x - before.x, end.y - before.y);
+    const [ux, uy] = [(9 * (end.x - before.x)) / far, (9 * (end.y - before.y)) / far];
+    const wing = (side) => `${fixed(end.x - ux + side * 0.5 * uy)} ${fixed(end.y - uy - side * 0.5 * ux)}`;
+    const d = `M${wing(1)}L${fixed(end.x)} ${fixed(end.y)}L${wing(-1)}Z`;
+    return [ring, drawn("path", { class: "end", d, fill: color })];
   }
 
   // Bars from zero, or from the low end of a logarithmic axis, and the line that they stand on.

@@ -157,3 +157,45 @@ fn quarters(scenery: &Scenery, body: &Body) -> u32 {
     let ([x0, y0], [x1, y1]) = (floor.plane.point([0.0; 2]), floor.plane.point([x, y]));
     u32::from((y1 - y0).abs() > (x1 - x0).abs())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Unwatched;
+    use crate::driver::{Sinks, drive};
+    use sidestep::scenario::Source;
+    use sidestep::worlds::WORLDS;
+
+    /// Robots among walls that slip to the side, watched for 200 cycles.
+    const SCENARIO: &str = "format = 1\nworld = \"robots\"\nregime = \"both\"\n\
+                            [map]\nbox_size_m = 0.5\nascii = \"\"\"\n\
+                            ############\n#..........#\n#..#.......#\n#..#..##...#\n#..........#\n############\n\
+                            \"\"\"\n[robots]\ncount = 2\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n";
+
+    #[test]
+    fn a_way_has_every_cycle_however_far_apart_frames_are_and_no_step_cuts_a_corner() {
+        let source = Source::new("t", SCENARIO, "");
+        let compiled = WORLDS.compile(&source).expect("a scenario");
+        let mut run = compiled.start(&source, 1);
+        let mut alone = compiled.start(&source, 1);
+        let mut pictures = Pictures::new(run.as_ref(), 67, 200);
+        let sinks = Sinks { film: Some(&mut pictures), ..Sinks::default() };
+        drive(run.as_mut(), 200, sinks, &Unwatched).expect("a film");
+        alone.advance(200);
+        assert_eq!(run.digest(), alone.digest(), "looking changes nothing");
+        let last = pictures.len() - 1;
+        for of in worth_a_trail(&pictures.scenery, &pictures.frames[last]) {
+            let way = pictures.trail(of, last).way;
+            let mut cycles: Vec<Cycle> = way.iter().map(|(cycle, _)| *cycle).collect();
+            cycles.dedup();
+            assert_eq!(cycles, (0..=200).collect::<Vec<Cycle>>());
+            for pair in way.windows(2) {
+                let moved = |k: usize| (pair[1].1[k] - pair[0].1[k]).abs();
+                assert!(moved(0).max(moved(1)) < 0.51 && moved(0).min(moved(1)) < 1e-9, "{pair:?}");
+            }
+        }
+        assert!(
+            pictures.trail((sidestep::kernel::view::Kind::Robot, 9, None), last).way.is_empty()
+        );
+    }
+}

@@ -8,7 +8,7 @@ use serde_json::Value;
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::table::split_unit;
 use sidestep::kernel::ports::{ColumnSpec, TableSchema};
-use sidestep::scenario::Source;
+use sidestep::scenario::{Source, told};
 use sidestep::worlds::WORLDS;
 use std::fmt::Write;
 
@@ -103,6 +103,18 @@ fn the_chapter_of_columns_names_every_event_and_no_other() {
         let name = |row: &str| row.strip_prefix("| `")?.split('`').next().map(String::from);
         let named: Vec<String> = rows.filter_map(name).collect();
         assert_eq!(named, event.labels, "events of {world}");
+    }
+}
+
+#[test]
+fn every_metric_is_told_in_words_with_a_meaning() {
+    for (world, scenario) in SCENARIOS {
+        let meanings = WORLDS.named(world).expect("a world").meanings();
+        let names = metrics(&started(world, scenario).metrics(), "");
+        for name in names {
+            let one = if name.contains("_by_") { format!("{name}.some") } else { name };
+            assert_ne!(told(meanings, &one).meaning, "", "{world}: `{one}`");
+        }
     }
 }
 

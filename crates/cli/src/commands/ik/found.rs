@@ -32,7 +32,7 @@ pub(super) struct Found {
     #[serde(skip)]
     wanted: usize,
     #[serde(flatten)]
-    placed: Placed,
+    pub(super) placed: Placed,
 }
 
 #[derive(Debug, Serialize)]

@@ -28,7 +28,7 @@ Examples:
   sidestep ik panda.urdf --srdf panda.srdf --group arm --posture default \\
       --target 0.4,0,0.5 --nearest
   sidestep ik arm.urdf --targets poses.csv > answers.csv
-  sidestep ik arm.urdf --target 0.3,0.1,0.4 --obstacle 0.2,0,0.3,0.05
+  sidestep ik arm.urdf --target 0.3,0.1,0.4 --obstacle 0.2,0,0.3,0.05 --png arm.png
 
 The target is the tip's frame in the frame of the base: its position in m, and with --rpy or \
 --quaternion its orientation. --free names what of it does not count, in the target's own axes: x, y, \
@@ -92,6 +92,10 @@ pub(crate) struct IkArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["target", "rpy", "quaternion"])]
     targets: Option<PathBuf>,
 
+    /// Draw the posture that was found into this file, with the target and the obstacles
+    #[arg(long, value_name = "FILE", conflicts_with = "targets")]
+    png: Option<PathBuf>,
+
     #[command(flatten)]
     goal: GoalArgs,
 }
@@ -110,6 +114,9 @@ pub(crate) fn ik(args: &IkArgs, console: Console) -> Result<ExitCode, Failure> {
     let answer = arm.chain.solve(&goal, &arm.values)?;
     remarks.iter().for_each(|remark| console.note(remark));
     let found = Found::new(&arm, &goal, answer, remarks);
+    if let Some(path) = &args.png {
+        found.placed.picture(Some(goal.target.origin_m), &goal.spheres).write(path)?;
+    }
     console.result(&found, || found.text());
     Ok(if found.reached { ExitCode::Done } else { ExitCode::Failed })
 }

@@ -152,17 +152,60 @@ fn figures_are_lines_over_numbers_bars_over_words_and_points_where_nothing_is_on
             .all(|p| p.interval.is_some())
     );
     assert_eq!(lines.y_label, "mean delay (%)");
-    assert_eq!(
-        lines.title,
-        "Mean delay over robots.count (means with 95 % intervals, 20 runs a variant)"
-    );
+    assert_eq!(lines.title, "Mean delay (%) over robots.count");
+    assert_eq!(lines.note, "Means with 95 % intervals, 20 runs a variant.");
 
     let scattered = summed(&hypercube(30, 2));
     assert!(scattered.baseline.is_none() && scattered.metrics[0].effects.is_empty());
     assert!(scattered.notes[0].starts_with("The variants are no full grid"));
     let figures = scattered.figures();
-    assert_eq!(figures.len(), 2);
-    assert!(figures.iter().all(|f| f.kind == FigureKind::Points && f.series[0].points.len() == 30));
+    assert!(figures.iter().all(|f| f.kind == FigureKind::Points));
+    let points = figures.iter().map(|f| f.series.iter().map(|s| s.points.len()).collect());
+    let points: Vec<Vec<usize>> = points.collect();
+    assert_eq!(points, [vec![10, 10, 10], vec![30], vec![30]], "the box in thirds, and both sides");
+    assert_eq!(scattered.overview().columns, ["metric", "goes with", "rank correlation", "n"]);
+    let lag = scattered.trends.iter().find(|t| t.parameter == "speed_m_s").unwrap();
+    assert!(lag.rank_correlation.unwrap().value > 0.99 && lag.n == 30);
+}
+
+/// A hypercube of which one side is a whole number: some variants share it, and still none is a baseline.
+#[test]
+fn samples_of_whole_numbers_are_samples_too() {
+    let mut table = hypercube(30, 1);
+    let speed = table.columns.iter_mut().find(|c| c.name == "speed_m_s").unwrap();
+    speed.values = Values::I64((0..30).map(|k| Some(k % 4)).collect());
+    let summary = summed(&table);
+    assert_eq!((summary.baseline.clone(), summary.figures().len()), (None, 3));
+}
+
+#[test]
+fn parameters_that_always_change_together_share_an_axis() {
+    let rows = || (0..12_i64).map(|k| k / 4);
+    let text =
+        |words: [&str; 3]| Values::Text(rows().map(|k| Some(words[k as usize].into())).collect());
+    let columns = vec![
+        column("variant", Role::Variant, Values::I64(rows().map(Some).collect())),
+        column("replicate", Role::Replicate, Values::I64((0..12).map(|k| Some(k % 4)).collect())),
+        column("method", Role::Parameter, text(["none", "mvp", "pc"])),
+        column("shield", Role::Parameter, text(["off", "on", "auto"])),
+        column("lag_m", Role::Metric, numbers((0..12).map(f64::from))),
+    ];
+    let summary = summed(&RunTable { columns });
+    let names: Vec<&str> = summary.parameters.iter().map(|p| p.name.as_str()).collect();
+    assert_eq!(names, ["method, shield"]);
+    let [figure] = &summary.figures()[..] else { panic!("one figure") };
+    let bars = ["none, off", "mvp, on", "pc, auto"].map(String::from).to_vec();
+    assert_eq!(figure.kind, FigureKind::Bars { categories: bars });
+}
+
+#[test]
+fn one_table_has_every_mean_with_its_difference_p_and_n() {
+    let overview = summed(&grid()).overview();
+    let columns = ["metric", "variant", "mean", "difference", "p (Holm)", "n"];
+    assert_eq!((&overview.columns[..], overview.rows.len()), (&columns.map(String::from)[..], 18));
+    assert_eq!(overview.rows[0][0], "Mean delay (%)");
+    assert_eq!(overview.rows[0][3..5], ["", ""], "the baseline differs from nothing");
+    assert!(overview.rows[3][3].ends_with(']') && overview.rows[3][5] == "20");
 }
 
 /// Two numeric parameters that no two variants share, 2 replicates.
@@ -200,10 +243,10 @@ fn no_number_in_a_table_is_without_interval_and_n() {
         assert!(table.rows.iter().all(|row| row.len() == table.columns.len()), "{}", table.title);
     }
     let delay = &tables[0];
-    assert_eq!((delay.title.as_str(), delay.rows.len()), ("Mean delay (%)", 6));
+    assert_eq!((delay.title.as_str(), delay.rows.len()), ("Mean delay (%): all numbers", 6));
     assert_eq!(delay.columns[1], "n");
-    assert!(delay.rows.iter().all(|row| row[3].ends_with(']') && row[5].ends_with(']')));
-    assert!(delay.rows[0][6].ends_with("[-]"), "20 runs do not bound a 5th percentile");
+    assert!(delay.rows.iter().all(|row| row[2].ends_with(']') && row[3].ends_with(']')));
+    assert!(delay.rows[0][8].ends_with("[-]"), "20 runs do not bound a 5th percentile");
     assert_eq!(tables.last().unwrap().title, "Metrics not shown");
 }
 
