@@ -70,13 +70,13 @@ pub struct Metrics {
     /// decides for all, or where messages take no time.
     pub network_s: Option<f64>,
     /// Number of optimizations run.
-    pub optimisations: u64,
+    pub optimizations: u64,
     /// Mean number of their rounds.
     pub rounds_mean: Option<f64>,
     /// Number of optimizations whose rounds ran out.
     pub unconverged: u64,
     /// Processor time in seconds spent deciding in this process's run, all workers together.
-    pub optimise_cpu_s: f64,
+    pub optimize_cpu_s: f64,
     /// Number of times that the shield changed an airplane's wish.
     pub shield_overrides: u64,
     /// Number of those times when the airplane fell back to an orbit for one `dt`.
@@ -247,7 +247,7 @@ pub fn metrics(
         at_s: world.starts_s(cycle),
         airplane,
     };
-    let Effort { optimizations: optimisations, rounds, unconverged, traffic } = ledger.effort;
+    let Effort { optimizations, rounds, unconverged, traffic } = ledger.effort;
     Metrics {
         min_separation_m: nearest,
         losses_of_separation: ledger.pairs.values().map(|r| u64::from(r.losses)).sum(),
@@ -260,10 +260,10 @@ pub fn metrics(
         multicasts: traffic.multicasts,
         multicast_bytes: traffic.multicast_bytes,
         network_s: world.network.as_ref().map(|network| network.seconds(traffic.ticks)),
-        optimisations,
-        rounds_mean: mean(rounds as f64, optimisations as usize),
+        optimizations,
+        rounds_mean: mean(rounds as f64, optimizations as usize),
         unconverged,
-        optimise_cpu_s: decide_s,
+        optimize_cpu_s: decide_s,
         shield_overrides: all.iter().map(|a| u64::from(a.shield_overrides)).sum(),
         shield_orbits: all.iter().map(|a| u64::from(a.shield_orbits)).sum(),
         shield_held_back: ledger.count(EventKind::HeldBack),

@@ -195,7 +195,7 @@ fn flights(m: &Metrics) -> Lines {
         line("nearest approach", nearest),
         line("losses of separation", lost),
         line("delay", delay),
-        line("optimizations", format!("{}{rounds}", grouped(m.optimisations))),
+        line("optimizations", format!("{}{rounds}", grouped(m.optimizations))),
         line(
             "shield",
             format!(

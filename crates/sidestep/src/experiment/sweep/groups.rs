@@ -61,10 +61,14 @@ pub(super) struct Groups<'a> {
 
 impl<'a> Groups<'a> {
     /// Groups the runs of `table`.
-    pub(super) fn of(table: &'a RunTable, seedless: &BTreeSet<String>) -> Result<Self, InputError> {
+    pub(super) fn of(
+        table: &'a RunTable,
+        names: Option<&[String]>,
+        seedless: &BTreeSet<String>,
+    ) -> Result<Self, InputError> {
         table.check()?;
         let runs = ordered(table);
-        let label = |run: usize| variant_name(table, run);
+        let label = |run: usize| variant_name(table, run, names);
         let replicate = table.of_role(Role::Replicate).next();
         let mut variants: Vec<String> = Vec::new();
         let mut places: BTreeMap<String, usize> = BTreeMap::new();
@@ -186,10 +190,13 @@ fn ordered(table: &RunTable) -> Vec<usize> {
     rows
 }
 
-/// Returns the variant's name, or its parameters if the table has no names.
-fn variant_name(table: &RunTable, run: usize) -> String {
+/// Returns the variant's name, or its parameters if the table has no names; with `names`, the table
+/// has their numbers.
+fn variant_name(table: &RunTable, run: usize, names: Option<&[String]>) -> String {
     if let Some(column) = table.of_role(Role::Variant).next() {
-        return column.values.text(run);
+        let number = || column.values.number(run).map(|n| n as usize);
+        let named = names.and_then(|names| names.get(number()?).cloned());
+        return named.unwrap_or_else(|| column.values.text(run));
     }
     let parts: Vec<String> = table
         .of_role(Role::Parameter)
