@@ -105,22 +105,28 @@ pub struct Metrics {
 }
 
 /// An airplane whose errors exceeded the shield's bounds.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BeyondBound {
     /// Time of the first such error, in seconds after the start of the run.
     pub at_s: f64,
     /// Id of the airplane.
     pub airplane: EntityId,
+    /// Its call sign.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub callsign: Option<String>,
 }
 
 /// Two airplanes that were too near each other for the shield when the later one came in, or one of
 /// which minds nobody and could reach the other.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TooClose {
     /// Time when that began, in seconds after the start of the run.
     pub at_s: f64,
     /// Ids of the two.
     pub airplanes: [EntityId; 2],
+    /// Their call signs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub callsigns: Option<[String; 2]>,
 }
 
 /// Metrics of one airplane.
@@ -128,6 +134,9 @@ pub struct TooClose {
 pub struct AirplaneMetrics {
     /// Its id.
     pub airplane: EntityId,
+    /// Its call sign.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub callsign: Option<String>,
     /// Seconds from its appearance to its arrival, if it has arrived; for a recorded airplane, from
     /// its handover to the method.
     pub flown_s: Option<f64>,
@@ -149,10 +158,13 @@ pub struct AirplaneMetrics {
 }
 
 /// Metrics of two airplanes that came near each other.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PairMetrics {
     /// Their ids.
     pub airplanes: [EntityId; 2],
+    /// Their call signs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub callsigns: Option<[String; 2]>,
     /// Closest approach in meters.
     pub nearest_m: f64,
     /// Number of times that they came nearer than their separation.
@@ -182,6 +194,7 @@ pub fn airplane_metrics(
     let flown_s = arrived_s.map(|s| s - joined_s).filter(|_| !is_replayed_to_the_end(world, id));
     AirplaneMetrics {
         airplane: id,
+        callsign: world.callsign(id),
         flown_s,
         alone_s,
         delay_percent: flown_s
@@ -208,6 +221,7 @@ pub fn pair_metrics(world: &AirspaceWorld, ledger: &Ledger) -> Vec<PairMetrics> 
     let separation_m = |id: EntityId| world.airplanes[id as usize].model.separation_m;
     let one = |(&(a, b), record): (&(EntityId, EntityId), &PairRecord)| PairMetrics {
         airplanes: [a, b],
+        callsigns: world.callsigns([a, b]),
         nearest_m: record.nearest_m,
         losses: record.losses,
         lost_s: record.lost_ns as f64 / 1e9,
@@ -246,6 +260,7 @@ pub fn metrics(
     let beyond_bound = |(&airplane, &cycle): (&EntityId, &Cycle)| BeyondBound {
         at_s: world.starts_s(cycle),
         airplane,
+        callsign: world.callsign(airplane),
     };
     let Effort { optimizations, rounds, unconverged, traffic } = ledger.effort;
     Metrics {
@@ -280,7 +295,8 @@ pub fn metrics(
 }
 
 fn too_close(world: &AirspaceWorld, &(cycle, a, b): &(Cycle, EntityId, EntityId)) -> TooClose {
-    TooClose { at_s: world.starts_s(cycle), airplanes: [a, b] }
+    let callsigns = world.callsigns([a, b]);
+    TooClose { at_s: world.starts_s(cycle), airplanes: [a, b], callsigns }
 }
 
 /// Returns whether all airplanes have arrived or left by now.

@@ -39,8 +39,15 @@ pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
         cycle_s: world.timing.dt_s,
         floor: None,
         bodies: starts.chain((0..).zip(&world.airplanes).filter_map(goal)).collect(),
-        names: Vec::new(),
+        names: names(world),
     }
+}
+
+/// Returns the call signs.
+fn names(world: &AirspaceWorld) -> Vec<(Kind, u32, String)> {
+    let named =
+        |(id, airplane): (u32, &Airplane)| Some((Kind::Airplane, id, airplane.callsign.clone()?));
+    (0..).zip(&world.airplanes).filter_map(named).collect()
 }
 
 /// Returns how recorded poses give the places of airplanes.
