@@ -152,10 +152,10 @@ fn spent(case: &Runs<'_>, run: &Run<'_>) -> Spent {
     // but arrives at the same time.
     let (senders, receivers) = if is_team { (n, n - 1.0) } else { (1.0, 1.0) };
     Spent {
-        deciding_s: run.or_zero("optimise_cpu_s") / senders,
+        deciding_s: run.or_zero("optimize_cpu_s") / senders,
         bits_in_turn: 8.0 * run.or_zero("bytes") / senders,
         messages_in_turn: run.or_zero("messages") / (senders * receivers),
-        optimizations: run.or_zero("optimisations"),
+        optimizations: run.or_zero("optimizations"),
     }
 }
 

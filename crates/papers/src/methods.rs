@@ -35,7 +35,7 @@ pub struct MethodResult {
     /// Mean delay, percent.
     pub delay_percent: Estimate,
     /// Time spent deciding per run, seconds.
-    pub optimise_cpu_s: Estimate,
+    pub optimize_cpu_s: Estimate,
     /// Messages per run.
     pub messages: Estimate,
     /// Bytes per run.
@@ -138,7 +138,7 @@ fn result(method: &'static str, seeds: Seeds, all: &[Metrics]) -> MethodResult {
         min_separation_m: all.iter().filter_map(|m| m.min_separation_m).reduce(f64::min),
         arrived: of(|m| Some(m.arrived as f64 / m.airplanes.max(1) as f64)),
         delay_percent: of(|m| m.mean_delay_percent),
-        optimise_cpu_s: of(|m| Some(m.optimise_cpu_s)),
+        optimize_cpu_s: of(|m| Some(m.optimize_cpu_s)),
         messages: of(|m| Some(m.messages as f64)),
         bytes: of(|m| Some(m.bytes as f64)),
         shield_overrides: of(|m| Some(m.shield_overrides as f64)),
@@ -160,7 +160,7 @@ pub fn table(title: &str, results: &[MethodResult]) -> Table {
             }),
             ("arrived", &|r| of_runs(r, &r.arrived)),
             ("delay, %", &|r| of_runs(r, &r.delay_percent)),
-            ("deciding, s", &|r| of_runs(r, &r.optimise_cpu_s)),
+            ("deciding, s", &|r| of_runs(r, &r.optimize_cpu_s)),
             ("messages", &|r| of_runs(r, &r.messages)),
             ("bytes", &|r| of_runs(r, &r.bytes)),
             ("changed by the shield", &|r| of_runs(r, &r.shield_overrides)),

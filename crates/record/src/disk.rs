@@ -36,6 +36,42 @@ fn write_through(path: &Path, bytes: &[u8]) -> io::Result<()> {
     file.sync_all()
 }
 
+/// Writes a file into a folder that has no name yet: one call of [`sync_below`] makes all of them
+/// durable, which is some thousand times faster than one each.
+///
+/// # Errors
+/// An I/O error.
+pub(crate) fn put(path: &Path, bytes: &[u8]) -> Result<(), RecordError> {
+    fs::write(path, bytes).map_err(|e| RecordError::new(path.display(), e))
+}
+
+/// Makes all files of a folder and of those in it durable.
+///
+/// # Errors
+/// An I/O error.
+pub(crate) fn sync_below(folder: &Path) -> Result<(), RecordError> {
+    sync_tree(folder).map_err(|e| RecordError::new(folder.display(), e))
+}
+
+/// Syncs the folder's file system at once.
+#[cfg(target_os = "linux")]
+fn sync_tree(folder: &Path) -> io::Result<()> {
+    Ok(rustix::fs::syncfs(File::open(folder)?)?)
+}
+
+/// Syncs file by file: other systems have no call for all.
+#[cfg(not(target_os = "linux"))]
+fn sync_tree(folder: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        match path.is_dir() {
+            true => sync_tree(&path)?,
+            false => File::options().write(true).open(&path)?.sync_all()?,
+        }
+    }
+    sync_folder(folder)
+}
+
 /// Renames `from` to `to` in the same folder, and makes the new name durable.
 pub(crate) fn rename(from: &Path, to: &Path) -> Result<(), RecordError> {
     fs::rename(from, to)
@@ -81,6 +117,18 @@ mod tests {
         replace(&path, b"new").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_was_put_into_folders_is_there_after_one_sync() {
+        let folder = tempfile::tempdir().unwrap();
+        let inner = folder.path().join("a");
+        fs::create_dir(&inner).unwrap();
+        put(&inner.join("b"), b"text").unwrap();
+        sync_below(folder.path()).unwrap();
+        assert_eq!(fs::read(inner.join("b")).unwrap(), b"text");
+        assert!(sync_below(&folder.path().join("gone")).is_err());
+        assert!(put(&folder.path().join("gone/b"), b"").unwrap_err().to_string().contains("gone"));
     }
 
     #[test]

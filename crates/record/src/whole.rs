@@ -60,7 +60,7 @@ pub struct WholeTable<R> {
 /// A column of a type that such files do not support; an I/O error. An earlier file stays then.
 pub fn write<R: Serialize>(
     path: &Path,
-    columns: &[RoleColumn<R>],
+    columns: &[&RoleColumn<R>],
     program_version: &str,
     extra: &[(&str, String)],
 ) -> Result<(), RecordError> {
@@ -78,7 +78,7 @@ pub fn write<R: Serialize>(
 
 fn write_file<R: Serialize>(
     file: File,
-    columns: &[RoleColumn<R>],
+    columns: &[&RoleColumn<R>],
     program_version: &str,
     extra: &[(&str, String)],
 ) -> ParquetResult<()> {
@@ -112,12 +112,12 @@ fn write_file<R: Serialize>(
 }
 
 fn key_values<R: Serialize>(
-    columns: &[RoleColumn<R>],
+    columns: &[&RoleColumn<R>],
     program_version: &str,
     extra: &[(&str, String)],
 ) -> ParquetResult<Vec<KeyValue>> {
     let json = |e: serde_json::Error| ParquetError::External(Box::new(e));
-    let entry = |c: &RoleColumn<R>| {
+    let entry = |c: &&RoleColumn<R>| {
         Ok(ColumnEntry { name: c.name.clone(), role: serde_json::to_value(&c.role)? })
     };
     let entries = columns.iter().map(entry).collect::<Result<Vec<_>, _>>().map_err(json)?;
@@ -132,8 +132,8 @@ fn key_values<R: Serialize>(
     Ok(pairs)
 }
 
-fn parquet_schema<R>(columns: &[RoleColumn<R>]) -> ParquetResult<TypePtr> {
-    let field = |column: &RoleColumn<R>| {
+fn parquet_schema<R>(columns: &[&RoleColumn<R>]) -> ParquetResult<TypePtr> {
+    let field = |column: &&RoleColumn<R>| {
         let (physical, logical) = match column.values.ty() {
             ColumnType::I64 => (PhysicalType::INT64, None),
             ColumnType::F64 => (PhysicalType::DOUBLE, None),
@@ -316,7 +316,13 @@ mod tests {
     fn back(columns: &[RoleColumn<String>]) -> Vec<RoleColumn<String>> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.parquet");
-        write(&path, columns, "0.1.0", &[("sidestep.plan", "{}".into())]).unwrap();
+        write(
+            &path,
+            &columns.iter().collect::<Vec<_>>(),
+            "0.1.0",
+            &[("sidestep.plan", "{}".into())],
+        )
+        .unwrap();
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
         read(&path).unwrap().columns
     }
@@ -355,7 +361,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.parquet");
         let columns = [column("k", Values::I64((0..1000).map(Some).collect()))];
-        write(&path, &columns, "0.1.0", &[]).unwrap();
+        write(&path, &columns.iter().collect::<Vec<_>>(), "0.1.0", &[]).unwrap();
         let whole = std::fs::read(&path).unwrap();
         for place in [10, whole.len() / 3] {
             let mut changed = whole.clone();

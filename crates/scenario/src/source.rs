@@ -196,10 +196,14 @@ impl Source {
         self.error(span, format!("{}: {}", error.place(), error.cause()), error.remedy())
     }
 
+    /// Returns its place without the mark of overrides.
+    pub fn file_place(&self) -> &str {
+        self.place.trim_end_matches(WITH_OVERRIDES)
+    }
+
     /// Returns the first line of a resolved scenario: its source, and the program that resolved it.
     pub fn heading(&self) -> String {
-        let place = self.place.trim_end_matches(WITH_OVERRIDES);
-        let name = Path::new(place).file_name().unwrap_or_default().display();
+        let name = Path::new(self.file_place()).file_name().unwrap_or_default().display();
         format!("# {name}, resolved by sidestep {}\n", env!("CARGO_PKG_VERSION"))
     }
 

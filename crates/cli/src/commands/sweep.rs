@@ -158,7 +158,7 @@ fn share(args: &ShareArgs, console: Console) -> Result<ExitCode, Failure> {
 
 fn collect(args: &CollectArgs, console: Console) -> Result<ExitCode, Failure> {
     let folder = Folder::open(&args.folder)?;
-    let ended = sweep::collect(&folder)?;
+    let ended = sweep::collect(&folder, &Watch::new(console))?;
     let told = Told { plan: folder.plan(), folder: Some(&folder), console };
     tell(told, ended, "The runs are collected already.")
 }

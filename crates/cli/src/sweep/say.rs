@@ -2,6 +2,7 @@
 
 use crate::console::{Console, LINE_COLS, aligned, duration, grouped, in_columns, wrapped};
 use crate::exit::{ExitCode, Failure};
+use crate::progress::Stages;
 use serde_json::json;
 use sidestep::experiment::sweep::rounds::{Stopped, stopped};
 use sidestep::experiment::sweep::{LeftOut, Plan, RunTable, Shard, Summary};
@@ -56,7 +57,10 @@ pub(crate) fn tell(told: Told<'_>, ended: Ended, already: &str) -> Result<ExitCo
     if was_done {
         console.note(already);
     }
-    let summary = plan.summary(&table)?;
+    let stages = Stages::new(console);
+    let summary = plan.summary_watched(&table, &mut |share| stages.at("intervals", share));
+    stages.clear();
+    let summary = summary?;
     let stopped = stopped(plan, &table);
     let failed = failures(told, &table);
     let json = json!({

@@ -20,9 +20,9 @@ fn a_run_ends_when_all_have_arrived_and_says_what_came_of_it() {
         "mean_delay_percent",
         "messages",
         "bytes",
-        "optimisations",
+        "optimizations",
         "rounds_mean",
-        "optimise_cpu_s",
+        "optimize_cpu_s",
         "shield_overrides",
     ] {
         assert!(metrics[key].is_number(), "{key}");
@@ -183,7 +183,7 @@ fn recorded_tracks_are_replayed_or_flown_anew_from_a_chosen_time() {
     let metrics = &replayed["metrics"];
     assert_eq!((&metrics["airplanes"], &metrics["replayed"]), (&2.into(), &2.into()), "{replayed}");
     assert_eq!(
-        (&metrics["losses_of_separation"], &metrics["optimisations"]),
+        (&metrics["losses_of_separation"], &metrics["optimizations"]),
         (&1.into(), &0.into())
     );
     assert!(metrics["mean_delay_percent"].is_null());

@@ -87,9 +87,11 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
             plan,
         };
         make_folder(&staging.path().join(SHARES))?;
+        let cells: Vec<_> = cells.iter().collect();
         whole::write(&staging.path().join(CELLS), &cells, program_version, &[])?;
         let file = staging.path().join(MANIFEST);
         disk::replace(&file, &json(&manifest, &file)?)?;
+        disk::sync_below(staging.path())?;
         staging.take_place_of(path)?;
         Ok(Self { path: path.to_path_buf(), manifest })
     }
@@ -110,9 +112,9 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         for (name, bytes) in files {
             let file = folder.join(name);
             make_folder(disk::parent(&file))?;
-            disk::replace(&file, bytes)?;
+            disk::put(&file, bytes)?;
         }
-        disk::replace(&folder.join(SCENARIO), text.as_bytes())
+        disk::put(&folder.join(SCENARIO), text.as_bytes())
     }
 
     /// Whether a folder holds a sweep, even if its manifest is damaged.
@@ -212,7 +214,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         &self,
         share: Share,
         journal: Journal,
-        runs: &[RoleColumn<R>],
+        runs: &[&RoleColumn<R>],
     ) -> Result<(), RecordError> {
         let version = &self.manifest.program_version;
         whole::write(&self.share_file(share, "parquet"), runs, version, &[])?;
@@ -265,8 +267,8 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// An I/O error.
     pub fn complete<R: Serialize>(
         &self,
-        results: &[RoleColumn<R>],
-        timings: &[RoleColumn<R>],
+        results: &[&RoleColumn<R>],
+        timings: &[&RoleColumn<R>],
     ) -> Result<(), RecordError> {
         let plan = serde_json::to_string(self.plan())
             .map_err(|e| RecordError::new(self.path.display(), e))?;
@@ -439,7 +441,9 @@ mod tests {
             runs
         };
         assert_eq!((runs(None), runs(Some(share))), (vec![7], vec![]));
-        folder.end_share(share, journal, &cells()).unwrap();
+        let cells_again = cells();
+        let refs: Vec<_> = cells_again.iter().collect();
+        folder.end_share(share, journal, &refs).unwrap();
         let again = folder.journal(share, |_: u32| ()).unwrap();
         assert!(again.is_none(), "a share that is done is done");
         assert!(runs(None).is_empty());
@@ -447,7 +451,7 @@ mod tests {
         folder.parts(|part| parts.push(part.columns)).unwrap();
         assert_eq!(parts, [cells()]);
         assert!(folder.results::<String>().unwrap_err().cause().contains("not done"));
-        folder.complete(&cells(), &cells()).unwrap();
+        folder.complete(&refs, &refs).unwrap();
         let again = Folder::open(&path).unwrap();
         assert_eq!((again.plan(), again.is_complete()), (&vec![4, 5], true));
         assert_eq!(again.results().unwrap().columns, cells());

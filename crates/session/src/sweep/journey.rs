@@ -5,6 +5,7 @@ use super::prepare::prepare;
 use super::work::{Take, Work};
 use crate::identity::Maker;
 use crate::identity::build;
+use crate::watcher::{Progress, Watched};
 use crate::{Error, Watcher};
 use sidestep::VERSION;
 use sidestep::experiment::sweep::rounds::Rounds;
@@ -179,8 +180,21 @@ pub fn go_on(
     if !watcher.go_on() {
         return Ok(Ended::Interrupted(log.rows.len()));
     }
-    let table = log.rows.table(folder.plan())?;
-    folder.complete(&table.results().columns, &table.timings().columns)?;
+    joined(folder, log.rows, effort, watcher)
+}
+
+/// Joins all runs into the sweep's tables.
+fn joined(
+    folder: &Folder,
+    rows: Rows,
+    effort: Effort,
+    watcher: &dyn Watcher,
+) -> Result<Ended, Error> {
+    let watched = Watched(watcher);
+    watched.at(Progress::Stage { what: "joining the runs", share: 0.0 });
+    let table = rows.table(folder.plan())?;
+    watched.at(Progress::Stage { what: "writing the results", share: 0.5 });
+    folder.complete(&table.results(), &table.timings())?;
     Ok(Done::now(table, effort))
 }
 
@@ -227,7 +241,7 @@ pub fn share(
         return Ok(Ended::Interrupted(log.rows.len()));
     }
     let table = log.rows.table(plan)?;
-    folder.end_share(share_of(shard), journal, &table.columns)?;
+    folder.end_share(share_of(shard), journal, &table.columns.iter().collect::<Vec<_>>())?;
     Ok(Done::now(table, effort))
 }
 
@@ -251,7 +265,7 @@ fn finished_of(folder: &Folder, shard: Shard) -> Result<RunTable, Error> {
 ///
 /// # Errors
 /// When runs are missing, cannot be read or stored, or are of another build.
-pub fn collect(folder: &Folder) -> Result<Ended, Error> {
+pub fn collect(folder: &Folder, watcher: &dyn Watcher) -> Result<Ended, Error> {
     if folder.is_complete() {
         return Ok(Done::before(table_of(folder.results()?)));
     }
@@ -266,9 +280,7 @@ pub fn collect(folder: &Folder) -> Result<Ended, Error> {
                       run the rest here: sidestep resume DIR";
         return Err(Error::stopped(cause, remedy));
     }
-    let table = log.rows.table(plan)?;
-    folder.complete(&table.results().columns, &table.timings().columns)?;
-    Ok(Done::now(table, Effort::default()))
+    joined(folder, log.rows, Effort::default(), watcher)
 }
 
 /// Returns the table of runs in a file.

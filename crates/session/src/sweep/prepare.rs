@@ -1,7 +1,7 @@
 //! Every variant of a sweep, compiled once, so that errors in any of them are reported before any
 //! runs.
 
-use crate::scenario::source_of;
+use crate::scenario::{read, source_of};
 use crate::watcher::{Progress, Watched};
 use crate::{Error, Watcher};
 use sidestep::experiment::sweep::cell::metric_names;
@@ -31,7 +31,10 @@ pub(super) fn prepare(
         }
         let share = f64::from(k) / count as f64;
         watched.at(Progress::Stage { what: "checking variants", share });
-        let (source, compiled) = variant(worlds, &base, wanted)?;
+        let (source, compiled) = variant(worlds, &base, wanted).map_err(|e| {
+            let plain = read(worlds, &sweep.scenario, &fixed).err();
+            of_variant(wanted, &base, plain, e)
+        })?;
         wanted.seeds = compiled.seeds();
         agents = agents.max(compiled.bodies() as u64);
         if first.is_none() {
@@ -66,23 +69,32 @@ fn check_metrics(
     Err(InputError::new(&sweep.place, cause, nearest(unknown, &known)))
 }
 
-/// Returns a variant's scenario; an error names the variant.
+/// Returns a variant's scenario.
 fn variant(
     worlds: Worlds,
     base: &Source,
     wanted: &Variant,
 ) -> Result<(Source, Box<dyn Compiled>), InputError> {
     let overrides: Vec<String> = wanted.settings.iter().map(Setting::to_override).collect();
-    let compiled = base.clone().with(&overrides).and_then(|source| {
-        let compiled = worlds.compile(&source)?;
-        Ok((source, compiled))
-    });
-    compiled.map_err(|e| {
-        if wanted.settings.is_empty() {
-            return e;
+    let source = base.clone().with(&overrides)?;
+    let compiled = worlds.compile(&source)?;
+    Ok((source, compiled))
+}
+
+/// Returns the error of a variant, which names the variant unless all have it: the lines of the text
+/// that its settings have edited are nobody's.
+fn of_variant(
+    wanted: &Variant,
+    base: &Source,
+    plain: Option<InputError>,
+    e: InputError,
+) -> InputError {
+    match plain.filter(|plain| plain.cause() == e.cause()) {
+        Some(plain) => plain,
+        None if !e.place().starts_with(base.file_place()) => e,
+        None => {
+            let place = format!("{}, where {wanted}", base.file_place());
+            InputError::new(place, e.cause(), e.remedy())
         }
-        let place = format!("{}, where {wanted}", e.place());
-        let error = InputError::new(place, e.cause(), e.remedy());
-        e.position().map_or(error.clone(), |(line, column)| error.at(line, column))
-    })
+    }
 }

@@ -18,7 +18,9 @@ pub(crate) fn sweep(place: &Place) -> Sweep {
 
 fn done(ended: Ended) -> RunTable {
     match ended {
-        Ended::Done(done) => done.table.results(),
+        Ended::Done(done) => {
+            RunTable { columns: done.table.results().into_iter().cloned().collect() }
+        }
         Ended::Interrupted(runs) => panic!("interrupted after {runs} runs"),
     }
 }

@@ -141,7 +141,7 @@ fn a_group_too_large_for_memory_is_not_optimized_and_that_is_said() {
     let mut run = run(&Source::new("s", text, ""), 1);
     run.advance(200);
     let metrics = run.metrics();
-    assert!(metrics.groups_too_large > 0 && metrics.optimisations == 0, "{metrics:?}");
+    assert!(metrics.groups_too_large > 0 && metrics.optimizations == 0, "{metrics:?}");
     assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 2));
 }
 

@@ -57,7 +57,7 @@ fn recorded_airplanes_fly_exactly_where_they_were_and_their_losses_are_counted()
     assert!((metrics.lost_s - 5.0).abs() < 0.3, "{}", metrics.lost_s);
     assert!(metrics.min_separation_m.is_some_and(|d| d < 1e-6));
     assert_eq!((metrics.mean_delay_percent, metrics.shield_overrides), (None, 0));
-    assert_eq!(metrics.optimisations, 0, "nobody decides for them");
+    assert_eq!(metrics.optimizations, 0, "nobody decides for them");
 }
 
 #[test]

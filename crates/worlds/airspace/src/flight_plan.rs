@@ -19,8 +19,7 @@ type Place = Point<2, FromTo<-1_000_000_000, 1_000_000_000>>;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct AirplaneSection {
-    #[serde(default)]
-    pub(super) name: String,
+    callsign: Option<Spanned<String>>,
     pub(super) at_m: Option<Place>,
     pub(super) heading_deg: Option<Value>,
     way_points_m: Option<Vec<Place>>,
@@ -57,7 +56,24 @@ fn places(given: Option<&Vec<Place>>) -> Vec<[f64; 2]> {
     given.into_iter().flatten().map(|place| place.get()).collect()
 }
 
+/// Largest number of characters of a call sign.
+const MOST_OF_CALLSIGN: usize = 40;
+
 impl AirplaneSection {
+    /// Returns the call sign, if it has one.
+    pub(super) fn callsign(&self, source: &Source) -> Result<Option<String>, InputError> {
+        let Some(given) = &self.callsign else { return Ok(None) };
+        let callsign = given.get_ref();
+        let is_right = (1..=MOST_OF_CALLSIGN).contains(&callsign.chars().count())
+            && !callsign.chars().any(char::is_control);
+        if is_right {
+            return Ok(Some(callsign.clone()));
+        }
+        let cause = format!("the call sign {callsign:?}");
+        let remedy = format!("give 1 to {MOST_OF_CALLSIGN} letters or digits, or leave it out");
+        Err(source.error(given.span(), cause, remedy))
+    }
+
     /// Returns the way-points in their order; none if none are given.
     pub(super) fn way_points_m(&self) -> Vec<[f64; 2]> {
         places(self.way_points_m.as_ref())

@@ -48,7 +48,7 @@ fn airplane(order: &Order<'_>, from: Point, to: Vec<Point>) -> Airplane {
     let first = to.first().copied().unwrap_or(from);
     let heading_rad = math::atan2(first[1] - from[1], first[0] - from[0]);
     Airplane {
-        name: String::new(),
+        callsign: None,
         model: order.model.clone(),
         start: Pose { at: from, heading_rad },
         mission: to,

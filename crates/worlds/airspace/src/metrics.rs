@@ -70,13 +70,13 @@ pub struct Metrics {
     /// decides for all, or where messages take no time.
     pub network_s: Option<f64>,
     /// Number of optimizations run.
-    pub optimisations: u64,
+    pub optimizations: u64,
     /// Mean number of their rounds.
     pub rounds_mean: Option<f64>,
     /// Number of optimizations whose rounds ran out.
     pub unconverged: u64,
     /// Processor time in seconds spent deciding in this process's run, all workers together.
-    pub optimise_cpu_s: f64,
+    pub optimize_cpu_s: f64,
     /// Number of times that the shield changed an airplane's wish.
     pub shield_overrides: u64,
     /// Number of those times when the airplane fell back to an orbit for one `dt`.
@@ -105,22 +105,28 @@ pub struct Metrics {
 }
 
 /// An airplane whose errors exceeded the shield's bounds.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BeyondBound {
     /// Time of the first such error, in seconds after the start of the run.
     pub at_s: f64,
     /// Id of the airplane.
     pub airplane: EntityId,
+    /// Its call sign.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub callsign: Option<String>,
 }
 
 /// Two airplanes that were too near each other for the shield when the later one came in, or one of
 /// which minds nobody and could reach the other.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TooClose {
     /// Time when that began, in seconds after the start of the run.
     pub at_s: f64,
     /// Ids of the two.
     pub airplanes: [EntityId; 2],
+    /// Their call signs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub callsigns: Option<[String; 2]>,
 }
 
 /// Metrics of one airplane.
@@ -128,6 +134,9 @@ pub struct TooClose {
 pub struct AirplaneMetrics {
     /// Its id.
     pub airplane: EntityId,
+    /// Its call sign.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub callsign: Option<String>,
     /// Seconds from its appearance to its arrival, if it has arrived; for a recorded airplane, from
     /// its handover to the method.
     pub flown_s: Option<f64>,
@@ -149,10 +158,13 @@ pub struct AirplaneMetrics {
 }
 
 /// Metrics of two airplanes that came near each other.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PairMetrics {
     /// Their ids.
     pub airplanes: [EntityId; 2],
+    /// Their call signs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub callsigns: Option<[String; 2]>,
     /// Closest approach in meters.
     pub nearest_m: f64,
     /// Number of times that they came nearer than their separation.
@@ -182,6 +194,7 @@ pub fn airplane_metrics(
     let flown_s = arrived_s.map(|s| s - joined_s).filter(|_| !is_replayed_to_the_end(world, id));
     AirplaneMetrics {
         airplane: id,
+        callsign: world.callsign(id),
         flown_s,
         alone_s,
         delay_percent: flown_s
@@ -208,6 +221,7 @@ pub fn pair_metrics(world: &AirspaceWorld, ledger: &Ledger) -> Vec<PairMetrics> 
     let separation_m = |id: EntityId| world.airplanes[id as usize].model.separation_m;
     let one = |(&(a, b), record): (&(EntityId, EntityId), &PairRecord)| PairMetrics {
         airplanes: [a, b],
+        callsigns: world.callsigns([a, b]),
         nearest_m: record.nearest_m,
         losses: record.losses,
         lost_s: record.lost_ns as f64 / 1e9,
@@ -246,8 +260,9 @@ pub fn metrics(
     let beyond_bound = |(&airplane, &cycle): (&EntityId, &Cycle)| BeyondBound {
         at_s: world.starts_s(cycle),
         airplane,
+        callsign: world.callsign(airplane),
     };
-    let Effort { optimizations: optimisations, rounds, unconverged, traffic } = ledger.effort;
+    let Effort { optimizations, rounds, unconverged, traffic } = ledger.effort;
     Metrics {
         min_separation_m: nearest,
         losses_of_separation: ledger.pairs.values().map(|r| u64::from(r.losses)).sum(),
@@ -260,10 +275,10 @@ pub fn metrics(
         multicasts: traffic.multicasts,
         multicast_bytes: traffic.multicast_bytes,
         network_s: world.network.as_ref().map(|network| network.seconds(traffic.ticks)),
-        optimisations,
-        rounds_mean: mean(rounds as f64, optimisations as usize),
+        optimizations,
+        rounds_mean: mean(rounds as f64, optimizations as usize),
         unconverged,
-        optimise_cpu_s: decide_s,
+        optimize_cpu_s: decide_s,
         shield_overrides: all.iter().map(|a| u64::from(a.shield_overrides)).sum(),
         shield_orbits: all.iter().map(|a| u64::from(a.shield_orbits)).sum(),
         shield_held_back: ledger.count(EventKind::HeldBack),
@@ -280,7 +295,8 @@ pub fn metrics(
 }
 
 fn too_close(world: &AirspaceWorld, &(cycle, a, b): &(Cycle, EntityId, EntityId)) -> TooClose {
-    TooClose { at_s: world.starts_s(cycle), airplanes: [a, b] }
+    let callsigns = world.callsigns([a, b]);
+    TooClose { at_s: world.starts_s(cycle), airplanes: [a, b], callsigns }
 }
 
 /// Returns whether all airplanes have arrived or left by now.

@@ -85,6 +85,10 @@ struct AirspaceSection {
     replay_until_s: Option<Number<UntilWhen>>,
     group_memory_gib: Option<Number<Gibibytes>>,
     wind_m_s: Option<Spanned<Point<2>>>,
+    /// Latitude and longitude of the origin.
+    origin_deg: Option<Point<2, FromTo<-360, 360>>>,
+    /// Time of the start, in seconds since 1970, UTC.
+    start_utc_s: Option<Number<FromTo<-1_000_000_000_000, 1_000_000_000_000>>>,
     /// Standard deviation in meters; larger errors of known positions make no sense.
     position_noise_m: Option<Number<FromTo<0, 1_000_000>>>,
     heading_noise_deg: Option<Number<HeadingNoise>>,

@@ -19,7 +19,7 @@ use super::flight::Point;
 use super::flight_plan::CLIMB_M_S;
 use rules::{Rules, rules};
 use sidestep_import::bluesky::{Change, ScnAircraft, ScnFile, Speed};
-use sidestep_import::local_plane::LocalPlane;
+use sidestep_import::local_plane::{LatLon, LocalPlane};
 use sidestep_import::traffic::{RecordedTraffic, Track};
 use sidestep_kernel::{InputError, math};
 use std::collections::BTreeMap;
@@ -46,7 +46,8 @@ pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
     let aircraft: Vec<UnderWay> = traffic.aircraft.iter().filter_map(under_way).collect();
     let plane = LocalPlane::about_all(aircraft.iter().map(|one| one.0.position()))?;
     let zone = (traffic.zone_radius_nm * NAUTICAL_MILE_M, traffic.zone_half_height_ft * FOOT_M);
-    let mut text = heading(name, zone, rules.horizon_s, &settings(rules));
+    let more = settings(rules) + &origin(&plane);
+    let mut text = heading(name, zone, rules.horizon_s, &more);
     for one in &aircraft {
         write_aircraft(&mut text, &one.0, &plane);
     }
@@ -103,6 +104,21 @@ fn under_way(aircraft: &ScnAircraft) -> Option<UnderWay> {
         }
     }
     None
+}
+
+/// Returns the place of the plane's origin on earth, as a scenario writes it.
+fn origin(plane: &LocalPlane) -> String {
+    let LatLon { lat_deg, lon_deg } = plane.center();
+    format!("origin_deg = {:?}\n", [lat_deg, lon_deg])
+}
+
+/// Returns a call sign as a line of the scenario; none where it would not be one.
+fn callsign(name: &str) -> String {
+    let name: String = name.trim().chars().filter(|c| !c.is_control()).take(40).collect();
+    match name.is_empty() {
+        true => String::new(),
+        false => format!("callsign = {}\n", toml::Value::from(name)),
+    }
 }
 
 /// Returns the settings of a scenario that follow from rules.
@@ -193,10 +209,10 @@ fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, plane: &LocalPlane)
     // Writing to a string cannot fail.
     let _ = write!(
         text,
-        "\n[[airplanes]]\nname = {}\nat_m = {at_m:?}\nheading_deg = {heading_deg:?}\n\
+        "\n[[airplanes]]\n{}at_m = {at_m:?}\nheading_deg = {heading_deg:?}\n\
          way_points_m = {way_points_m:?}\naltitude_m = {altitude_m:?}\n\
          appears_s = {appears_s:?}\nv_m_s = {v_m_s:?}\nomega_max_deg_s = {omega_deg_s:?}\n",
-        quoted(&aircraft.id)
+        callsign(&aircraft.id)
     );
     if orders.is_empty() {
         return;
@@ -286,7 +302,8 @@ pub fn from_tracks(name: &str, traffic: &RecordedTraffic) -> Option<String> {
     let begins_s = samples().map(|s| s.time_s).fold(f64::INFINITY, f64::min);
     let replay = "# seconds after which recorded airplanes are flown anew; inf: never\n\
                   replay_until_s = inf\n";
-    let mut text = heading(name, ZONE, None, replay);
+    let more = format!("{replay}start_utc_s = {begins_s:?}\n{}", origin(&plane));
+    let mut text = heading(name, ZONE, None, &more);
     let tracks = || traffic.tracks.iter().filter(|track| has_length(track));
     tracks().for_each(|track| write_track(&mut text, track, &plane, begins_s));
     tracks().next().map(|_| text)
@@ -301,14 +318,13 @@ fn write_track(text: &mut String, track: &Track, plane: &LocalPlane, begins_s: f
     let speed_kt =
         track.samples.iter().map(|s| s.ground_speed_kt).sum::<f64>() / track.samples.len() as f64;
     let omega_deg_s = banked_deg_s((speed_kt * KNOT_M_S).max(1.0));
-    let callsign = track.callsign.trim();
-    let name = if callsign.is_empty() { track.icao24.trim() } else { callsign };
+    let name = if track.callsign.trim().is_empty() { &track.icao24 } else { &track.callsign };
     // Writing to a string cannot fail. A name with a line end would end the comment.
     let _ = write!(
         text,
-        "\n[[airplanes]] # {}\nname = {}\nomega_max_deg_s = {omega_deg_s:?}\ntrack = [\n",
-        track.icao24.trim().escape_debug(),
-        quoted(name)
+        "\n[[airplanes]] # {}\n{}omega_max_deg_s = {omega_deg_s:?}\ntrack = [\n",
+        track.icao24.escape_debug(),
+        callsign(name)
     );
     for sample in &track.samples {
         let [x, y] = plane.to_plane_m(sample.position);
@@ -316,12 +332,6 @@ fn write_track(text: &mut String, track: &Track, plane: &LocalPlane, begins_s: f
         let _ = writeln!(text, "  [{t_s:?}, {x:?}, {y:?}, {altitude_m:?}],");
     }
     text.push_str("]\n");
-}
-
-/// Returns a name as a TOML string, without what such a string may not hold.
-fn quoted(name: &str) -> String {
-    let plain: String = name.chars().filter(|c| !c.is_control() && !"\"\\".contains(*c)).collect();
-    format!("\"{plain}\"")
 }
 
 fn banked_deg_s(v_m_s: f64) -> f64 {

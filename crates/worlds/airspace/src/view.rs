@@ -43,10 +43,11 @@ pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
     }
 }
 
-/// Returns the names of those airplanes that have one.
+/// Returns the call signs.
 fn names(world: &AirspaceWorld) -> Vec<(Kind, u32, String)> {
-    let named = (0..).zip(&world.airplanes).filter(|(_, airplane)| !airplane.name.is_empty());
-    named.map(|(id, airplane)| (Kind::Airplane, id, airplane.name.clone())).collect()
+    let named =
+        |(id, airplane): (u32, &Airplane)| Some((Kind::Airplane, id, airplane.callsign.clone()?));
+    (0..).zip(&world.airplanes).filter_map(named).collect()
 }
 
 /// Returns how recorded poses give the places of airplanes.

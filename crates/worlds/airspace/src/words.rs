@@ -30,6 +30,8 @@ pub(super) fn contents(compiled: &Compiled) -> Said {
         "cycles": compiled.cycles,
         "seed": compiled.seed,
         "too_close": compiled.too_close,
+        "origin_deg": world.origin_deg,
+        "start_utc_s": world.start_utc_s,
         "recorded": recorded,
         "replay_until_s": (recorded > 0).then_some(until_s),
     });
@@ -43,7 +45,10 @@ pub(super) fn contents(compiled: &Compiled) -> Said {
         lines.push(line("recorded", format!("{}, replayed {until}", grouped(recorded))));
     }
     lines.extend(times(compiled));
-    lines.extend(too_close(&compiled.too_close));
+    if let Some([lat, lon]) = world.origin_deg {
+        lines.push(line("origin", format!("latitude {lat:.5}, longitude {lon:.5}")));
+    }
+    lines.extend(too_close(world, &compiled.too_close));
     Said { json, text: aligned(&lines) }
 }
 
@@ -112,8 +117,9 @@ pub(super) fn poses(snapshot: &Snapshot) -> Said {
 }
 
 /// Returns the pairs whose first fallbacks are not apart, in words.
-fn too_close(pairs: &[(u32, u32)]) -> Lines {
-    let warn = |(a, b): &(u32, u32)| {
+fn too_close(world: &AirspaceWorld, pairs: &[(u32, u32)]) -> Lines {
+    let warn = |&(a, b): &(u32, u32)| {
+        let [a, b] = [a, b].map(|id| world.called(id));
         line("warning", format!("airplanes {a} and {b} start too close for the shield"))
     };
     pairs.iter().map(warn).collect()
@@ -162,7 +168,10 @@ const NAMED: usize = 5;
 
 /// Returns the first airplanes whose errors exceeded the shield's bounds, and the number of others.
 fn beyond_bound(all: &[BeyondBound]) -> Option<(String, String)> {
-    let named = all.iter().take(NAMED).map(|one| format!("{} at {} s", one.airplane, one.at_s));
+    let named = all.iter().take(NAMED).map(|one| {
+        let name = one.callsign.clone().unwrap_or_else(|| one.airplane.to_string());
+        format!("{name} at {} s", one.at_s)
+    });
     let mut airplanes: Vec<String> = named.collect();
     if all.len() > NAMED {
         airplanes.push(format!("and {} more", grouped((all.len() - NAMED) as u64)));
@@ -173,7 +182,8 @@ fn beyond_bound(all: &[BeyondBound]) -> Option<(String, String)> {
 
 /// Returns the first pairs for which the shield promises nothing, and the number of others.
 fn warning(too_close: &[TooClose]) -> Option<(String, String)> {
-    let named = too_close.iter().take(NAMED).map(|TooClose { at_s, airplanes: [a, b] }| {
+    let named = too_close.iter().take(NAMED).map(|TooClose { at_s, airplanes, callsigns }| {
+        let [a, b] = callsigns.clone().unwrap_or_else(|| airplanes.map(|id| id.to_string()));
         if *at_s > 0.0 { format!("{a} and {b} at {at_s} s") } else { format!("{a} and {b}") }
     });
     let mut pairs: Vec<String> = named.collect();
@@ -197,7 +207,7 @@ fn flights(m: &Metrics) -> Lines {
         line("nearest approach", nearest),
         line("losses of separation", lost),
         line("delay", delay),
-        line("optimizations", format!("{}{rounds}", grouped(m.optimisations))),
+        line("optimizations", format!("{}{rounds}", grouped(m.optimizations))),
         line(
             "shield",
             format!(

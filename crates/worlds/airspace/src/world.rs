@@ -13,7 +13,7 @@ use super::shield::{Bounds, Side, common_rates};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, Order, Settings};
 use sidestep_kernel::stream::Streams;
-use sidestep_kernel::{Cycle, Slot, interrupt};
+use sidestep_kernel::{Cycle, EntityId, Slot, interrupt};
 
 /// The methods by which airplanes choose their actions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -92,6 +92,10 @@ pub struct AirspaceWorld {
     /// Number of cycles in which recorded airplanes follow their tracks; then the method flies
     /// them.
     pub replay_cycles: Cycle,
+    /// Latitude and longitude of the origin, in degrees, where traffic has a place on earth.
+    pub origin_deg: Option<Point>,
+    /// Time of the start, in seconds since 1970, UTC, where traffic has a date.
+    pub start_utc_s: Option<f64>,
     /// The wind, which everybody knows, in meters per second.
     pub wind_m_s: Point,
     /// Random errors that nobody knows.
@@ -117,6 +121,21 @@ pub struct AirspaceWorld {
 const ENDLESS_STEPS: usize = 1_000_000;
 
 impl AirspaceWorld {
+    /// Returns the call sign of an airplane, if it has one.
+    pub(crate) fn callsign(&self, id: EntityId) -> Option<String> {
+        self.airplanes.get(id as usize)?.callsign.clone()
+    }
+
+    /// Returns the call signs of two airplanes, if both have one.
+    pub(crate) fn callsigns(&self, [a, b]: [EntityId; 2]) -> Option<[String; 2]> {
+        Some([self.callsign(a)?, self.callsign(b)?])
+    }
+
+    /// Returns what people call an airplane: its call sign, or else its id.
+    pub(crate) fn called(&self, id: EntityId) -> String {
+        self.callsign(id).unwrap_or_else(|| id.to_string())
+    }
+
     /// Fills in the fields that follow from the others.
     #[must_use]
     pub(crate) fn prepared(mut self) -> Self {

@@ -175,7 +175,7 @@ mod tests {
     #[test]
     fn what_a_clock_measured_stands_apart() {
         let outcome = outcome(AIRSPACE, 1, 1);
-        assert!(outcome.costs.contains_key("optimise_cpu_s"));
+        assert!(outcome.costs.contains_key("optimize_cpu_s"));
         assert!(!outcome.metrics.keys().any(|name| name.ends_with("cpu_s")));
         assert_eq!(outcome.metrics["arrived"], json!(3));
     }

@@ -68,12 +68,12 @@ pub(super) struct Groups<'a> {
 }
 
 impl<'a> Groups<'a> {
-    /// Groups the runs of `table`, of which the options name the variants in which seeds change nothing,
-    /// and tell the metrics in words.
+    /// Groups the runs of `table`, of which the options give the names, tell the variants in which seeds
+    /// change nothing, and have the metrics in words.
     pub(super) fn of(table: &'a RunTable, options: &SummaryOptions) -> Result<Self, InputError> {
         table.check()?;
         let runs = ordered(table);
-        let label = |run: usize| variant_name(table, run);
+        let label = |run: usize| variant_name(table, run, options.names.as_deref());
         let replicate = table.of_role(Role::Replicate).next();
         let mut variants: Vec<String> = Vec::new();
         let mut places: BTreeMap<String, usize> = BTreeMap::new();
@@ -215,10 +215,13 @@ fn ordered(table: &RunTable) -> Vec<usize> {
     rows
 }
 
-/// Returns the variant's name, or its parameters if the table has no names.
-fn variant_name(table: &RunTable, run: usize) -> String {
+/// Returns the variant's name, or its parameters if the table has no names; with `names`, the table
+/// has their numbers.
+fn variant_name(table: &RunTable, run: usize, names: Option<&[String]>) -> String {
     if let Some(column) = table.of_role(Role::Variant).next() {
-        return column.values.text(run);
+        let number = || column.values.number(run).map(|n| n as usize);
+        let named = names.and_then(|names| names.get(number()?).cloned());
+        return named.unwrap_or_else(|| column.values.text(run));
     }
     let parts: Vec<String> = table
         .of_role(Role::Parameter)

@@ -58,7 +58,7 @@ mod tests {
             ("min_separation_m", "min separation (m)"),
             ("max_speed_m_s", "max speed (m/s)"),
             ("lost_s", "lost (s)"),
-            ("optimise_cpu_s", "optimise (s of processor time)"),
+            ("optimize_cpu_s", "optimize (s of processor time)"),
             ("steps_per_cpu_s", "steps (1/s of processor time)"),
             ("robots.count", "robots.count"),
             ("ground.corridor.width_m", "ground.corridor.width (m)"),

@@ -4,13 +4,12 @@ use super::baseline::{Baseline, Search};
 use super::file::{Sweep, Until};
 use super::seeds;
 use super::summary::{Against, Summary, SummaryOptions};
-use super::table::{Role, RunTable};
+use super::table::RunTable;
 use super::variant::{Base, Setting, Variant};
 use crate::scenario::Seeds;
 use crate::worlds::WORLDS;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
-use sidestep_kernel::ports::Values;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
@@ -135,24 +134,29 @@ impl Plan {
     /// # Errors
     /// When a metric that is to be reported does not exist, or the table is not of this plan.
     pub fn summary(&self, runs: &RunTable) -> Result<Summary, InputError> {
+        self.summary_watched(runs, &mut |_| ())
+    }
+
+    /// Returns the summary like [`Plan::summary`], and passes on the share of the work that is done.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn summary_watched(
+        &self,
+        runs: &RunTable,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Summary, InputError> {
         let names = self.names();
-        let mut named = runs.clone();
-        for column in named.columns.iter_mut().filter(|c| c.role == Role::Variant) {
-            let name = |k: usize| {
-                let variant = column.values.number(k)? as usize;
-                names.get(variant).cloned()
-            };
-            column.values = Values::Text((0..runs.runs()).map(name).collect());
-        }
         let same = seeds::seedless(self, runs);
         let options = SummaryOptions {
             metrics: (!self.metrics.is_empty()).then(|| self.metrics.clone()),
             seedless: (0..names.len()).filter(|k| same[*k]).map(|k| names[k].clone()).collect(),
             against: self.baseline.as_ref().map(|baseline| against(baseline, &names)),
             meanings: WORLDS.named(&self.world).map_or(&[], |world| world.meanings()),
+            names: Some(names),
             ..SummaryOptions::default()
         };
-        let mut summary = Summary::of(&named, &options)?;
+        let mut summary = Summary::watched(runs, &options, progress)?;
         summary.notes.splice(0..0, seeds::notes(self, runs));
         Ok(summary)
     }

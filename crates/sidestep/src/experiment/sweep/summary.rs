@@ -46,6 +46,8 @@ pub struct SummaryOptions {
     /// What variants are compared with; `None` for the first variant, but for nothing in grids of
     /// several parameters and in scattered designs, where the first is like no other.
     pub against: Option<Against>,
+    /// Names of the variants, where the table has their numbers.
+    pub names: Option<Vec<String>>,
     /// Variants in which seeds change nothing: their one value has no interval.
     pub seedless: BTreeSet<String>,
     /// Options of bootstrap intervals.
@@ -81,6 +83,7 @@ impl Default for SummaryOptions {
     fn default() -> Self {
         Self {
             metrics: None,
+            names: None,
             max_metrics: 12,
             against: None,
             seedless: BTreeSet::new(),
@@ -284,11 +287,27 @@ impl Summary {
     /// When columns differ in length, a variant has a replicate twice, or a metric or the
     /// baseline does not exist.
     pub fn of(table: &RunTable, options: &SummaryOptions) -> Result<Self, InputError> {
+        Self::watched(table, options, &mut |_| ())
+    }
+
+    /// Summarizes a table of runs like [`Summary::of`], and passes on the share of the work that is
+    /// done.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn watched(
+        table: &RunTable,
+        options: &SummaryOptions,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Self, InputError> {
         let groups = Groups::of(table, options)?;
         let (columns, left_out) = chosen(&groups, options)?;
         let reference = reference(&groups, options)?;
-        let metric = |c: &&RunColumn| summed(&groups, c, reference.as_ref(), &options.bootstrap);
-        let metrics: Vec<MetricSummary> = columns.iter().map(metric).collect();
+        let metric = |(k, c): (usize, &&RunColumn)| {
+            let within = &mut |share| progress((k as f64 + share) / columns.len() as f64);
+            summed(&groups, c, (reference.as_ref(), &options.bootstrap), within)
+        };
+        let metrics: Vec<MetricSummary> = columns.iter().enumerate().map(metric).collect();
         let named = |c: &&RunColumn, f: Figure| (c.name.clone(), f);
         let figures = columns
             .iter()
@@ -521,13 +540,17 @@ fn explained(groups: &Groups<'_>, column: &RunColumn) -> Option<f64> {
 fn summed(
     groups: &Groups<'_>,
     column: &RunColumn,
-    reference: Option<&Reference>,
-    bootstrap: &Bootstrap,
+    (reference, bootstrap): (Option<&Reference>, &Bootstrap),
+    progress: &mut dyn FnMut(f64),
 ) -> MetricSummary {
-    let variants = 0..groups.variants.len();
+    let count = groups.variants.len();
+    let variants = 0..count;
     let most = variants.clone().map(|v| groups.runs_of(v)).max().unwrap_or(0);
     let bootstrap = (most <= BOOTSTRAP_RUNS).then_some(bootstrap);
-    let describe = |v| described(groups, column, v, bootstrap);
+    let describe = |v| {
+        progress(v as f64 / count as f64);
+        described(groups, column, v, bootstrap)
+    };
     MetricSummary {
         name: column.name.clone(),
         label: groups.label(column),

@@ -8,8 +8,8 @@ use sidestep_kernel::Slot;
 /// One airplane at its start.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Airplane {
-    /// Its name, such as a callsign; may be empty.
-    pub name: String,
+    /// Its call sign, if it has one.
+    pub callsign: Option<String>,
     /// Its abilities.
     pub model: Model,
     /// Its first pose.

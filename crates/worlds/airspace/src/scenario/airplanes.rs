@@ -149,7 +149,7 @@ impl Compiler<'_> {
         let heading_rad = sidestep_kernel::math::wrap_angle(heading_deg.get().to_radians());
         let (orders, leaves_s) = s.orders(self.source)?;
         Ok(Airplane {
-            name: s.name.clone(),
+            callsign: s.callsign(self.source)?,
             model,
             start: Pose { at: at_m.get(), heading_rad },
             mission,
@@ -180,9 +180,9 @@ impl Compiler<'_> {
         if section.get_ref().v_m_s.is_none() {
             model.v_m_s = track.mean_speed_m_s(replay.until_s).max(1.0);
         }
-        let own = section.get_ref();
-        let followed = following(track, model, replay, own.intruder);
-        Ok(Airplane { name: own.name.clone(), ..followed })
+        let callsign = section.get_ref().callsign(self.source)?;
+        let airplane = following(track, model, replay, section.get_ref().intruder);
+        Ok(Airplane { callsign, ..airplane })
     }
 
     /// Returns the time for which recorded airplanes follow their tracks.
@@ -204,7 +204,7 @@ fn following(track: Track, model: Model, replay: Replay, is_intruder: bool) -> A
     };
     let joins_s = replay.until_s.max(appears_s);
     Airplane {
-        name: String::new(),
+        callsign: None,
         model,
         start: track.pose_at(appears_s),
         mission: track.rest(joins_s),

@@ -113,6 +113,8 @@ impl Compiler<'_> {
             group_bytes: (group_memory_gib * GIB) as u64,
             shield: section.shield.0,
             vertical_m,
+            origin_deg: section.origin_deg.map(|at| at.get()),
+            start_utc_s: section.start_utc_s.map(f64::from),
             replay_cycles: replay.cycles,
             disturbance: self.disturbance(),
             bounds: self.bounds(),
