@@ -97,7 +97,7 @@ fn a_picture_in_space_has_numbers_on_its_axes() {
 fn recorded_traffic_is_drawn_with_callsigns_and_directions() {
     let place = Place::new();
     let scenario = "format = 1\nworld = \"airspace\"\ncycles = 40\n\
-                    [[airplanes]]\nname = \"KLM204\"\nat_m = [0, 0]\nheading_deg = 0\n\
+                    [[airplanes]]\ncallsign = \"KLM204\"\nat_m = [0, 0]\nheading_deg = 0\n\
                     way_points_m = [[9000, 0]]\n\
                     [[airplanes]]\nat_m = [0, 4000]\nheading_deg = 0\nway_points_m = [[9000, 4000]]\n";
     place.write("sky.toml", scenario);
