@@ -44,7 +44,7 @@ const TARGETS: [Target; 27] = [
     ("carmen", |data| text(data, |t| drop(carmen::parse("f", t)))),
     ("learn_carmen", |data| drop(effector::from_carmen(&file("f.log", data), &Default::default()))),
     ("bag", |data| drop(bag::read(&file("f.mcap", data), &all_of_a_bag()))),
-    ("cdr", |data| messages(data)),
+    ("cdr", messages),
     ("mrclam", |data| drop(mrclam::read(&mrclam_folder(data)))),
     ("learn_csv", |data| text(data, learned)),
     ("checkpoint", |data| drop(checkpoint::decode_header(data))),

@@ -44,7 +44,10 @@ map: /tf:map:base_link. The scanner's place on the robot is read from /tf_static
 CSV columns: true, reported (one word each; `nothing` for no observation), and true_distance_m, \
 reported_distance_m, or true_class, reported_class.";
 
-/// As it would be made, but in lines that fit.
+/// As they would be made, but in lines that fit.
+const SENSOR_USAGE: &str = "\
+sidestep learn sensor [OPTIONS]
+           <--mrclam <DIR>|--bag <PATH>|--csv <FILE>|--run <DIR>>";
 const EFFECTOR_USAGE: &str = "\
 sidestep learn effector [OPTIONS]
            <--mrclam <DIR>|--carmen <FILE>|--bag <PATH>|--csv <FILE>|
@@ -84,7 +87,7 @@ enum What {
 
 /// The log to learn a sensor from, and how.
 #[derive(Debug, Args)]
-#[command(after_help = SENSOR_EXAMPLES)]
+#[command(after_help = SENSOR_EXAMPLES, override_usage = SENSOR_USAGE)]
 struct SensorArgs {
     #[command(flatten)]
     log: SensorLog,

@@ -102,7 +102,7 @@ fn what_is_learned_from_a_bag_is_a_profile_that_a_scenario_loads() {
     place.json(&[&learn[..], &ODOM, &TRUTH, &to("wheels")].concat());
     place.json(&[&["learn", "sensor", "--bag", "bag"][..], &TRUTH, &SCANS, &to("eye")].concat());
     let profile = place.read("p.toml");
-    assert!(profile.contains("bearings_deg = [-90, 0, 90]"), "{profile}");
+    assert!(profile.contains("bearings_deg = [-90.0, 0.0, 90.0]"), "{profile}");
     let known = hall().replace("wheels]", "known]").replace("[sensors.eye", "[sensors.known");
     let scenario = known.replace("seed = 7", "seed = 7\nprofiles = [\"p.toml\"]");
     place.write("again.toml", scenario);
