@@ -33,7 +33,7 @@ pub(super) fn contents<const D: usize>(compiled: &Compiled<D>) -> Said {
             format!(
                 "{}, of {} connectors in {D} dimensions",
                 count(world.chains.len()),
-                count(connectors as usize)
+                count(connectors)
             ),
         ),
         line(
