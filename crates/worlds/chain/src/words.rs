@@ -27,7 +27,7 @@ pub(super) fn contents<const D: usize>(compiled: &Compiled<D>) -> Said {
     });
     let count = |n: usize| grouped(n as u64);
     let (chains, dt_s) = (count(world.chains.len()), world.dt_s);
-    let parts = count(connectors as usize);
+    let parts = count(connectors);
     let (still, moving) = (count(world.obstacles.still().len()), count(world.movers.len()));
     let (cycles, lasts_s) = (grouped(plan.cycles), plan.cycles as f64 * dt_s);
     let lines = [
