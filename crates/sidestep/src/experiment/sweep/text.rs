@@ -47,8 +47,10 @@ fn brief_of(summary: &Summary, metric: &MetricSummary) -> Table {
         };
         let mut row = vec![variant.variant.clone(), variant.n.to_string(), value];
         if let Some(c) = metric.comparisons.iter().find(|c| c.variant == variant.variant) {
-            let n = if c.pairs > 1 { format!(" n={}", c.pairs) } else { String::new() };
-            row.push(format!("{}{n}", with_interval(c.difference, c.interval)));
+            row.push(match (c.seedless, c.difference) {
+                (true, Some(difference)) => number(difference, Some(0.0)),
+                _ => format!("{} n={}", with_interval(c.difference, c.interval), c.pairs),
+            });
             row.push(c.p_holm.map_or("-".into(), p_value));
         }
         table.row(row);
@@ -228,7 +230,7 @@ pub(super) fn left_out(summary: &Summary) -> Option<Table> {
 /// Returns the mean of a variant with its interval; alone where seeds change nothing.
 fn center(variant: &VariantMetric, value: Option<f64>, interval: Option<Interval>) -> String {
     match value {
-        Some(value) if variant.seedless => number(value, None),
+        Some(value) if variant.seedless => number(value, Some(0.0)),
         value => with_interval(value, interval),
     }
 }
