@@ -81,7 +81,7 @@ mod tests {
 
     #[test]
     fn long_values_are_broken_at_spaces_and_stand_below_their_first_line() {
-        let words = vec!["seventeen_columns"; 6].join(" ");
+        let words = ["seventeen_columns"; 6].join(" ");
         let told = aligned(&[line("name", words)]);
         let lines: Vec<&str> = told.lines().collect();
         assert_eq!(lines.len(), 2, "{told}");

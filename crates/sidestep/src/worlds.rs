@@ -12,5 +12,5 @@ pub fn with_behaviours(own: robots::scenario::Behaviours) -> Worlds {
     let robots: &'static dyn Kind = Box::leak(Box::new(robots::Robots::with(own)));
     let named =
         |kind: &&'static dyn Kind| if kind.name() == robots.name() { robots } else { *kind };
-    Worlds(Box::leak(WORLDS.0.iter().map(|kind| named(&kind)).collect()))
+    Worlds(Box::leak(WORLDS.0.iter().map(named).collect()))
 }

@@ -15,9 +15,9 @@ const NAMED: usize = 5;
 
 fn time_words(effort: &Effort) -> String {
     format!(
-        "{} for {} runs, {} at once; {:.1} ms of simulation and {:.1} ms beside it each",
+        "{} for {}, {} at once; {:.1} ms of simulation and {:.1} ms beside it each",
         duration(effort.wall_s),
-        grouped(effort.runs),
+        counted(effort.runs as usize, "run"),
         effort.at_once,
         1000.0 * effort.simulation_s_per_run(),
         effort.overhead_ms_per_run(),

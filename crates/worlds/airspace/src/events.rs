@@ -34,7 +34,28 @@ pub enum EventKind {
     Intruder,
 }
 
+/// What the value of an event measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Measure {
+    /// Meters.
+    Distance,
+    /// Seconds.
+    Delay,
+    /// A number of something.
+    Number,
+}
+
 impl EventKind {
+    /// Returns what its value measures; `None` for kinds without one.
+    fn measure(self) -> Option<Measure> {
+        match self {
+            Self::LossOfSeparation | Self::Intruder => Some(Measure::Distance),
+            Self::Arrival => Some(Measure::Delay),
+            Self::Override | Self::GroupTooLarge | Self::BeyondBound => Some(Measure::Number),
+            Self::Orbit | Self::Unheard | Self::Deadline | Self::HeldBack => None,
+        }
+    }
+
     /// All kinds.
     pub const ALL: [Self; 10] = [
         Self::LossOfSeparation,
@@ -82,6 +103,16 @@ pub struct Event {
 }
 
 impl Event {
+    /// Returns the other airplane involved, if there is one.
+    pub(super) fn partner(&self) -> Option<EntityId> {
+        (self.other != self.airplane).then_some(self.other)
+    }
+
+    /// Returns the value, if it is measured so.
+    pub(super) fn value_in(&self, measure: Measure) -> Option<f64> {
+        (self.kind.measure() == Some(measure)).then_some(self.value)
+    }
+
     /// Returns an event of one airplane.
     pub fn of(cycle: Cycle, kind: EventKind, airplane: EntityId) -> Self {
         Self { cycle, kind, airplane, other: airplane, value: 0.0 }

@@ -1,9 +1,10 @@
 //! The tables that a run records, and their rows until they are recorded.
 
 use super::decide::Optimization;
-use super::events::{Event, EventKind};
+use super::events::{Event, EventKind, Measure};
 use super::flight::Leg;
 use super::scenario::RecordSection;
+use super::world::AirspaceWorld;
 use sidestep_kernel::ports::table::label_of;
 use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
 use sidestep_kernel::{Cycle, EntityId};
@@ -41,14 +42,19 @@ fn trajectories() -> Table<FlownLeg> {
         .f64("drift_y_m_s", "velocity of the air north", |f| f.leg.drift_m_s[1])
 }
 
-fn events() -> Table<Event> {
+fn events(callsigns: Vec<Option<String>>) -> Table<Event> {
     let kinds = EventKind::ALL.map(EventKind::name);
     Table::new("events")
         .u64("cycle", "cycle of dt in which it happened", |e: &Event| e.cycle)
         .label("event", "what happened", kinds, |e| label_of(&EventKind::ALL, &e.kind))
         .u32("airplane", "entity id", |e| e.airplane)
-        .u32("other", "the other airplane, or the same", |e| e.other)
-        .f64("value", "metres, seconds or a number, by event", |e| e.value)
+        .text("callsign", "its call sign", move |e: &Event| {
+            callsigns.get(e.airplane as usize).cloned().flatten()
+        })
+        .u32("other", "the other airplane", Event::partner)
+        .f64("distance_m", "how near they were", |e| e.value_in(Measure::Distance))
+        .f64("delay_s", "time beyond that of the flight alone", |e| e.value_in(Measure::Delay))
+        .f64("number", "a number, by event", |e| e.value_in(Measure::Number))
 }
 
 fn optimizations() -> Table<Optimization> {
@@ -62,6 +68,10 @@ fn optimizations() -> Table<Optimization> {
         })
         .u64("messages", "messages, one per receiver", |o| o.traffic.messages)
         .u64("bytes", "their bytes", |o| o.traffic.bytes)
+}
+
+fn callsigns(world: &AirspaceWorld) -> Vec<Option<String>> {
+    world.airplanes.iter().map(|airplane| airplane.callsign.clone()).collect()
 }
 
 /// Rows that wait to be recorded.
@@ -80,9 +90,9 @@ impl Rows {
     }
 
     /// Starts to keep rows.
-    pub(super) fn begin(&mut self) {
+    pub(super) fn begin(&mut self, world: &AirspaceWorld) {
         self.flown.begin(self.record.trajectories.then(trajectories));
-        self.events.begin(self.record.events.then(events));
+        self.events.begin(self.record.events.then(|| events(callsigns(world))));
         self.optimizations.begin(self.record.optimizations.then(optimizations));
     }
 

@@ -128,7 +128,7 @@ impl World for AirspaceWorld {
     }
 
     fn begin_recording(&self, _: &mut AirspaceState, books: &mut Books, _: Cycle) {
-        books.rows.begin();
+        books.rows.begin(self);
     }
 
     fn watch(&self, books: &mut Books) {

@@ -11,9 +11,6 @@ use sidestep_kernel::ports::table::label_of;
 use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
 use sidestep_kernel::{Cycle, EntityId};
 
-/// Obstacle number of an event that concerns no obstacle.
-const NO_OBSTACLE: u32 = u32::MAX;
-
 /// Position of a connector, a robot or an obstacle at the start of a cycle.
 #[derive(Debug)]
 struct Place {
@@ -69,7 +66,7 @@ fn events() -> Table<Event> {
         .label("event", "what happened", kinds, |e| label_of(&EventKind::ALL, &e.kind))
         .u32("connector", "the connector that it is about", |e| e.connector)
         .label("reason", "why, of vetoes", reasons, move |e| e.reason.as_ref().map_or(0, reason))
-        .u32("obstacle", "the obstacle; 4294967295 for none", |e| e.obstacle.unwrap_or(NO_OBSTACLE))
+        .u32("obstacle", "the obstacle", |e| e.obstacle)
         .f64("value", "meters, radians or a number, by event", |e| e.value)
         .u32("missing", "parts missing in a gap that is too long; else 0", |e| e.missing)
 }

@@ -13,6 +13,8 @@ pub struct Comparison {
     pub variant: String,
     /// The variant that it is compared with.
     pub baseline: String,
+    /// Whether seeds change neither: there is one pair, and no interval.
+    pub seedless: bool,
     /// Number of pairs in which both have a value.
     pub pairs: usize,
     /// Number of replicates in which only one has a value.
@@ -67,14 +69,13 @@ pub(super) fn comparisons(
         let (own, base) =
             (groups.by_replicate(metric, variant), groups.by_replicate(metric, baseline));
         // Where seeds change neither, there is one pair; replicates that neither has are none.
-        let most = match groups.seedless[variant] && groups.seedless[baseline] {
-            true => 1,
-            false => usize::MAX,
-        };
+        let seedless = groups.seedless[variant] && groups.seedless[baseline];
+        let most = if seedless { 1 } else { usize::MAX };
         let there = own.iter().zip(&base).take(most).filter(|(a, b)| a.is_some() || b.is_some());
         let (own, base): (Vec<_>, Vec<_>) = there.map(|(a, b)| (*a, *b)).unzip();
         let names = [variant, baseline].map(|v| groups.variants[v].clone());
-        Some(compared(names, &Pairs::of(&own, &base), is_share, bootstrap))
+        let compared = compared(names, &Pairs::of(&own, &base), is_share, bootstrap);
+        Some(Comparison { seedless, ..compared })
     };
     let mut all: Vec<Comparison> = (0..groups.variants.len()).filter_map(pairs_of).collect();
     let adjusted = holm(&all.iter().map(|c| c.p).collect::<Vec<_>>());
@@ -93,6 +94,7 @@ fn compared(
     Comparison {
         variant,
         baseline,
+        seedless: false,
         pairs: pairs.n(),
         incomplete: pairs.incomplete(),
         difference: pairs.difference(),

@@ -8,7 +8,7 @@ use super::cell::Outcome;
 use super::plan::{Cell, Plan};
 use super::table::{Role, RunTable};
 use crate::scenario::Seeds;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Number of runs of a variant whose world cannot tell, before the others.
 const TRIALS: u32 = 2;
@@ -113,5 +113,102 @@ pub(super) fn notes(plan: &Plan, runs: &RunTable) -> Vec<String> {
             seeds[1]
         ));
     }
+    let unchanged = unchanged(plan, runs);
+    if unchanged > 0 {
+        notes.push(format!(
+            "All runs{} ended in the same state, to the bit: seeds changed nothing there, and \
+             intervals say nothing.",
+            of_all(unchanged)
+        ));
+    }
     notes
+}
+
+/// Returns the number of variants of which all runs ended alike, although seeds might decide.
+fn unchanged(plan: &Plan, runs: &RunTable) -> usize {
+    let (Some(cells), Some(digests)) =
+        (runs.of_role(Role::Cell).next(), runs.of_role(Role::Digest).next())
+    else {
+        return 0;
+    };
+    let mut ends: BTreeMap<u32, (BTreeSet<String>, usize)> = BTreeMap::new();
+    for row in 0..runs.runs() {
+        let cell = cells.values.number(row).and_then(|id| plan.cell_of(id as u64));
+        let decided = |cell: &Cell| plan.seeds(cell.variant) == Seeds::Decide;
+        let digest = digests.values.text(row);
+        // A failed run has no end.
+        if let Some(cell) = cell.filter(decided).filter(|_| !digest.is_empty()) {
+            let (different, count) = ends.entry(cell.variant).or_default();
+            different.insert(digest);
+            *count += 1;
+        }
+    }
+    ends.values().filter(|(different, count)| different.len() == 1 && *count > 1).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::sweep::{Base, Factor, Rows, Sweep};
+    use crate::scenario::Source;
+
+    /// A plan of two variants with four runs each.
+    fn plan(seeds: [Seeds; 2]) -> Plan {
+        let mut sweep = Sweep::of_scenario("s.toml");
+        sweep.design.factors = vec![Factor::parse("n=1,2").expect("valid")];
+        sweep.replicates = 4;
+        let mut variants = sweep.design.variants("test").expect("valid");
+        variants.iter_mut().zip(seeds).for_each(|(v, seeds)| v.seeds = seeds);
+        let source = Source::new("s.toml", "", "");
+        Plan::new(&sweep, variants, Base { world: "w", seed: 7, source: &source }).expect("valid")
+    }
+
+    fn outcome(cell: Cell, digest: &str) -> Outcome {
+        Outcome { digest: digest.into(), failure: None, ..Outcome::failed(cell, "") }
+    }
+
+    #[test]
+    fn what_draws_nothing_is_planned_once() {
+        let plan = plan([Seeds::Nothing, Seeds::Decide]);
+        let cells: Vec<Cell> = plan.share(crate::experiment::sweep::Shard::ALL).collect();
+        assert_eq!((plan.runs(), cells.len()), (5, 5));
+        assert_eq!(cells.iter().filter(|c| c.variant == 0).count(), 1);
+    }
+
+    #[test]
+    fn two_equal_ends_settle_a_variant_whose_world_cannot_tell_and_no_other() {
+        for (digests, settled) in [(["a", "a"], true), (["a", "b"], false), (["", ""], false)] {
+            let plan = plan([Seeds::Perhaps, Seeds::Decide]);
+            let mut trials = Trials::new(&plan);
+            let open: Vec<Cell> = plan.share(crate::experiment::sweep::Shard::ALL).collect();
+            let first = trials.first_of(open.clone());
+            assert!(first.len() == 4 && first.iter().all(|c| c.replicate < TRIALS), "{first:?}");
+            for (replicate, digest) in (0..).zip(digests) {
+                (0..2).for_each(|v| trials.note(&outcome(plan.cell(v, replicate), digest)));
+            }
+            assert_eq!([trials.is_settled(0), trials.is_settled(1)], [settled, false]);
+            assert_eq!(trials.asks_for(&plan.cell(0, 2)), !settled);
+        }
+    }
+
+    #[test]
+    fn the_table_has_no_runs_beyond_trials_that_settle_and_readers_are_told() {
+        let plan = plan([Seeds::Perhaps, Seeds::Decide]);
+        let mut rows = Rows::default();
+        for cell in plan.share(crate::experiment::sweep::Shard::ALL) {
+            rows.push(outcome(cell, "the same"));
+        }
+        let table = rows.table(&plan).expect("no twins");
+        assert_eq!(table.runs(), 2 + 4);
+        assert_eq!(seedless(&plan, &table), [true, false]);
+        let told = notes(&plan, &table);
+        assert!(
+            told[0].contains("in 1 of 2 variants: the runs with the seeds 7 and 8"),
+            "{told:?}"
+        );
+        assert!(
+            told[1].contains("All runs in 1 of 2 variants ended in the same state"),
+            "{told:?}"
+        );
+    }
 }

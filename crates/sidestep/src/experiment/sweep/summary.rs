@@ -512,7 +512,10 @@ fn uninformative(column: &RunColumn) -> Option<String> {
     let sample = Sample::of((0..runs).map(|run| column.values.number(run)));
     match sample.values.first() {
         None => Some(format!("no run has a value (n = {runs})")),
-        Some(first) if sample.missing == 0 && sample.values.iter().all(|v| v == first) => {
+        // One run says what it says, and nothing of what varies.
+        Some(first)
+            if runs > 1 && sample.missing == 0 && sample.values.iter().all(|v| v == first) =>
+        {
             Some(format!("{} in all runs (n = {runs})", column.values.text(0)))
         }
         Some(_) => None,

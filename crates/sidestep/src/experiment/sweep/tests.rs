@@ -181,8 +181,7 @@ fn samples_of_whole_numbers_are_samples_too() {
 #[test]
 fn parameters_that_always_change_together_share_an_axis() {
     let rows = || (0..12_i64).map(|k| k / 4);
-    let text =
-        |words: [&str; 3]| Values::Text(rows().map(|k| Some(words[k as usize].into())).collect());
+    let text = |words: [&str; 3]| Values::Text(rows().map(|k| Some(words[k as usize])).collect());
     let columns = vec![
         column("variant", Role::Variant, Values::I64(rows().map(Some).collect())),
         column("replicate", Role::Replicate, Values::I64((0..12).map(|k| Some(k % 4)).collect())),

@@ -42,8 +42,8 @@ fn brief_of(summary: &Summary, metric: &MetricSummary) -> Table {
     for variant in &metric.variants {
         let mut row = vec![variant.variant.clone(), variant.n.to_string(), center(variant)];
         if let Some(c) = metric.comparisons.iter().find(|c| c.variant == variant.variant) {
-            let n = if c.pairs > 1 { format!(" n={}", c.pairs) } else { String::new() };
-            row.push(format!("{}{n}", with_interval(c.difference, c.interval)));
+            let n = if c.seedless { String::new() } else { format!(" n={}", c.pairs) };
+            row.push(difference(c) + &n);
             row.push(c.p_holm.map_or("-".into(), p_value));
         }
         table.row(row);
@@ -59,7 +59,7 @@ fn center(variant: &VariantMetric) -> String {
     };
     match value {
         // What no seed changes has no spread.
-        Some(value) if variant.seedless => number(value, None),
+        Some(value) if variant.seedless => number(value, Some(0.0)),
         value => with_interval(value, interval),
     }
 }
@@ -94,7 +94,15 @@ fn against(metric: &MetricSummary, variant: &str) -> [String; 2] {
         return [String::new(), String::new()];
     };
     let p = found.p_holm.map_or("-".into(), p_value);
-    [with_interval(found.difference, found.interval), p]
+    [difference(found), p]
+}
+
+/// Returns the difference of a variant from what it is compared with; alone where seeds change nothing.
+fn difference(comparison: &Comparison) -> String {
+    match comparison.difference {
+        Some(difference) if comparison.seedless => number(difference, Some(0.0)),
+        difference => with_interval(difference, comparison.interval),
+    }
 }
 
 /// Returns a table of how each metric goes with each parameter.
@@ -268,7 +276,7 @@ fn difference_row(comparison: &Comparison) -> Vec<String> {
     vec![
         comparison.variant.clone(),
         comparison.pairs.to_string(),
-        with_interval(comparison.difference, comparison.interval),
+        difference(comparison),
         comparison.p_holm.map_or("-".into(), p_value),
         of_pairs(comparison.lower),
         of_pairs(comparison.higher),
