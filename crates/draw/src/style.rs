@@ -2,6 +2,7 @@
 
 use crate::error::DrawError;
 use sidestep_kernel::view::{COLORS, Color};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Okabe and Ito's palette without its yellow, which is unreadable on white: distinct for every
 /// common color blindness.
@@ -33,9 +34,16 @@ pub(crate) fn series_dash(index: usize) -> &'static str {
     DASHES[index / SERIES_COLORS.len() % DASHES.len()]
 }
 
-/// Returns the dashes of the way of a body, which differ where colors repeat.
-pub(crate) fn body_dash(number: u32) -> &'static str {
-    DASHES[number as usize / COLORS.len() % DASHES.len()]
+/// Returns the dashes of the ways of bodies with these numbers, which differ where colors repeat.
+pub(crate) fn body_dashes(numbers: &BTreeSet<u32>) -> BTreeMap<u32, &'static str> {
+    let color = |number: u32| number as usize % COLORS.len();
+    let mut times = [0; COLORS.len()];
+    let dash = |&number: &u32| {
+        let time = &mut times[color(number)];
+        *time += 1;
+        (number, DASHES[(*time - 1) % DASHES.len()])
+    };
+    numbers.iter().map(dash).collect()
 }
 
 /// Returns the opacity of the bars of a series, and the color of their rim: bars of one color differ in
@@ -110,6 +118,13 @@ impl Default for Style {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn dashes_begin_where_colors_repeat() {
+        let numbers = BTreeSet::from([2, 8, 9, 14]);
+        let dashes: Vec<&str> = body_dashes(&numbers).into_values().collect();
+        assert_eq!(dashes, [DASHES[0], DASHES[1], DASHES[0], DASHES[2]]);
+    }
 
     #[test]
     fn series_have_the_colors_of_bodies() {

@@ -20,8 +20,7 @@ Examples:
   sidestep report runs/office           runs/office/report.html and report.md
   sidestep report runs/office --out office.html
   sidestep report sweeps/methods        intervals, comparisons, figures
-  sidestep report sweeps/methods --figure svg,png --figure-size 85x60 \
-      --label 'mean delay (%)=Delay in percent'
+  sidestep report sweeps/methods --figure svg,png --figure-size 85x60
 
 The page is one file that needs no network. A run that is not complete can be reported too; its \
 report says so.";

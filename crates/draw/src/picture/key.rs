@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::trails::agents;
 use super::{Scene, bodies};
 use crate::legend::{Entry, Symbol};
-use crate::style::{body_dash, hex};
+use crate::style::{body_dashes, hex};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{
     Body, Frame, Kind, Occupancy, Scenery, Trail, UNKNOWN, WALL, color_of,
@@ -102,11 +102,12 @@ fn named(scene: &Scene<'_>) -> Vec<Entry> {
         })
         .map(|body| (body.number, (body.kind, None)));
     let all: BTreeMap<u32, (Kind, Option<f64>)> = chains.chain(trails).collect();
+    let dashes = body_dashes(&all.keys().copied().collect());
     let entry = |(&number, &(kind, width_m)): (&u32, &(Kind, Option<f64>))| {
         let color = hex(color_of(number)).into();
         let symbol = match width_m {
             Some(_) => Symbol::Swatch { fill: color, rim: "none".into(), opacity: RIBBON },
-            None => Symbol::Line { color, marker: None, dash: body_dash(number) },
+            None => Symbol::Line { color, marker: None, dash: dashes[&number] },
         };
         Entry::new(symbol, name(scene, kind, number))
     };

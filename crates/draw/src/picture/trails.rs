@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::style::body_dashes;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{
     Body, COLORS, Color, Condition, Floor, Frame, Kind, Place, Scenery, Shape, Trail, Who, color_of,
@@ -26,6 +27,8 @@ pub(crate) struct Shown<'a> {
     pub(crate) width_m: Option<f64>,
     /// First and last cycle of all trails.
     pub(crate) span: [Cycle; 2],
+    /// Its dashes, which tell it from others of its color; of ribbons, which have a name beside them, none.
+    pub(crate) dash: &'static str,
 }
 
 impl Shown<'_> {
@@ -103,6 +106,7 @@ pub(super) fn shown<'a>(scenery: &Scenery, frame: &Frame, trails: &'a [Trail]) -
         color: color_of(trail.of.1),
         width_m: sizes.get(&trail.of).map(|size_m| size_m[0]),
         span: [0, 0],
+        dash: "",
     };
     let is_shown = |trail: &&Trail| worth.contains(&trail.of) && !trail.way.is_empty();
     let mut shown: Vec<Shown<'_>> = trails.iter().filter(is_shown).map(drawn).collect();
@@ -111,7 +115,13 @@ pub(super) fn shown<'a>(scenery: &Scenery, frame: &Frame, trails: &'a [Trail]) -
     }
     let cycles = || shown.iter().flat_map(|trail| trail.way).map(|(cycle, _)| *cycle);
     let span = [cycles().min().unwrap_or(0), cycles().max().unwrap_or(0)];
-    shown.iter_mut().for_each(|trail| trail.span = span);
+    let dashes = body_dashes(&shown.iter().map(|trail| trail.of.1).collect());
+    for trail in &mut shown {
+        trail.span = span;
+        if trail.width_m.is_none() {
+            trail.dash = dashes[&trail.of.1];
+        }
+    }
     shown
 }
 

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::canvas::{Canvas, Px};
 use super::trails::Shown;
-use crate::style::{body_dash, hex};
+use crate::style::hex;
 use crate::svg::{Num, Svg};
 use sidestep_kernel::view::Color;
 
@@ -35,7 +35,7 @@ pub(super) fn draw(svg: &mut Svg, trail: &Shown<'_>, canvas: &Canvas) {
         }
         None => (LINE_PX, r#"stroke-linecap="round" stroke-linejoin="round""#),
     };
-    let dash = if trail.width_m.is_none() { body_dash(trail.of.1) } else { "" };
+    let dash = trail.dash;
     let points = trail.way.iter().map(|&(_, at)| canvas.at(at));
     let shades = trail.way.iter().map(|(cycle, _)| trail.shade(*cycle, SHADES));
     let points: Vec<(usize, Px)> = match trail.width_m {

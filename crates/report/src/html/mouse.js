@@ -236,9 +236,12 @@
   document.documentElement.dataset.drawn = String(charts.length);
 
   const resized = new ResizeObserver(() =>
-    charts.forEach((chart) => {
-      if (chart.stage.clientWidth !== chart.drawnWidth) draw(chart);
-    }),
+    // In a frame of its own: drawing changes heights, which the observer would have to report again.
+    requestAnimationFrame(() =>
+      charts.forEach((chart) => {
+        if (chart.stage.clientWidth !== chart.drawnWidth) draw(chart);
+      }),
+    ),
   );
   charts.forEach((chart) => resized.observe(chart.stage));
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () =>

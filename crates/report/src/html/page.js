@@ -99,7 +99,8 @@
     new ResizeObserver(() => {
       if (room.clientWidth !== before) {
         before = room.clientWidth;
-        fit();
+        // In a frame of its own: a change of sizes within the observer's would call it again.
+        requestAnimationFrame(fit);
       }
     }).observe(room);
     fit();
