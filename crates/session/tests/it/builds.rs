@@ -29,13 +29,13 @@ fn two_builds_do_not_mix_in_one_sweep() {
     edit(&manifest, BUILD, OTHER);
     is_refused(run("1/2"));
     let folder = Folder::open(&path).expect("a sweep");
-    is_refused(collect(&folder));
+    is_refused(collect(&folder, &Unwatched));
     is_refused(go_on(WORLDS, &folder, 1, &Unwatched));
     is_refused(planned_or_there(WORLDS, &sweep, &path, &Unwatched));
     // A folder from before builds had identities.
     edit(&manifest, &format!("  \"build\": \"{OTHER}\",\n"), "");
     run("1/2").expect("the version is the same");
-    collect(&Folder::open(&path).expect("a sweep")).expect("collected");
+    collect(&Folder::open(&path).expect("a sweep"), &Unwatched).expect("collected");
 }
 
 #[test]

@@ -44,7 +44,7 @@ fn two_variants_with_three_seeds_come_to_one_table_however_they_are_run() {
         let ended = share(WORLDS, &folder, shard, 1, &Unwatched).expect("run");
         assert_eq!(done(ended).runs(), 3);
     }
-    assert_eq!(done(collect(&folder).expect("collected")), table);
+    assert_eq!(done(collect(&folder, &Unwatched).expect("collected")), table);
 }
 
 #[test]
