@@ -60,7 +60,6 @@
       tick.textContent,
       tick.getBoundingClientRect(),
     ]);
-    found.beyond = beyond(found.width);
     const isCut = ([, box]) =>
       box.left < edge.left - 1 || box.right > edge.right + 1 || box.bottom > edge.bottom + 1;
     const touch = ([, a], [, b]) =>
@@ -121,6 +120,7 @@
     all("details").forEach((details) => (details.open = true));
     await later(300);
     const isCut = (place) => place.scrollWidth > place.clientWidth + 1;
+    found.beyond = beyond(found.width);
     found.cut = all(".scrolled").filter(isCut).map((place) => place.getAttribute("aria-label"));
     found.offered = all(".more:not([hidden])").length;
     found.cards = all("table.cards").length;

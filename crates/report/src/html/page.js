@@ -95,6 +95,8 @@
       isOpen = !isOpen;
       fit();
     });
+    // What is folded has no size until it is opened.
+    place.closest("details")?.addEventListener("toggle", fit);
     let before = -1;
     new ResizeObserver(() => {
       if (room.clientWidth !== before) {

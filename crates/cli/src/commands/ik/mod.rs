@@ -28,7 +28,8 @@ Examples:
   sidestep ik panda.urdf --srdf panda.srdf --group arm --posture default \\
       --target 0.4,0,0.5 --nearest
   sidestep ik arm.urdf --targets poses.csv > answers.csv
-  sidestep ik arm.urdf --target 0.3,0.1,0.4 --obstacle 0.2,0,0.3,0.05 --png arm.png
+  sidestep ik arm.urdf --target 0.3,0.1,0.4 --obstacle 0.2,0,0.3,0.05
+  sidestep ik arm.urdf --target 0.3,0.1,0.4 --png arm.png
 
 The target is the tip's frame in the frame of the base: its position in m, and with --rpy or \
 --quaternion its orientation. --free names what of it does not count, in the target's own axes: x, y, \
