@@ -57,11 +57,15 @@ pub(super) fn contents(compiled: &Compiled) -> Said {
         ),
         line("run", format!("at most {cycles} cycles ({lasts_s} s), seed {}", compiled.seed)),
     ]);
-    if let Some([lat, lon]) = world.origin_deg {
-        lines.push(line("origin", format!("latitude {lat:.5}, longitude {lon:.5}")));
-    }
+    lines.extend(origin(world));
     lines.extend(too_close(world, &compiled.too_close));
     Said { json, text: aligned(&lines) }
+}
+
+/// Returns the place of the origin on earth, if it has one.
+fn origin(world: &AirspaceWorld) -> Option<(String, String)> {
+    let [lat, lon] = world.origin_deg?;
+    Some(line("origin", format!("latitude {lat:.5}, longitude {lon:.5}")))
 }
 
 /// Returns the separations, speeds and turn rates of the airplanes.

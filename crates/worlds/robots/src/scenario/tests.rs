@@ -186,7 +186,7 @@ fn an_effector_that_was_learned_for_other_boxes_is_refused() {
         text("", &format!("{learned}box_m = {box_m}\nforward = [{{ p = 1, path = \"F\" }}]\n"))
     };
     assert!(remarks(&of(0.5), Path::new("")).is_empty());
-    let error = compiled(&of(0.25), Path::new("")).err().expect("another box");
+    let error = compiled(&of(0.25), Path::new("")).expect_err("another box");
     assert!(error.position().is_some(), "{error}");
     assert!(error.cause().contains("boxes of 0.25 m, and those of the map are 0.5 m"), "{error}");
     assert!(error.remedy().contains("--box 0.5"), "{error}");
