@@ -159,7 +159,7 @@ mod tests {
     fn a_table_that_fits_is_one_block() {
         assert_eq!(
             in_columns(&table("pc", 2)),
-            "  what           heading 0           heading 1\n  pc     0.5 [0.25, 0.75]   1.5 [1.25, \
+            "  what          heading 0          heading 1\n  pc     0.5 [0.25, 0.75]   1.5 [1.25, \
              1.75]\n"
         );
     }

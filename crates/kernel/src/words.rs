@@ -29,15 +29,22 @@ pub fn grouped(number: u64) -> String {
     head.into_iter().chain(groups).collect::<Vec<_>>().join(" ")
 }
 
+/// Begin of a value that is a command to copy.
+const COMMAND: &str = "sidestep ";
+
 /// Columns of a line of text.
 pub const LINE_COLS: usize = 80;
 
 /// Returns lines of names and values, the values below each other and broken into lines of
-/// [`LINE_COLS`] columns where they have spaces.
+/// [`LINE_COLS`] columns where they have spaces. A command, which people copy, stays whole.
 pub fn aligned(rows: &[(String, String)]) -> String {
     let width = rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
     let line = |(name, value): &(String, String)| {
-        let words = wrapped(value, LINE_COLS.saturating_sub(width + 4));
+        let cols = match value.starts_with(COMMAND) {
+            true => usize::MAX,
+            false => LINE_COLS.saturating_sub(width + 4),
+        };
+        let words = wrapped(value, cols);
         format!(
             "  {name:<width$}  {}\n",
             words.join(&format!("\n{:indent$}", "", indent = width + 4))
@@ -86,6 +93,8 @@ mod tests {
         let lines: Vec<&str> = told.lines().collect();
         assert_eq!(lines.len(), 2, "{told}");
         assert!(lines[1].starts_with("        seventeen") && lines.iter().all(|l| l.len() <= 80));
+        let command = format!("sidestep report {}", "x".repeat(99));
+        assert_eq!(aligned(&[line("look", &command)]), format!("  look  {command}\n"));
         assert_eq!(wrapped(&"x".repeat(99), 80), ["x".repeat(99)], "a word is never broken");
         assert_eq!(wrapped("a  b\nc", 80), ["a  b", "c"]);
     }

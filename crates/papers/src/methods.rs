@@ -217,8 +217,8 @@ mod tests {
     #[test]
     fn traffic_that_no_seed_changes_is_flown_once_and_has_no_interval() {
         let text = "format = 1\nworld = \"airspace\"\n[airspace]\nshield = \"off\"\n\
-                    [[airplanes]]\nat_m = [0, 0]\nway_points_m = [[9000, 0]]\n\
-                    [[airplanes]]\nat_m = [9000, 500]\nway_points_m = [[0, 500]]\n";
+                    [[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[9000, 0]]\n\
+                    [[airplanes]]\nat_m = [9000, 500]\nheading_deg = 180\nway_points_m = [[0, 500]]\n";
         let source = Source::new("two", text, "");
         let found = compare(&source, &Method::ALL, (1, 5), 2, &mut |_, _| ()).expect("valid");
         let table = table("t", &found);

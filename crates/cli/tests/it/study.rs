@@ -6,8 +6,8 @@ use serde_json::Value;
 
 /// Two airplanes that meet; no number is drawn but by the optimizer.
 const MEETING: &str = "format = 1\nworld = \"airspace\"\nname = \"meeting\"\n[airspace]\n\
-                       shield = \"off\"\n[[airplanes]]\nat_m = [0, 0]\n\
-                       way_points_m = [[9000, 0]]\n[[airplanes]]\nat_m = [9000, 500]\n\
+                       shield = \"off\"\n[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\n\
+                       way_points_m = [[9000, 0]]\n[[airplanes]]\nat_m = [9000, 500]\nheading_deg = 180\n\
                        way_points_m = [[0, 500]]\n";
 
 fn place() -> Place {

@@ -45,9 +45,7 @@ pub(super) fn contents(compiled: &Compiled) -> Said {
         lines.push(line("recorded", format!("{}, replayed {until}", grouped(recorded))));
     }
     lines.extend(times(compiled));
-    if let Some([lat, lon]) = world.origin_deg {
-        lines.push(line("origin", format!("latitude {lat:.5}, longitude {lon:.5}")));
-    }
+    lines.extend(origin(world));
     lines.extend(too_close(world, &compiled.too_close));
     Said { json, text: aligned(&lines) }
 }
@@ -61,6 +59,12 @@ fn times(compiled: &Compiled) -> Lines {
         line("time", format!("decides every {dt_s} s, looks {horizon_s} s ahead")),
         line("run", format!("at most {cycles} cycles ({lasts_s} s), seed {}", compiled.seed)),
     ]
+}
+
+/// Returns the place of the origin on earth, if it has one.
+fn origin(world: &AirspaceWorld) -> Option<(String, String)> {
+    let [lat, lon] = world.origin_deg?;
+    Some(line("origin", format!("latitude {lat:.5}, longitude {lon:.5}")))
 }
 
 /// Returns the separations, speeds and turn rates of the airplanes, and how they decide.

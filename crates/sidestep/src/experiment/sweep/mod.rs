@@ -17,6 +17,7 @@
 //! groups.rs    runs by variant and replicate, and the mean over any group of variants
 //! compare.rs   a variant against the baseline, on the same replicates
 //! summary.rs   a summary of the table: every number with its interval and number of runs
+//! told.rs      a plan's runs -> their summary
 //! text.rs      the summary as tables
 //! charts.rs    the summary as figures
 //! ```
@@ -41,6 +42,7 @@ pub mod seeds;
 pub mod summary;
 pub mod table;
 mod text;
+mod told;
 pub mod variant;
 pub mod work;
 

@@ -72,13 +72,6 @@ pub enum Against {
     },
 }
 
-impl Against {
-    /// Whether there are variants that are compared with nothing.
-    fn leaves_out(&self) -> bool {
-        matches!(self, Self::Matched { alone: 1.., .. })
-    }
-}
-
 impl Default for SummaryOptions {
     fn default() -> Self {
         Self {
@@ -638,23 +631,27 @@ fn effects(groups: &Groups<'_>, column: &RunColumn) -> Vec<Effect> {
     balanced.filter(|p| groups.with_level(*p, 0).len() > 1).map(effect).collect()
 }
 
-fn notes(summary: &Summary, groups: &Groups<'_>, against: Option<&Against>) -> Vec<String> {
-    let mut notes = Vec::new();
-    if let Some(Against::Matched { name, alone, .. }) = against.filter(|a| a.leaves_out()) {
-        notes.push(format!(
+/// Returns what a reader must know about what is compared.
+fn note_on_baseline(groups: &Groups<'_>, against: Option<&Against>) -> Option<String> {
+    match against {
+        Some(Against::Matched { name, alone: alone @ 1.., .. }) => Some(format!(
             "No variant with {name} is equal to {alone} of the others in all else: these are not \
              compared."
-        ));
+        )),
+        None if groups.paired && is_grid(groups) => {
+            let (name, level) = (&groups.parameters[0].name, groups.parameters[0].levels[0].name());
+            Some(format!(
+                "Nothing is compared: several keys vary. A baseline is compared within the others, \
+                 e.g. --baseline {name}={level}"
+            ))
+        }
+        _ => None,
     }
-    if against.is_none() && groups.paired && is_grid(groups) {
-        let p = &groups.parameters[0];
-        notes.push(format!(
-            "Nothing is compared: several keys vary. A baseline is compared within the others, e.g. \
-             --baseline {}={}",
-            p.name,
-            p.levels[0].name()
-        ));
-    }
+}
+
+fn notes(summary: &Summary, groups: &Groups<'_>, against: Option<&Against>) -> Vec<String> {
+    let mut notes = Vec::new();
+    notes.extend(note_on_baseline(groups, against));
     let hidden: Vec<&LeftOut> =
         summary.left_out.iter().filter(|l| l.reason.starts_with("beyond")).collect();
     if !hidden.is_empty() {

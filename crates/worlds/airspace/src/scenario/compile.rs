@@ -95,7 +95,6 @@ impl Compiler<'_> {
         let tolerance_m = section.tolerance_m.map_or((radius_m / 5.0).max(1.0), f64::from);
         let vertical_m = section.vertical_m.map_or(300.0, f64::from) - ROUNDED_M;
         let network = self.network(&timing, &airplanes)?;
-        let group_memory_gib = section.group_memory_gib.map_or(2.0, f64::from);
         let world = AirspaceWorld {
             wind_m_s: self.wind_m_s(&airplanes)?,
             airplanes,
@@ -110,7 +109,7 @@ impl Compiler<'_> {
             mvp: section.mvp.or(MVP),
             orca: section.orca.or(ORCA),
             deployment: section.deployment,
-            group_bytes: (group_memory_gib * GIB) as u64,
+            group_bytes: (section.group_memory_gib.map_or(2.0, f64::from) * GIB) as u64,
             shield: section.shield.0,
             vertical_m,
             origin_deg: section.origin_deg.map(|at| at.get()),
