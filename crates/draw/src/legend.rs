@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use crate::style::{FAINT_INK, INK};
 use crate::svg::{Anchor, Num, Rect, Svg, TextLook};
 use crate::text::{self, Weight};
+use sidestep_kernel::math::hypot;
 
 /// The shape that distinguishes a series besides its color.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -204,7 +205,7 @@ pub(crate) fn arrowhead(
     head_px: f64,
     color: &str,
 ) {
-    let far = (x - from.0).hypot(y - from.1);
+    let far = hypot(x - from.0, y - from.1);
     let (ux, uy) = (head_px * (x - from.0) / far, head_px * (y - from.1) / far);
     let wing = |side: f64| (x - ux + side * 0.5 * uy, y - uy - side * 0.5 * ux);
     let [(ax, ay), (bx, by)] = [wing(1.0), wing(-1.0)].map(|(x, y)| (Num(x), Num(y)));

@@ -7,6 +7,7 @@ use crate::error::DrawError;
 use crate::legend::{Entry, Marker, Symbol, arrowhead, dashes, start_mark};
 use crate::style::{FAINT_INK, Style, series_color, series_dash};
 use crate::svg::Svg;
+use sidestep_kernel::math::hypot;
 
 /// Straight pieces of an ideal line, which is a curve if one axis is logarithmic.
 const IDEAL_PIECES: u32 = 64;
@@ -318,7 +319,7 @@ type Px = (f64, f64);
 fn draw_ends(svg: &mut Svg, places: &[Px], color: &str, head_px: f64) {
     let [start, .., end] = places else { return };
     start_mark(svg, *start, 0.4 * head_px, color);
-    let is_apart = |p: &&Px| (p.0 - end.0).hypot(p.1 - end.1) > 0.5;
+    let is_apart = |p: &&Px| hypot(p.0 - end.0, p.1 - end.1) > 0.5;
     if let Some(before) = places.iter().rev().find(is_apart) {
         arrowhead(svg, *before, *end, head_px, color);
     }

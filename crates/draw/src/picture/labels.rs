@@ -7,6 +7,7 @@ use crate::legend::{arrowhead, end_mark, start_mark};
 use crate::style::{Style, hex};
 use crate::svg::{Anchor, Rect, Svg, TextLook};
 use crate::text::{self, Weight};
+use sidestep_kernel::math::hypot;
 use sidestep_kernel::view::{Body, Kind, Shape};
 
 /// Most trails in a picture with names: with more there is no room.
@@ -71,7 +72,7 @@ pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect
 /// Draws an arrowhead in the middle of a line, which tells where it goes.
 fn draw_direction(svg: &mut Svg, trail: &Shown<'_>, canvas: &Canvas, color: &str) {
     let points: Vec<Px> = trail.way.iter().map(|&(_, at)| canvas.at(at)).collect();
-    let length = |pair: &[Px]| (pair[1].0 - pair[0].0).hypot(pair[1].1 - pair[0].1);
+    let length = |pair: &[Px]| hypot(pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
     let half = 0.5 * points.windows(2).map(length).sum::<f64>();
     // A short line has no room for a head.
     if half < 3.0 * HEAD_PX {

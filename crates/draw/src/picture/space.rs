@@ -9,6 +9,7 @@ use crate::style::{FAINT_INK, GRID, Style};
 use crate::svg::{Anchor, Rect, Svg, TextLook};
 use crate::text::{self, Weight};
 use crate::ticks::{Ticks, decimals, label, nice_step};
+use sidestep_kernel::math::hypot;
 use sidestep_kernel::view::Place;
 
 /// Room along an edge for a number.
@@ -67,21 +68,32 @@ fn draw_box(svg: &mut Svg, canvas: &Canvas, box_m: [Place; 2], style: &Style) {
         }
     }
     let look = TextLook { fill: FAINT_INK, ..TextLook::new(style.small_px(), Anchor::Middle) };
+    let mut names = Vec::new();
     // Edges with nothing in front of them, as corners of the box.
     for (name, [from, to]) in [("x", [0, 1]), ("y", [1, 3]), ("z", [0, 4])] {
         let (from, to) = (canvas.at(all[from]), canvas.at(all[to]));
         svg.line(from, to, format_args!(r#"stroke="{FAINT_INK}" stroke-width="1.2""#));
-        let length = (to.0 - from.0).hypot(to.1 - from.1).max(1.0);
+        let length = hypot(to.0 - from.0, to.1 - from.1).max(1.0);
         let out = 1.6 * style.font_px / length;
         let at = (to.0 + out * (to.0 - from.0), to.1 + out * (to.1 - from.1));
         let longest_m = (0..3).map(|k| box_m[1][k] - box_m[0][k]).fold(0.0, f64::max);
         svg.text(at.0, at.1 + look.middle_px(), &format!("{name} ({})", unit(longest_m).0), &look);
+        names.push(at);
     }
-    (0..3).for_each(|k| draw_numbers(svg, canvas, box_m, k, style));
+    // A number that would lie on the name of an axis is left out.
+    let room_px = 2.5 * style.font_px;
+    let is_free = |(x, y): (f64, f64)| names.iter().all(|n| hypot(n.0 - x, n.1 - y) > room_px);
+    (0..3).for_each(|k| draw_numbers(svg, canvas, (box_m, k), style, &is_free));
 }
 
-/// Writes numbers along an edge of the box, on the side where nothing is.
-fn draw_numbers(svg: &mut Svg, canvas: &Canvas, box_m: [Place; 2], k: usize, style: &Style) {
+/// Writes numbers along the edge `k` of the box, on the side where nothing is, as far as there is room.
+fn draw_numbers(
+    svg: &mut Svg,
+    canvas: &Canvas,
+    (box_m, k): ([Place; 2], usize),
+    style: &Style,
+    is_free: &dyn Fn((f64, f64)) -> bool,
+) {
     let longest_m = (0..3).map(|k| box_m[1][k] - box_m[0][k]).fold(0.0, f64::max);
     let unit_m = unit(longest_m).1;
     // The edge of y begins where that of x ends.
@@ -96,7 +108,7 @@ fn draw_numbers(svg: &mut Svg, canvas: &Canvas, box_m: [Place; 2], k: usize, sty
     };
     let (low, high) = (box_m[0][k] / unit_m, box_m[1][k] / unit_m);
     let (from, to) = (at(low), at(high));
-    let room_px = (to.0 - from.0).hypot(to.1 - from.1);
+    let room_px = hypot(to.0 - from.0, to.1 - from.1);
     let ticks = Ticks::linear(low, high, ((room_px / NUMBER_ROOM_PX) as usize).clamp(1, 8));
     let (anchor, [dx, dy]) =
         [(Anchor::End, [-0.5, 0.9]), (Anchor::Start, [0.5, 0.9]), (Anchor::End, [-0.6, 0.0])][k];
@@ -104,6 +116,9 @@ fn draw_numbers(svg: &mut Svg, canvas: &Canvas, box_m: [Place; 2], k: usize, sty
     for (value, label) in &ticks.major {
         let (x, y) = at(*value);
         let (dx, dy) = (dx * style.small_px(), dy * style.small_px());
+        if !is_free((x + dx, y + dy)) {
+            continue;
+        }
         svg.line((x, y), (x + 0.6 * dx, y + 0.6 * dy), format_args!(r#"stroke="{FAINT_INK}""#));
         svg.text(x + dx, y + dy + look.middle_px(), label, &look);
     }

@@ -191,7 +191,8 @@ mod tests {
             assert_eq!(cycles, (0..=200).collect::<Vec<Cycle>>());
             for pair in way.windows(2) {
                 let moved = |k: usize| (pair[1].1[k] - pair[0].1[k]).abs();
-                assert!(moved(0).max(moved(1)) < 0.51 && moved(0).min(moved(1)) < 1e-9, "{pair:?}");
+                // An action that errs may carry two boxes ahead.
+                assert!(moved(0).max(moved(1)) < 1.01 && moved(0).min(moved(1)) < 1e-9, "{pair:?}");
             }
         }
         assert!(

@@ -44,7 +44,9 @@ fn named_paths(text: &str) -> Vec<&str> {
     };
     let elsewhere =
         ["runs/", "sweeps/", "trajectories/", "events/", "shares/", "variants/", "../", "/"];
-    let is_ours = |span: &&str| !elsewhere.iter().any(|p| span.starts_with(p));
+    // Types of ROS 2 are written as paths are.
+    let is_ours =
+        |span: &&str| !elsewhere.iter().any(|p| span.starts_with(p)) && !span.contains("_msgs/");
     let prose = text.split("```").step_by(2);
     let spans = prose.flat_map(|part| part.split('`').skip(1).step_by(2));
     spans.filter(is_path).filter(is_ours).collect()

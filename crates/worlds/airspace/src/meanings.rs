@@ -66,7 +66,7 @@ pub(super) const MEANINGS: &[Meaning] = &[
         meaning: "simulated time that all talks took; none where one process decides or messages take no time",
     },
     Meaning {
-        name: "optimisations",
+        name: "optimizations",
         words: "optimizations",
         unit: "",
         meaning: "optimizations run",
@@ -84,7 +84,7 @@ pub(super) const MEANINGS: &[Meaning] = &[
         meaning: "optimizations whose rounds ran out",
     },
     Meaning {
-        name: "optimise_cpu_s",
+        name: "optimize_cpu_s",
         words: "time spent deciding",
         unit: "",
         meaning: "processor time spent deciding, all workers together; measured, so it differs from run to run",

@@ -1,7 +1,7 @@
 //! Runs by variant and replicate.
 
 use super::Label;
-use super::summary::SummaryOptions;
+use super::options::SummaryOptions;
 use super::table::{Role, RunColumn, RunTable};
 use super::variant::DEFAULT;
 use crate::scenario::{Meaning, told};

@@ -13,9 +13,10 @@
 use super::Label;
 use super::compare::{Comparison, Reference, comparisons};
 use super::groups::{Groups, Level, Parameter};
+use super::options::{Against, SummaryOptions};
 use super::table::{Role, RunColumn, RunTable};
 use super::{charts, text};
-use crate::scenario::{Meaning, nearest};
+use crate::scenario::nearest;
 use crate::statistics::{
     Bootstrap, Correlation, Interval, QuantileInterval, Sample, mean, mean_interval, percentile,
     quantile_interval, rank_correlation, runs_for_half_width, sample_sd, wilson,
@@ -24,7 +25,7 @@ use serde::Serialize;
 use sidestep_document::{Estimate, Figure, Table};
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::Values;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// The quantiles that are reported.
 pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
@@ -35,56 +36,6 @@ const BOOTSTRAP_RUNS: usize = 10_000;
 
 /// The reason why a metric is not shown if others were requested.
 pub(super) const NOT_ASKED_FOR: &str = "not asked for";
-
-/// Options of a summary.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SummaryOptions {
-    /// Metrics to show, in this order; `None` for the default order of the module.
-    pub metrics: Option<Vec<String>>,
-    /// Largest number of metrics shown if none are requested.
-    pub max_metrics: usize,
-    /// What variants are compared with; `None` for the first variant, but for nothing in grids of
-    /// several parameters and in scattered designs, where the first is like no other.
-    pub against: Option<Against>,
-    /// Names of the variants, where the table has their numbers.
-    pub names: Option<Vec<String>>,
-    /// Variants in which seeds change nothing: their one value has no interval.
-    pub seedless: BTreeSet<String>,
-    /// Options of bootstrap intervals.
-    pub bootstrap: Bootstrap,
-    /// The metrics in words.
-    pub meanings: &'static [Meaning],
-}
-
-/// What variants are compared with.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Against {
-    /// The variant of this name.
-    Variant(String),
-    /// Each with a variant of its own.
-    Matched {
-        /// The name of these in tables.
-        name: String,
-        /// The names of variants, and of those that they are compared with.
-        of: BTreeMap<String, String>,
-        /// Number of variants to which none corresponds.
-        alone: usize,
-    },
-}
-
-impl Default for SummaryOptions {
-    fn default() -> Self {
-        Self {
-            metrics: None,
-            names: None,
-            max_metrics: 12,
-            against: None,
-            seedless: BTreeSet::new(),
-            bootstrap: Bootstrap::default(),
-            meanings: &[],
-        }
-    }
-}
 
 /// Runs that differ by their seeds alone.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -1,9 +1,10 @@
 //! The summary of a plan's runs: with its metrics and its baseline, and what its seeds change.
 
 use super::baseline::Baseline;
+use super::options::{Against, SummaryOptions};
 use super::plan::Plan;
 use super::seeds;
-use super::summary::{Against, Summary, SummaryOptions};
+use super::summary::Summary;
 use super::table::RunTable;
 use crate::worlds::WORLDS;
 use sidestep_kernel::InputError;

@@ -121,7 +121,7 @@ fn verdicts(fits: &[Fit]) -> Vec<String> {
     let mut words: Vec<String> = differs
         .map(|(fit, _)| {
             format!(
-                "WARNING: {}: the parts of the log differ by more than chance (p = {}).\nWhat was \
+                "WARNING: {}: the parts of the log differ by more than chance (p {}).\nWhat was \
                  learned may not hold elsewhere: the robot or its place changed meanwhile,\nor \
                  events depend on each other.",
                 fit.table,
@@ -140,7 +140,7 @@ fn verdicts(fits: &[Fit]) -> Vec<String> {
 }
 
 fn shown_p(p: f64) -> String {
-    if p < 0.0001 { "< 0.0001".into() } else { format!("{p:.4}") }
+    if p < 0.0001 { "< 0.0001".into() } else { format!("= {p:.4}") }
 }
 
 #[cfg(test)]
