@@ -68,7 +68,7 @@ fn draw_box(svg: &mut Svg, canvas: &Canvas, box_m: [Place; 2], style: &Style) {
         }
     }
     let look = TextLook { fill: FAINT_INK, ..TextLook::new(style.small_px(), Anchor::Middle) };
-    let mut names = Vec::new();
+    let mut taken = Vec::new();
     // Edges with nothing in front of them, as corners of the box.
     for (name, [from, to]) in [("x", [0, 1]), ("y", [1, 3]), ("z", [0, 4])] {
         let (from, to) = (canvas.at(all[from]), canvas.at(all[to]));
@@ -78,21 +78,19 @@ fn draw_box(svg: &mut Svg, canvas: &Canvas, box_m: [Place; 2], style: &Style) {
         let at = (to.0 + out * (to.0 - from.0), to.1 + out * (to.1 - from.1));
         let longest_m = (0..3).map(|k| box_m[1][k] - box_m[0][k]).fold(0.0, f64::max);
         svg.text(at.0, at.1 + look.middle_px(), &format!("{name} ({})", unit(longest_m).0), &look);
-        names.push(at);
+        taken.push((at, 2.5 * style.font_px));
     }
-    // A number that would lie on the name of an axis is left out.
-    let room_px = 2.5 * style.font_px;
-    let is_free = |(x, y): (f64, f64)| names.iter().all(|n| hypot(n.0 - x, n.1 - y) > room_px);
-    (0..3).for_each(|k| draw_numbers(svg, canvas, (box_m, k), style, &is_free));
+    (0..3).for_each(|k| draw_numbers(svg, canvas, (box_m, k), style, &mut taken));
 }
 
-/// Writes numbers along the edge `k` of the box, on the side where nothing is, as far as there is room.
+/// Writes numbers along the edge `k` of the box, on the side where nothing is. Those that would lie on what is
+/// `taken` already, in pixels, are left out.
 fn draw_numbers(
     svg: &mut Svg,
     canvas: &Canvas,
     (box_m, k): ([Place; 2], usize),
     style: &Style,
-    is_free: &dyn Fn((f64, f64)) -> bool,
+    taken: &mut Vec<((f64, f64), f64)>,
 ) {
     let longest_m = (0..3).map(|k| box_m[1][k] - box_m[0][k]).fold(0.0, f64::max);
     let unit_m = unit(longest_m).1;
@@ -116,9 +114,11 @@ fn draw_numbers(
     for (value, label) in &ticks.major {
         let (x, y) = at(*value);
         let (dx, dy) = (dx * style.small_px(), dy * style.small_px());
-        if !is_free((x + dx, y + dy)) {
+        let place = (x + dx, y + dy);
+        if taken.iter().any(|(by, room_px)| hypot(by.0 - place.0, by.1 - place.1) < *room_px) {
             continue;
         }
+        taken.push((place, 1.5 * style.font_px));
         svg.line((x, y), (x + 0.6 * dx, y + 0.6 * dy), format_args!(r#"stroke="{FAINT_INK}""#));
         svg.text(x + dx, y + dy + look.middle_px(), label, &look);
     }

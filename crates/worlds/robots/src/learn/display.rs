@@ -122,7 +122,7 @@ fn verdicts(fits: &[Fit]) -> Vec<String> {
         .map(|(fit, _)| {
             format!(
                 "WARNING: {}: the parts of the log differ by more than chance (p {}).\nWhat was \
-                 learned may not hold elsewhere: the robot or its place changed meanwhile,\nor \
+                 learned may not hold elsewhere: the robot or its place changed\nmeanwhile, or \
                  events depend on each other.",
                 fit.table,
                 shown_p(fit.p_value)
