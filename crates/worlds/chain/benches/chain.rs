@@ -1,7 +1,8 @@
 //! Speed of the chain world's core.
 //!
 //! `cargo bench -p sidestep-chain [-- PART ...]` with the parts `open`, `middle`, `wavefront`,
-//! `own`, `field`, `corridor`, and `corridors` for the table of all pinned corridors; CPU time. In brackets what the prototype took.
+//! `own`, `field`, `corridor`, and `corridors` for the table of all pinned corridors; CPU time. In brackets
+//! what the prototype took.
 
 use cpu_time::ProcessTime;
 use sidestep_chain::geometry::{Point, add, along, first_axis, norm, scaled, sub, unit};
@@ -113,7 +114,7 @@ fn own() {
             let [without_us, with_us] =
                 [false, true].map(|self_collision| pull_beside(n, motions, self_collision, far));
             println!(
-                "own body, {n} connectors, {}: {with_us:.1} us per motion, {:.2} times as without [3 times]",
+                "own body, {n} connectors, {}: {with_us:.1} us per motion, {:.2} times as without (bar: 3)",
                 if far { "a ball far away" } else { "alone" },
                 with_us / without_us,
             );

@@ -63,7 +63,7 @@ fn assert_all_reached<const D: usize>(links: &[usize]) {
 }
 
 #[test]
-fn arms_of_3_to_25_links_reach_all_targets_within_reach_from_straight_and_bent() {
+fn arms_of_3_to_11_links_in_the_plane_and_to_25_in_space_reach_all_targets_within_reach() {
     assert_all_reached::<2>(&[3, 7, 11]);
     assert_all_reached::<3>(&[3, 7, 11, 25]);
 }
