@@ -24,7 +24,7 @@ use std::sync::LazyLock;
 /// A reader of text or bytes, by its name. A folder of the same name in `seeds` has inputs to begin with.
 type Target = (&'static str, fn(&[u8]));
 
-const TARGETS: [Target; 27] = [
+const TARGETS: [Target; 28] = [
     ("scenario", |data| text(data, scenario)),
     ("override", |data| text(data, overridden)),
     ("script", |data| text(data, script)),
@@ -51,6 +51,7 @@ const TARGETS: [Target; 27] = [
     ("journal", |data| drop(read_journal(&file("f.jsonl", data), "0", |_: serde_json::Value| {}))),
     ("manifest", |data| drop(RunView::open(&run_folder(data)))),
     ("mcap", |data| drop(McapRun::open(&file("f.mcap", data)))),
+    ("request", |data| text(data, |t| drop(sidestep_server::decode(t)))),
     ("parquet", |data| drop(read_table(&folder_of(&file("f.parquet", data)), "f", ..))),
 ];
 

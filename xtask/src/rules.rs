@@ -17,21 +17,23 @@ use crate::source::Role;
 const KNOWN: &str = include_str!("../circles.txt");
 
 /// Folders whose code may name threads; tests may too.
-const THREADS: [&str; 3] = ["crates/kernel", "crates/session", "crates/cli"];
+const THREADS: [&str; 4] = ["crates/kernel", "crates/session", "crates/server", "crates/cli"];
 
 /// Packages that only some crates may depend on, with the folders of those crates.
-const RESERVED: [(&str, &[&str]); 4] = [
+const RESERVED: [(&str, &[&str]); 6] = [
     ("parquet", &["crates/record"]),
     ("mcap", &["crates/record", "crates/import"]),
     ("foxglove", &["crates/record"]),
     ("clap", &["crates/cli"]),
+    ("axum", &["crates/server"]),
+    ("tokio", &["crates/server", "crates/link"]),
 ];
 
 /// Folder of the crates of worlds.
 const WORLDS: &str = "crates/worlds";
 
 /// Crates that know no world, not even through another crate.
-const WITHOUT_WORLDS: [&str; 12] = [
+const WITHOUT_WORLDS: [&str; 11] = [
     "crates/document",
     "crates/kernel",
     "crates/record",
@@ -43,8 +45,10 @@ const WITHOUT_WORLDS: [&str; 12] = [
     "crates/collectives",
     "crates/map",
     "crates/link",
-    "crates/server",
 ];
+
+/// Crates that drive runs of any world: the list of worlds is handed to them, and their code names none.
+const NAMES_NO_WORLD: [&str; 2] = ["crates/session", "crates/server"];
 
 /// Kinds of dependencies that get into what is built.
 const BUILT: [&str; 2] = ["dependencies", "build-dependencies"];
@@ -134,6 +138,21 @@ fn threads(members: &[Member]) -> Vec<String> {
     wrong
 }
 
+/// Returns where code names a world, or their list, and may not.
+fn names_worlds(members: &[Member]) -> Vec<String> {
+    let list = ["sidestep", "worlds"].map(String::from);
+    let mut wrong = Vec::new();
+    for member in members.iter().filter(|m| NAMES_NO_WORLD.iter().any(|folder| is(m, folder))) {
+        for source in functions::code(member) {
+            if paths::of(&source.items).iter().any(|named| named.path.starts_with(&list)) {
+                let path = member.folder.join(&source.path);
+                wrong.push(format!("{} names a world", path.display()));
+            }
+        }
+    }
+    wrong
+}
+
 /// Returns where a file outside of its crate's folder is compiled in: a package has no such file.
 fn reaches_out(members: &[Member]) -> Vec<String> {
     let mut wrong = Vec::new();
@@ -201,6 +220,7 @@ fn the_rules_of_the_house_hold() {
         trespassers(&members),
         knows_worlds(&members),
         threads(&members),
+        names_worlds(&members),
         reaches_out(&members),
         differing(&circles::listed(&members), KNOWN),
     ]
@@ -257,6 +277,18 @@ mod small {
             threads(&members),
             ["crates/a/src/lib.rs names std::thread", "crates/b/src/lib.rs names std::thread"]
         );
+    }
+
+    #[test]
+    fn worlds_are_found_in_code_that_gets_them_handed_in_but_not_in_its_tests() {
+        let named = "use sidestep::worlds::WORLDS;";
+        let tests = format!("#[cfg(test)] mod tests {{ {named} }}");
+        let members = [
+            member("crates/session", "", named),
+            member("crates/server", "", &tests),
+            member("crates/cli", "", named),
+        ];
+        assert_eq!(names_worlds(&members), ["crates/session/src/lib.rs names a world"]);
     }
 
     #[test]

@@ -82,6 +82,12 @@ impl Shared<u32> {
     }
 }
 
+impl<T: Word> Clone for Shared<T> {
+    fn clone(&self) -> Self {
+        Self::new(self.get())
+    }
+}
+
 impl<T: Word> Default for Shared<T> {
     fn default() -> Self {
         Self::new(T::default())

@@ -9,7 +9,7 @@ use crate::plan::{Effort, GroupSizes, Plan};
 use crate::ports::{RecordError, Recorder, SystemClock, TableSchema};
 use crate::simulation::Simulation;
 use crate::units::Cycle;
-use crate::view::{Frame, Look, PlaceRows, Scenery};
+use crate::view::{Frame, Inspection, Look, PlaceRows, Scenery, Who};
 use crate::words::{Lines, Said};
 use crate::world::{Decides, World};
 use serde_json::Value;
@@ -251,9 +251,18 @@ impl<W: World> Simulation for Run<W> {
         self.prepare();
     }
 
+    fn watch_odometry(&mut self) {
+        self.world.watch_odometry(&mut self.books);
+        self.prepare();
+    }
+
     fn frame(&mut self, look: Look) -> Frame {
         self.gather();
         self.world.frame(&self.state, &mut self.books, self.cycle, look)
+    }
+
+    fn inspect(&self, who: Who) -> Option<Inspection> {
+        self.world.inspect(&self.state, &self.books, self.cycle, who)
     }
 
     fn place_rows(&self) -> Vec<PlaceRows> {

@@ -7,7 +7,7 @@ use crate::interrupt::Interrupt;
 use crate::plan::Plan;
 use crate::ports::{RecordError, Recorder, TableSchema};
 use crate::units::Cycle;
-use crate::view::{Frame, Look, PlaceRows, Scenery};
+use crate::view::{Frame, Inspection, Look, PlaceRows, Scenery, Who};
 use crate::words::{Lines, Said};
 use crate::world::Decides;
 use std::any::Any;
@@ -72,12 +72,20 @@ pub trait Simulation: Any + Send {
     /// The scenery: everything that stays as it is during the run.
     fn scenery(&self) -> Scenery;
 
-    /// Starts to keep events and odometry for the next [`Simulation::frame`]; no result depends on it.
+    /// Starts to keep events for the next [`Simulation::frame`]; no result depends on it.
     fn watch(&mut self);
 
+    /// Starts to keep odometry for the next [`Simulation::frame`], which takes longer than events do;
+    /// no result depends on it.
+    fn watch_odometry(&mut self);
+
     /// Returns the present frame, with the events since the last call and what wheels claim since
-    /// [`Simulation::watch`] (none without it). No result depends on it.
+    /// [`Simulation::watch_odometry`] (none without it). No result depends on it.
     fn frame(&mut self, look: Look) -> Frame;
+
+    /// Returns what a body perceives and decides in the cycle that comes next, and what will come of
+    /// it; `None` for a body that is not there or of which nothing is to tell. No result depends on it.
+    fn inspect(&self, who: Who) -> Option<Inspection>;
 
     /// The recorded tables and columns that hold the places of bodies.
     fn place_rows(&self) -> Vec<PlaceRows>;

@@ -12,7 +12,7 @@ use crate::digest::Digest;
 use crate::plan::Effort;
 use crate::ports::{Clock, RecordError, Recorder, TableSchema};
 use crate::units::{Cycle, Slot};
-use crate::view::{Frame, Look, PlaceRows, Scenery};
+use crate::view::{Frame, Inspection, Look, PlaceRows, Scenery, Who};
 use crate::words::{Lines, Said};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -151,8 +151,11 @@ pub trait World: Phases<State: Send> + Send + 'static {
     /// Starts to keep the rows that [`World::record`] hands over.
     fn begin_recording(&self, state: &mut Self::State, books: &mut Self::Books, now: Cycle);
 
-    /// Starts to keep events and odometry for frames.
+    /// Starts to keep events for frames.
     fn watch(&self, books: &mut Self::Books);
+
+    /// Starts to keep odometry for frames, in worlds with wheels that err.
+    fn watch_odometry(&self, _: &mut Self::Books) {}
 
     /// Sets up a worker's scratch for gathering rows and events, after [`World::begin_recording`]
     /// and [`World::watch`].
@@ -194,6 +197,13 @@ pub trait World: Phases<State: Send> + Send + 'static {
 
     /// Returns the present frame, with the events since the last one.
     fn frame(&self, state: &Self::State, books: &mut Self::Books, now: Cycle, look: Look) -> Frame;
+
+    /// Returns what a body perceives and decides in cycle `now`, and what will come of it if nothing
+    /// else is asked of the run; `None` for a body that is not there or of which nothing is to tell.
+    /// It works on a copy of what it needs, so that no result depends on it.
+    fn inspect(&self, _: &Self::State, _: &Self::Books, _: Cycle, _: Who) -> Option<Inspection> {
+        None
+    }
 
     /// The recorded tables and columns that hold the places of bodies.
     fn place_rows(&self, _: &Self::Books) -> Vec<PlaceRows> {

@@ -39,16 +39,16 @@ fn main() {
 
 fn schema() -> TableSchema {
     let column = |name: &str, ty| ColumnSpec::new(name, ty, "");
-    TableSchema {
-        name: "trajectories".into(),
-        columns: vec![
+    TableSchema::new(
+        "trajectories",
+        vec![
             column("cycle", ColumnType::U64),
             column("robot", ColumnType::U32),
             column("col", ColumnType::U32),
             column("row", ColumnType::U32),
             ColumnSpec::label("heading", "", ["east", "north", "west", "south"]),
         ],
-    }
+    )
 }
 
 /// A robot: column, row, heading.

@@ -261,7 +261,7 @@ pub(crate) fn check_vacant(path: &Path, existing: Existing) -> Result<(), InputE
             "resume that run, name another folder, or replace the old run (--replace)",
         ),
         (true, false, _) => {
-            let what = match crate::sweep::SweepFolder::<()>::is_at(path) {
+            let what = match path.join(manifest::OF_SWEEP).is_file() {
                 true => "the folder holds a sweep",
                 false => "the folder holds something else than a run",
             };

@@ -10,6 +10,9 @@ use sidestep_kernel::ports::RecordError;
 use crate::disk;
 use crate::format::{self, FormatVersion};
 
+/// File name of the manifest of a sweep.
+pub(crate) const OF_SWEEP: &str = "sweep.json";
+
 /// The progress of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]

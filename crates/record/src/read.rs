@@ -225,7 +225,12 @@ impl<'a> Part<'a> {
         };
         let checksums =
             schema::checksums_from_text(&text(schema::CHECKSUMS)?).map_err(|e| bad(path, e))?;
-        let schema = TableSchema { name: name.to_string(), columns };
+        let about = match schema::key_value(file.metadata(), schema::ABOUT) {
+            Some(json) => schema::about_from_json(json).map_err(|e| bad(path, e))?,
+            // Files of earlier versions tell nothing.
+            None => Vec::new(),
+        };
+        let schema = TableSchema { about, ..TableSchema::new(name, columns) };
         let part = Self { path, bytes, file, checksums, schema, origin };
         part.check_types()?;
         Ok(part)

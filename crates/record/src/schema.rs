@@ -22,6 +22,8 @@ pub(crate) const SCENARIO: &str = "sidestep.scenario";
 pub(crate) const SEED: &str = "sidestep.seed";
 /// Key of the columns: a JSON list of [`ColumnEntry`].
 pub(crate) const COLUMNS: &str = "sidestep.columns";
+/// Key of [`TableSchema::about`]: a JSON object of texts.
+pub(crate) const ABOUT: &str = "sidestep.about";
 /// Key of the row groups' checksums: a CRC-32 of each one's bytes, in hexadecimal.
 pub(crate) const CHECKSUMS: &str = "sidestep.crc32";
 /// Key of the cycle at which the next part starts; `end` in the last part of a run.
@@ -141,6 +143,7 @@ pub(crate) fn key_values(schema: &TableSchema, origin: &Origin) -> Vec<KeyValue>
         pair(SCENARIO, origin.scenario.clone()),
         pair(SEED, origin.seed.to_string()),
         pair(COLUMNS, columns_to_json(&schema.columns)),
+        pair(ABOUT, about_to_json(&schema.about)),
     ]
 }
 
@@ -178,6 +181,21 @@ pub(crate) fn columns_from_json(text: &str) -> serde_json::Result<Vec<ColumnSpec
     Ok(entries.into_iter().map(spec).collect())
 }
 
+fn about_to_json(about: &[(String, String)]) -> String {
+    let facts = about.iter().map(|(name, fact)| (name.clone(), fact.as_str().into()));
+    serde_json::Value::Object(facts.collect()).to_string()
+}
+
+/// Reads the facts that [`key_values`] wrote.
+///
+/// # Errors
+/// Text that is not an object of texts.
+pub(crate) fn about_from_json(text: &str) -> serde_json::Result<Vec<(String, String)>> {
+    let facts: serde_json::Map<String, serde_json::Value> = serde_json::from_str(text)?;
+    let fact = |(name, value)| Ok((name, serde_json::from_value(value)?));
+    facts.into_iter().map(fact).collect()
+}
+
 /// Returns the value of [`CHECKSUMS`].
 pub(crate) fn checksums_to_text(checksums: &[u32]) -> String {
     checksums.iter().map(|c| format!("{c:08x}")).collect::<Vec<_>>().join(" ")
@@ -202,6 +220,15 @@ mod tests {
             let text = columns_to_json(&schema.columns);
             assert_eq!(columns_from_json(&text).unwrap(), schema.columns);
         }
+    }
+
+    #[test]
+    fn facts_about_a_table_survive_their_json_in_their_order() {
+        let fact = |name: &str, fact: &str| (name.to_string(), fact.to_string());
+        for about in [vec![], vec![fact("box_m", "0.25"), fact("a", "\"ü\"")]] {
+            assert_eq!(about_from_json(&about_to_json(&about)).unwrap(), about);
+        }
+        assert!(about_from_json("{\"a\": 1}").is_err());
     }
 
     #[test]

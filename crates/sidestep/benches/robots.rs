@@ -1,17 +1,20 @@
 //! Speed of the robots world: robot-cycles per CPU second, speed-up, and related numbers.
 //!
-//! `cargo bench -p sidestep [-- PART ...]` with the parts `rates`, `teams`, `corridor`, `loop` and
-//! `recording`; every number is a ratio or a rate taken in one run, because the machine may be
+//! `cargo bench -p sidestep [-- PART ...]` with the parts `rates`, `teams`, `corridor`, `loop`,
+//! `recording` and `looking`; every number is a ratio or a rate taken in one run, because the machine may be
 //! noisy. Sensors and effectors are both unreliable.
 
 use cpu_time::ProcessTime;
 use sidestep::scenario::Source;
+use sidestep::worlds::WORLDS;
 use sidestep::worlds::robots::heap_bytes;
 use sidestep::worlds::robots::{RobotsRun, RobotsWorld, robots_run};
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::ports::{Recorder, SystemClock};
+use sidestep_kernel::view::{Kind, Look};
 use sidestep_kernel::{Phases, Simulation, Turn};
 use sidestep_record::{Origin, ParquetRecorder};
+use std::hint::black_box;
 use std::time::Instant;
 
 /// One case: bodies in a walled hall, 5 % of which they cover.
@@ -246,6 +249,57 @@ fn recording() {
     );
 }
 
+/// Prints what a frame and an inspection of 10,000 robots cost, in CPU time: the best of several; and
+/// inspections in other worlds.
+fn looking() {
+    let case =
+        Case { name: "10000-1x1-8x8", robots: 10_000, size: 1, ray_boxes: Some(8), promised: 0.0 };
+    let mut run = case.simulation(1);
+    run.watch();
+    let best_ms = |n: u32, mut work: Box<dyn FnMut(u32) + '_>| {
+        let once = |k: u32| {
+            let started = ProcessTime::now();
+            work(k);
+            1e3 * started.elapsed().as_secs_f64()
+        };
+        (0..n).map(once).fold(f64::INFINITY, f64::min)
+    };
+    advance(&mut run, 20);
+    let frame_ms = best_ms(40, Box::new(|_| drop(black_box(run.frame(Look::BODIES)))));
+    let asked = |k: u32| (Kind::Robot, 97 * k, None);
+    let inspect_ms = best_ms(20, Box::new(|k| drop(black_box(run.inspect(asked(k))))));
+    println!("{}: a frame in {frame_ms:.2} ms, an inspection in {inspect_ms:.1} ms", case.name);
+    let traffic = |kind: &str, n: u32, more: &str| {
+        format!(
+            "format = 1\nworld = \"airspace\"\n[airspace.generator]\nkind = \"{kind}\"\nn = {n}\n{more}\n"
+        )
+    };
+    let chains = WORLDS.named("chain").map_or("", |kind| kind.default_scenario());
+    inspections("20 airplanes in one conflict", traffic("superconflict", 20, ""));
+    inspections("5000 airplanes", traffic("random", 5000, "radius_m = 400000"));
+    inspections("the chains of the default scenario", chains.into());
+}
+
+/// Prints what inspections of some bodies of a scenario cost, in CPU time.
+fn inspections(what: &str, text: String) {
+    let source = Source::new(what, text, "");
+    let compiled = WORLDS.compile(&source).expect("a valid scenario");
+    let mut run = compiled.start(&source, 1);
+    run.advance(25);
+    let bodies = run.frame(Look::BODIES).bodies;
+    let agents: Vec<_> = bodies.iter().filter(|body| body.kind.is_agent()).collect();
+    let every = agents.len().div_ceil(20);
+    let mut took_ms: Vec<f64> = Vec::new();
+    for body in agents.iter().step_by(every) {
+        let started = ProcessTime::now();
+        black_box(run.inspect(body.who()));
+        took_ms.push(1e3 * started.elapsed().as_secs_f64());
+    }
+    took_ms.sort_by(f64::total_cmp);
+    let (middle, longest) = (took_ms[took_ms.len() / 2], took_ms[took_ms.len() - 1]);
+    println!("{what}: an inspection in {middle:.1} ms, at most {longest:.1} ms");
+}
+
 fn size_of_folder(folder: &std::path::Path) -> u64 {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     entries
@@ -261,12 +315,13 @@ fn size_of_folder(folder: &std::path::Path) -> u64 {
 
 fn main() {
     let asked: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
-    let parts: [(&str, fn()); 5] = [
+    let parts: [(&str, fn()); 6] = [
         ("rates", rates),
         ("teams", teams),
         ("corridor", corridor),
         ("loop", plain_loop),
         ("recording", recording),
+        ("looking", looking),
     ];
     for (name, part) in parts {
         if asked.is_empty() || asked.iter().any(|a| a == name) {

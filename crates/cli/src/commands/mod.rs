@@ -19,6 +19,7 @@ mod report;
 mod reproduce;
 mod resume;
 mod run;
+mod studio;
 mod sweep;
 
 use crate::console::Console;
@@ -28,7 +29,7 @@ use clap::Subcommand;
 /// The commands by what people do with them, in the order in which they meet them.
 pub(crate) const GROUPS: &[(&str, &[&str])] = &[
     ("Prepare", &["new", "check", "map", "learn"]),
-    ("Run and look at it", &["run", "resume", "replay", "report", "export"]),
+    ("Run and look at it", &["run", "studio", "resume", "replay", "report", "export"]),
     ("Study", &["sweep", "compare", "exact", "reproduce"]),
     ("Robot arms", &["fk", "ik"]),
     ("This command", &["completions", "man"]),
@@ -39,6 +40,8 @@ pub(crate) const GROUPS: &[(&str, &[&str])] = &[
 pub(crate) enum Command {
     /// Run a scenario; record it with --out
     Run(run::RunArgs),
+    /// Watch, steer and replay runs in the browser
+    Studio(studio::StudioArgs),
     /// Validate a scenario and describe it, without running it
     Check(check::CheckArgs),
     /// Create a commented scenario as a starting point
@@ -80,6 +83,7 @@ pub(crate) enum Command {
 pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, Failure> {
     match command {
         Command::Run(args) => run::run(&args, *console),
+        Command::Studio(args) => studio::studio(&args, *console),
         Command::Check(args) => check::check(&args, *console),
         Command::New(args) => new::new(&args, *console),
         Command::Map(args) => map::map(&args, *console),

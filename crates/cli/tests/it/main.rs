@@ -25,6 +25,7 @@ mod report;
 mod reproduce;
 mod slurm;
 mod stops;
+mod studio;
 mod study;
 mod support;
 mod sweep;

@@ -30,7 +30,9 @@ pub fn describe(scenery: &Scenery, frame: &Frame, trails: &[Trail]) -> String {
         0 => format!("{} {plural} before cycle {to}.", grouped(all as Cycle)),
         1 if all == 1 => format!("Track of one {plural}, cycles {from} to {to}."),
         n if n == all => format!("Tracks of all {n} {plural}, cycles {from} to {to}."),
-        n => format!("Tracks of {n} of {all} {plural} (the others black), cycles {from} to {to}."),
+        n => format!(
+            "Tracks of {n} of {all} {plural} (the others without color), cycles {from} to {to}."
+        ),
     }
 }
 

@@ -34,12 +34,8 @@ pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect
         let mark_px = (0.56 * radius_px).clamp(3.0, 6.0);
         // If the body itself is drawn there, it needs no mark.
         if contains(room, start) {
-            start_mark(
-                svg,
-                start,
-                if trail.width_m.is_some() { mark_px } else { LINE_START_PX },
-                &color,
-            );
+            let start_px = if trail.width_m.is_some() { mark_px } else { LINE_START_PX };
+            start_mark(svg, start, start_px, &color);
         }
         if trail.width_m.is_none() {
             draw_direction(svg, trail, canvas, &color);
@@ -57,16 +53,19 @@ pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect
     if wanted.len() > MOST_LABELS {
         return;
     }
-    let matters = |body: &&Body| {
-        body.kind.is_agent() || matches!(body.kind, Kind::Person | Kind::Start | Kind::Goal)
-    };
-    let others = scene.scenery.bodies.iter().chain(&scene.frame.bodies).filter(matters);
-    taken.extend(
-        others.map(|body| around(canvas.at(body.pose.at_m), radius_m(body) * canvas.px_per_m)),
-    );
+    taken.extend(bodies_to_spare(scene, canvas));
     for (at, clear_px, words) in wanted {
         write(svg, (at, clear_px), &words, room, &mut taken, style);
     }
+}
+
+/// Returns the rooms of bodies that no name may cover.
+fn bodies_to_spare(scene: &Scene<'_>, canvas: &Canvas) -> impl Iterator<Item = Rect> {
+    let matters = |body: &&Body| {
+        body.kind.is_agent() || matches!(body.kind, Kind::Person | Kind::Start | Kind::Goal)
+    };
+    let bodies = scene.scenery.bodies.iter().chain(&scene.frame.bodies).filter(matters);
+    bodies.map(|body| around(canvas.at(body.pose.at_m), radius_m(body) * canvas.px_per_m))
 }
 
 /// Draws an arrowhead in the middle of a line, which tells where it goes.

@@ -5,7 +5,7 @@
 //! slow (the run waits) but never changes the run, and a recording that it has not finished is
 //! never taken for complete.
 
-use super::table::{ColumnSpec, ColumnType, TableSchema, Values};
+use super::table::{Cells, ColumnSpec, ColumnType, TableSchema, Values};
 use std::fmt;
 
 /// Recording failed: a full disk, a file that cannot be created.
@@ -117,12 +117,20 @@ pub fn check_block(schema: &TableSchema, block: &[Values]) -> Result<(), RecordE
         }
         // The maximum, not the first wrong one, because this runs for every row of a recorded run.
         if let Values::Label(indices) = values
-            && let Some(bad) = indices.iter().max().filter(|&&i| i as usize >= spec.labels.len())
+            && let Some(bad) = largest(indices).filter(|&&i| i as usize >= spec.labels.len())
         {
             return wrong(format!("column `{}` has no label {bad}", spec.name));
         }
     }
     Ok(())
+}
+
+/// Returns the largest of the values that there are.
+fn largest(indices: &Cells<u32>) -> Option<&u32> {
+    match indices.valid() {
+        None => indices.iter().max(),
+        Some(_) => indices.options().flatten().max(),
+    }
 }
 
 impl Recorder for MemoryRecorder {
@@ -148,18 +156,15 @@ pub fn conformance_schemas() -> Vec<TableSchema> {
     let event = ColumnSpec::label("event", "test column event", ["contact", "trip"]);
     let note = ColumnSpec { is_nullable: true, ..column("note", ColumnType::Text) };
     vec![
-        TableSchema {
-            name: "first".into(),
-            columns: vec![
+        TableSchema::new(
+            "first",
+            vec![
                 column("cycle", ColumnType::U64),
                 column("entity", ColumnType::U32),
                 column("x_m", ColumnType::F64),
             ],
-        },
-        TableSchema {
-            name: "second".into(),
-            columns: vec![column("delta", ColumnType::I32), event, note],
-        },
+        ),
+        TableSchema::new("second", vec![column("delta", ColumnType::I32), event, note]),
     ]
 }
 
@@ -232,6 +237,15 @@ fn refuses_what_does_not_fit(recorder: &mut impl Recorder) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_missing_label_needs_no_name() {
+        let label = ColumnSpec::label("callsign", "", Vec::<String>::new());
+        let schema = TableSchema::new("t", vec![ColumnSpec { is_nullable: true, ..label }]);
+        let block = |label| [Values::Label([None, label].into_iter().collect())];
+        check_block(&schema, &block(None)).expect("no label is named");
+        assert!(check_block(&schema, &block(Some(0))).is_err());
+    }
 
     #[test]
     fn the_memory_recorder_conforms() {

@@ -7,6 +7,14 @@ use std::fmt;
 /// Which body: its kind, its number, and its part of things that have parts.
 pub type Who = (Kind, u32, Option<u32>);
 
+/// Returns the name of a body, which it keeps during the run, such as `robot/3` or `connector/0/7`.
+pub fn name_of((kind, number, part): Who) -> String {
+    match part {
+        Some(part) => format!("{kind}/{number}/{part}"),
+        None => format!("{kind}/{number}"),
+    }
+}
+
 /// Something that can be seen.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Body {
@@ -70,10 +78,7 @@ impl Body {
 
     /// Returns a name that it keeps during the run, such as `robot/3` or `connector/0/7`.
     pub fn name(&self) -> String {
-        match self.part {
-            Some(part) => format!("{}/{}/{part}", self.kind, self.number),
-            None => format!("{}/{}", self.kind, self.number),
-        }
+        name_of(self.who())
     }
 }
 
@@ -104,6 +109,25 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// All kinds.
+    pub const ALL: [Self; 10] = [
+        Self::Robot,
+        Self::Person,
+        Self::Door,
+        Self::Connector,
+        Self::Rods,
+        Self::Airplane,
+        Self::Zone,
+        Self::Obstacle,
+        Self::Goal,
+        Self::Start,
+    ];
+
+    /// Returns the kind with a name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
     /// Its name in files.
     pub fn name(self) -> &'static str {
         match self {

@@ -1,7 +1,10 @@
 //! The events of a run, for viewers.
 
+use super::body::{Who, name_of};
+use super::pose::Place;
 use crate::units::Cycle;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// An event.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -10,10 +13,132 @@ pub struct Entry {
     pub cycle: Cycle,
     /// Its severity.
     pub level: Level,
-    /// The name of the body it happened to.
-    pub who: String,
+    /// Its kind.
+    pub kind: Happening,
+    /// The body it happened to.
+    pub who: Who,
+    /// The other body concerned, where there is one and the world knows which.
+    pub with: Option<Who>,
+    /// The place, in meters.
+    pub at_m: Option<Place>,
+    /// The measure of it, where it has one.
+    pub value: Option<Amount>,
     /// The event in words.
     pub words: String,
+}
+
+impl Entry {
+    /// Returns the name of the body it happened to.
+    pub fn name(&self) -> String {
+        name_of(self.who)
+    }
+}
+
+/// A number with its unit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Amount {
+    /// The number.
+    pub value: f64,
+    /// Its unit; empty for plain numbers.
+    pub unit: Cow<'static, str>,
+}
+
+impl Amount {
+    /// Creates an amount.
+    pub fn new(value: f64, unit: &'static str) -> Self {
+        Self { value, unit: Cow::Borrowed(unit) }
+    }
+}
+
+/// Declares the kinds of events with their names in files.
+macro_rules! happenings {
+    ($($(#[$doc:meta])* $kind:ident = $name:literal,)*) => {
+        /// The kinds of events of all worlds.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+        #[serde(rename_all = "kebab-case")]
+        pub enum Happening {
+            $($(#[$doc])* $kind,)*
+        }
+
+        impl Happening {
+            /// All kinds.
+            pub const ALL: &[Self] = &[$(Self::$kind),*];
+
+            /// Returns its name in files.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$kind => $name,)*
+                }
+            }
+        }
+    };
+}
+
+happenings! {
+    /// Two bodies, or a body and a wall, touch.
+    Contact = "contact",
+    /// A door has opened.
+    DoorOpened = "door-opened",
+    /// A door has closed.
+    DoorClosed = "door-closed",
+    /// Two bodies are nearer to each other than they may be; the value is their distance.
+    LossOfSeparation = "loss-of-separation",
+    /// A body has finished its way; the value is its delay.
+    Arrival = "arrival",
+    /// The shield has changed a wish; the value is the number of the wish that is followed instead.
+    Override = "override",
+    /// The shield keeps a body on its stored orbit.
+    Orbit = "orbit",
+    /// A body has not heard another one in spite of asking.
+    Unheard = "unheard",
+    /// Time was up before a body had decided.
+    Deadline = "deadline",
+    /// A body stays as it is because not all others have agreed to its wish.
+    HeldBack = "held-back",
+    /// A group is too large to decide together; the value is the number of its bodies.
+    GroupTooLarge = "group-too-large",
+    /// The errors of a body exceed the bounds that were allowed for; the value is how many times.
+    BeyondBound = "beyond-bound",
+    /// A body can be reached by one that minds nobody; the value is their distance.
+    Intruder = "intruder",
+    /// A part has objected to a motion; the value is how far it could have gone.
+    Veto = "veto",
+    /// A part is inside something; the value is the depth.
+    Penetration = "penetration",
+    /// A body is clear of everything again.
+    Clear = "clear",
+    /// A part got out of the way of something; the value is the number of motions that it took.
+    Escape = "escape",
+    /// A bumper touches something; the value is the way between the robot and its place.
+    Bumper = "bumper",
+    /// A leader goes on in another direction after a veto; the value is the turn.
+    Sideways = "sideways",
+    /// The other end has taken over, to pull a chain back.
+    PulledBack = "pulled-back",
+    /// Nothing helps: the leader cannot go on.
+    Stuck = "stuck",
+    /// A part has broken down, or has got other abilities.
+    Changed = "changed",
+    /// Parts were scattered; the value is their number.
+    Broken = "broken",
+    /// Scattered parts start to be joined again; the value is the number of passes that it takes.
+    Reforming = "reforming",
+    /// Scattered parts are joined again.
+    Reformed = "reformed",
+    /// A gap is longer than the parts that shall close it; the value is the missing length.
+    GapTooLong = "gap-too-long",
+    /// No places were found where scattered parts are joined; the value is the error that is left.
+    NotReformed = "not-reformed",
+    /// A target has been reached; the value is its number.
+    Target = "target",
+    /// A task is done; the value is its number.
+    Done = "done",
+    /// A task was given up; the value is its number.
+    GivenUp = "given-up",
+    /// A way to a target was found; the value is the number of its pieces.
+    Planned = "planned",
+    /// No way to a target was found; the value is its number.
+    NotPlanned = "not-planned",
 }
 
 /// The severity of an event.
@@ -67,6 +192,14 @@ impl<E> Log<E> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn kinds_of_events_have_one_name_each_and_the_same_in_all_files() {
+        for kind in Happening::ALL {
+            assert_eq!(serde_json::to_value(kind).unwrap(), kind.name());
+            assert_eq!(Happening::ALL.iter().filter(|k| k.name() == kind.name()).count(), 1);
+        }
+    }
 
     #[test]
     fn a_log_keeps_nothing_unless_somebody_watches_and_counts_what_is_too_much() {

@@ -6,14 +6,16 @@
 
 mod appearance;
 mod body;
+mod inspect;
 mod log;
 mod pose;
 mod trails;
 
 pub use appearance::{ALERT, Appearance, COLORS, Color, DOOR, MOBILE, UNKNOWN, WALL, color_of};
-pub use body::{Body, Condition, Kind, Shape, Who};
-pub use log::{Entry, Level, Log};
-pub use pose::{Place, Plane, Pose};
+pub use body::{Body, Condition, Kind, Shape, Who, name_of};
+pub use inspect::{Fact, Inspection, Mark, MarkShape, Role, Section, Table, Value};
+pub use log::{Amount, Entry, Happening, Level, Log};
+pub use pose::{Place, Plane, Pose, TurnedPlane};
 pub use trails::{Axis, PlaceRows, Trail, corner};
 
 use crate::units::Cycle;
@@ -93,15 +95,35 @@ pub struct Frame {
 }
 
 /// The options of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Look {
-    /// The maximum number of bodies with scans; reading sensors costs as much as simulating them.
-    pub scanning_bodies: usize,
+    /// The bodies whose scans are wanted; reading sensors costs as much as simulating them.
+    pub scans: Scans,
 }
 
 impl Look {
     /// A frame with bodies and events, without scans.
-    pub const BODIES: Self = Self { scanning_bodies: 0 };
+    pub const BODIES: Self = Self::first(0);
+
+    /// Returns a frame with the scans of the first bodies that have sensors.
+    pub const fn first(bodies: usize) -> Self {
+        Self { scans: Scans::First(bodies) }
+    }
+
+    /// Returns a frame with the scans of these bodies, as far as they have sensors.
+    pub fn of(bodies: Vec<Who>) -> Self {
+        Self { scans: Scans::Of(bodies) }
+    }
+}
+
+/// The bodies whose scans a frame holds.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scans {
+    /// This number of bodies, the first ones that have sensors.
+    First(usize),
+    /// These, in this order; those without sensors are left out.
+    Of(Vec<Who>),
 }
 
 /// Largest difference in rad between steps of beams that count as evenly spaced.
@@ -122,6 +144,9 @@ pub struct Scan {
     pub bearings_rad: Vec<f64>,
     /// Range of each beam in meters, from the pose; infinite where there is nothing in range.
     pub ranges_m: Vec<f64>,
+    /// Range of each beam if it erred in nothing; empty where the world does not tell.
+    #[serde(default)]
+    pub true_m: Vec<f64>,
     /// The maximum range, in meters.
     pub range_m: f64,
 }
@@ -129,12 +154,7 @@ pub struct Scan {
 impl Scan {
     /// Returns the name of the body with the sensor, followed by the sensor's.
     pub fn name(&self) -> String {
-        let (kind, number, part) = self.of;
-        let of = match part {
-            Some(part) => format!("{kind}/{number}/{part}"),
-            None => format!("{kind}/{number}"),
-        };
-        format!("{of}/{}", self.sensor)
+        format!("{}/{}", name_of(self.of), self.sensor)
     }
 
     /// Returns the first and last bearing, and ranges at equal steps between them. Beams that are not
@@ -177,6 +197,7 @@ mod tests {
             pose: Pose::at([0.0; 3]),
             bearings_rad: bearings_rad.to_vec(),
             ranges_m: ranges_m.to_vec(),
+            true_m: Vec::new(),
             range_m: 9.0,
         }
     }

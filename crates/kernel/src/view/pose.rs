@@ -17,9 +17,14 @@ pub struct Plane {
 
 impl Plane {
     /// Returns the place in the world of a point of the plane, in meters.
-    pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let (s, c) = (crate::math::sin(self.yaw_rad), crate::math::cos(self.yaw_rad));
-        [self.origin_m[0] + (c * x - s * y), self.origin_m[1] + (s * x + c * y)]
+    pub fn place(&self, point: [f64; 2]) -> [f64; 2] {
+        self.turned().place(point)
+    }
+
+    /// Returns the plane with its sine and cosine, for many points.
+    pub fn turned(&self) -> TurnedPlane {
+        let (sine, cosine) = (crate::math::sin(self.yaw_rad), crate::math::cos(self.yaw_rad));
+        TurnedPlane { origin_m: self.origin_m, sine, cosine }
     }
 
     /// Returns the point of the plane that is at a place in the world, in meters.
@@ -27,6 +32,23 @@ impl Plane {
         let (s, c) = (crate::math::sin(self.yaw_rad), crate::math::cos(self.yaw_rad));
         let [x, y] = [at_m[0] - self.origin_m[0], at_m[1] - self.origin_m[1]];
         [c * x + s * y, c * y - s * x]
+    }
+}
+
+/// A [`Plane`] with the sine and cosine of its turn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TurnedPlane {
+    origin_m: [f64; 2],
+    sine: f64,
+    cosine: f64,
+}
+
+impl TurnedPlane {
+    /// Returns the place in the world of a point of the plane, in meters.
+    #[inline]
+    pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let (s, c) = (self.sine, self.cosine);
+        [self.origin_m[0] + (c * x - s * y), self.origin_m[1] + (s * x + c * y)]
     }
 }
 

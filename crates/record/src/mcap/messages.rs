@@ -253,8 +253,8 @@ pub(super) fn log(frame: &Frame, cycle_s: f64) -> Vec<Log> {
         ..Log::default()
     };
     let told = frame.log.iter().map(|e| {
-        let words = format!("{} {}", e.who, e.words);
-        entry(e.cycle as f64 * cycle_s, e.level, e.who.clone(), words)
+        let (name, words) = (e.name(), format!("{} {}", e.name(), e.words));
+        entry(e.cycle as f64 * cycle_s, e.level, name, words)
     });
     let more = (frame.log_left_out > 0).then(|| {
         let words = format!("{} more events are not told", frame.log_left_out);

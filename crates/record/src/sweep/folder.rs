@@ -12,12 +12,10 @@ use super::journal::{Journal, read_journal};
 use crate::disk;
 use crate::folder::check_vacant;
 use crate::format::{self, FormatVersion};
-use crate::manifest::{self, json};
+use crate::manifest::{self, OF_SWEEP as MANIFEST, json};
 use crate::staging::Staging;
 use crate::whole::{self, WholeTable};
 
-/// File name of the manifest.
-pub(crate) const MANIFEST: &str = "sweep.json";
 const CELLS: &str = "cells.parquet";
 const RESULTS: &str = "results.parquet";
 const TIMINGS: &str = "timings.parquet";

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use sidestep_kernel::view::{
-    Body, Condition, Entry, Floor, Frame, Kind, Level, Occupancy, Plane, Pose, Scan, Scenery, Shape,
+    Body, Condition, Entry, Floor, Frame, Happening, Kind, Level, Occupancy, Plane, Pose, Scan,
+    Scenery, Shape,
 };
 use sidestep_record::{Existing, McapEnd, McapOrigin, McapRecorder, McapRun, Status, is_mcap};
 
@@ -60,12 +61,17 @@ fn frame(cycle: u64) -> Frame {
         pose: Pose::at(at_m),
         bearings_rad: vec![-0.5, 0.0, 0.5],
         ranges_m: vec![1.0, f64::INFINITY, 2.0],
+        true_m: Vec::new(),
         range_m: 3.0,
     };
     let entry = |cycle| Entry {
         cycle,
         level: Level::Warning,
-        who: "robot/0".into(),
+        kind: Happening::Contact,
+        who: (Kind::Robot, 0, None),
+        with: None,
+        at_m: None,
+        value: None,
         words: "touches a wall".into(),
     };
     let log = cycle.checked_sub(1).map(entry).into_iter().collect();

@@ -13,16 +13,16 @@ pub(crate) fn column(name: &str, ty: ColumnType, labels: &[&str]) -> ColumnSpec 
 
 /// Where two robots are in every cycle.
 pub(crate) fn trajectories() -> TableSchema {
-    TableSchema {
-        name: "trajectories".into(),
-        columns: vec![
+    TableSchema::new(
+        "trajectories",
+        vec![
             column("cycle", ColumnType::U64, &[]),
             column("robot", ColumnType::U32, &[]),
             column("col", ColumnType::I32, &[]),
             column("x_m", ColumnType::F64, &[]),
             column("heading", ColumnType::Label, &["east", "north", "west", "south"]),
         ],
-    }
+    )
 }
 
 /// The rows of the cycles from `from` to before `to`, robot after robot.

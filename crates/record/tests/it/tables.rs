@@ -63,10 +63,7 @@ fn rows_are_chosen_by_cycle_across_parts_and_row_groups() {
 #[test]
 fn a_range_of_cycles_of_a_table_without_cycles_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let schema = TableSchema {
-        name: "robots".into(),
-        columns: vec![column("size_m", ColumnType::F64, &[])],
-    };
+    let schema = TableSchema::new("robots", vec![column("size_m", ColumnType::F64, &[])]);
     let mut recorder = ParquetRecorder::create(folder.path(), &[schema], &origin()).unwrap();
     recorder.append(0, &[Values::F64(vec![f64::NAN, 0.5].into())]).unwrap();
     recorder.finish().unwrap();
@@ -215,15 +212,12 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
     fn any_values_in_any_blocks_come_back(blocks in blocks()) {
-        let schema = TableSchema {
-            name: "t".into(),
-            columns: vec![
+        let schema = TableSchema::new("t", vec![
                 column("count", ColumnType::U64, &[]),
                 column("id", ColumnType::U32, &[]),
                 column("delta", ColumnType::I32, &[]),
                 column("event", ColumnType::Label, &["a", "b", "", "ü", "e e"]),
-            ],
-        };
+            ]);
         let folder = tempfile::tempdir().unwrap();
         let mut recorder = ParquetRecorder::create(folder.path(), &[schema], &origin()).unwrap();
         for block in &blocks {
@@ -253,7 +247,7 @@ fn every_type(rows: u64, missing: u64) -> (TableSchema, Vec<Values>) {
         let spec = column(values.ty().name(), values.ty(), labels);
         ColumnSpec { is_nullable: missing <= rows, ..spec }
     };
-    (TableSchema { name: "t".into(), columns: blocks.iter().map(spec).collect() }, blocks)
+    (TableSchema::new("t", blocks.iter().map(spec).collect()), blocks)
 }
 
 #[test]

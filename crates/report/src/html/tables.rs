@@ -102,28 +102,11 @@ pub(super) fn claims(claims: &[Claim]) -> Markup {
         th scope="col" .ours { "our figures" }
         th scope="col" .why { "why" }
     };
-    let rows = html! {
-        @for claim in claims {
-            tr id={ "claim-" (claim.id.replace([' ', ','], "")) } {
-                th scope="row" { (claim.id) }
-                td { (badge(claim.verdict)) }
-                td { (text(&Text::marked(claim.paper))) }
-                @if has_figure {
-                    @match claim.papers_figure {
-                        Some(figure) => td { (figure) },
-                        None => td .none { "none" },
-                    }
-                }
-                td { (text(&Text::marked(&claim.ours))) }
-                td .why { (text(&Text::marked(&claim.reason))) }
-            }
-        }
-    };
     let table = html! {
         table .claims .sortable {
             caption { "Claims of the paper, and what came of them" }
             thead { tr { (heads) } }
-            tbody { (rows) }
+            tbody { @for claim in claims { (claim_row(claim, has_figure)) } }
         }
     };
     html! {
@@ -134,6 +117,24 @@ pub(super) fn claims(claims: &[Claim]) -> Markup {
         }
         (wide("Claims", table))
         p .note { (text(&Text::marked(claim::NOTE))) }
+    }
+}
+
+fn claim_row(claim: &Claim, has_figure: bool) -> Markup {
+    html! {
+        tr id={ "claim-" (claim.id.replace([' ', ','], "")) } {
+            th scope="row" { (claim.id) }
+            td { (badge(claim.verdict)) }
+            td { (text(&Text::marked(claim.paper))) }
+            @if has_figure {
+                @match claim.papers_figure {
+                    Some(figure) => td { (figure) },
+                    None => td .none { "none" },
+                }
+            }
+            td { (text(&Text::marked(&claim.ours))) }
+            td .why { (text(&Text::marked(&claim.reason))) }
+        }
     }
 }
 

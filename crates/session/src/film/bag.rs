@@ -43,7 +43,7 @@ impl BagFilm {
                 std::fs::write(&path, bytes).map_err(|e| Error::write(&path, &e))?;
             }
         }
-        run.watch();
+        run.watch_odometry();
         Ok(Self { writer: BagWriter::create(folder, VERSION)?, every, before: None })
     }
 

@@ -139,8 +139,10 @@ fn the_same(
         check_build(&folder)?;
         return Ok(folder);
     }
-    let remedy = "name another folder, or go on with what is there: sidestep resume DIR";
-    Err(InputError::new(out.display(), "the folder holds another sweep", remedy).into())
+    let there = out.display();
+    let remedy =
+        format!("name another folder, or go on with what is there: sidestep resume {there}");
+    Err(InputError::new(there, "the folder holds another sweep", remedy).into())
 }
 
 /// Refuses another build: results may change between builds, so only one makes all runs.

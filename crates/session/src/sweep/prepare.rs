@@ -38,14 +38,17 @@ pub(super) fn prepare(
         wanted.seeds = compiled.seeds();
         agents = agents.max(compiled.bodies() as u64);
         if first.is_none() {
-            first = Some((compiled.world(), compiled.plan().seed));
+            first = Some((compiled.world(), compiled.plan().clone()));
             check_metrics(sweep, &source, compiled.as_ref())?;
         }
         each(k, &source, compiled.as_ref())?;
     }
-    let (world, seed) = first.expect("a design has at least one variant");
-    let base = Base { world, seed, source: &base };
-    Ok(Plan { agents, ..Plan::new(sweep, variants, base)? })
+    let (world, of_scenario) = first.expect("a design has at least one variant");
+    let base = Base { world, seed: of_scenario.seed, source: &base };
+    let plan = Plan::new(sweep, variants, base)?;
+    // A sweep without a name of its own goes by that of its scenario.
+    let name = if plan.name.is_empty() { of_scenario.name } else { plan.name };
+    Ok(Plan { agents, name, ..plan })
 }
 
 /// Checks that the requested metrics exist: it is better to know before all runs than after them.

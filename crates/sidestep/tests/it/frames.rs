@@ -10,7 +10,7 @@ use sidestep::worlds::airspace::airspace_run;
 use sidestep::worlds::chain::chain_run;
 use sidestep::worlds::robots::robots_run;
 
-const LOOK: Look = Look { scanning_bodies: usize::MAX };
+const LOOK: Look = Look::first(usize::MAX);
 
 fn traffic() -> Source {
     let text = "format = 1\nworld = \"airspace\"\nseed = 7\n[airspace]\nmethod = \"none\"\n\
@@ -32,7 +32,7 @@ fn airplanes(workers: usize) -> Box<dyn Simulation> {
     Box::new(airspace_run(&traffic(), workers).expect("a valid scenario"))
 }
 
-fn worlds(workers: usize) -> Vec<Box<dyn Simulation>> {
+pub(crate) fn worlds(workers: usize) -> Vec<Box<dyn Simulation>> {
     vec![robots(workers), chains(SEVERAL, workers), chains(SWARM, workers), airplanes(workers)]
 }
 
@@ -147,4 +147,51 @@ fn airplanes_that_are_too_near_are_marked_until_they_are_apart() {
         assert_eq!(frame.bodies.len(), 2 * zones.count(), "each airplane has its zone");
     }
     assert!(marked > 0 && losses > 0, "{marked} marked, {losses} losses");
+}
+
+#[test]
+fn a_look_names_the_bodies_whose_scans_are_wanted_and_truth_stands_beside_every_report() {
+    let mut run = robots(1);
+    run.advance(10);
+    let all = run.frame(LOOK).scans;
+    let asked = [30, 3].map(|id| (Kind::Robot, id, None));
+    let unknown = [(Kind::Robot, 9_999, None), (Kind::Door, 30, None)];
+    let some = run.frame(Look::of([&asked[..], &unknown].concat())).scans;
+    let of = |who| all.iter().filter(move |scan| scan.of == who).cloned();
+    let expected: Vec<_> = asked.into_iter().flat_map(of).collect();
+    assert!(some.len() >= 2 && some == expected);
+    let (mut beams, mut wrong) = (0, 0);
+    for scan in &all {
+        assert_eq!(scan.true_m.len(), scan.ranges_m.len());
+        beams += scan.ranges_m.len();
+        let pairs = scan.ranges_m.iter().zip(&scan.true_m);
+        wrong += pairs.filter(|(said, truth)| said.is_finite() != truth.is_finite()).count();
+    }
+    assert!(wrong > 0 && wrong < beams / 4, "{wrong} of {beams}: sensors seldom err");
+    let leader = chains(SWARM, 1).frame(Look::first(1)).scans.swap_remove(0);
+    assert_eq!(leader.true_m.len(), leader.ranges_m.len());
+    let again = chains(SWARM, 1).frame(Look::of(vec![leader.of])).scans;
+    assert_eq!(again, [leader]);
+}
+
+#[test]
+fn entries_of_the_log_say_what_happened_to_whom_with_whom_and_where() {
+    let mut met = 0;
+    for mut run in worlds(1) {
+        run.watch();
+        for _ in 0..60 {
+            run.advance(1);
+            let frame = run.frame(Look::BODIES);
+            for entry in &frame.log {
+                let here = frame.bodies.iter().find(|body| body.who() == entry.who);
+                let (Some(here), Some(at_m)) = (here, entry.at_m) else {
+                    panic!("{} is nowhere: {entry:?}", entry.name())
+                };
+                let apart_m = (here.pose.at_m[0] - at_m[0]).hypot(here.pose.at_m[1] - at_m[1]);
+                assert!(apart_m < 1.0, "{entry:?} is {apart_m} m from its body");
+                met += usize::from(entry.with.is_some());
+            }
+        }
+    }
+    assert!(met > 10, "{met}");
 }

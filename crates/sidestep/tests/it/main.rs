@@ -11,6 +11,7 @@ mod determinism;
 mod distributions;
 mod exactness;
 mod frames;
+mod inspect;
 mod laws;
 mod obstacle_rule;
 mod pomdp;

@@ -26,7 +26,13 @@ pub(super) fn act(turn: &mut Turn<'_>, group: &[Slot]) {
     flying.extend(group.iter().filter(|&&slot| state.is_there(world, slot, now)));
     flying.sort_unstable();
     if !flying.is_empty() {
+        let before = turn.scratch.events.len();
         fly(turn, &flying);
+        for event in &mut turn.scratch.events[before..] {
+            let cell = &state.airplanes[event.airplane as usize];
+            let [x_m, y_m] = cell.pose().at;
+            event.at_m = Some([x_m, y_m, cell.altitude_m.get()]);
+        }
     }
     turn.scratch.flying = flying;
 }
@@ -64,13 +70,22 @@ fn ways(turn: &mut Turn<'_>, flown: &[Slot], intruders: &[Intruder]) -> Vec<Way>
     let group: Vec<Known> = flown.iter().map(|&slot| known(world, state, now, slot)).collect();
     let began_ns = clock.thread_cpu_ns();
     let mut contacts = state.take_contacts(flown);
+    if let Some(notes) = &mut turn.scratch.notes {
+        notes.begin(&group, intruders, &contacts);
+    }
     let candidates = wanted(turn, &group, intruders, &mut contacts);
     turn.scratch.decide_ns += clock.thread_cpu_ns() - began_ns;
-    let ways = if world.shield {
+    if let Some(notes) = &mut turn.scratch.notes {
+        notes.ways = notes.own(&candidates).cloned().unwrap_or_default();
+    }
+    let ways: Vec<Way> = if world.shield {
         protect::shielded(turn, flown, candidates, intruders, &mut contacts)
     } else {
         candidates.into_iter().map(|ways| ways.into_iter().next().unwrap_or_default()).collect()
     };
     state.put_contacts(flown, contacts);
+    if let Some(notes) = &mut turn.scratch.notes {
+        notes.flown = notes.own(&ways).cloned();
+    }
     ways
 }

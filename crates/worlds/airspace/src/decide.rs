@@ -79,6 +79,9 @@ pub(super) fn wanted(
         Method::Pc => optimized(turn, group, intruders, contacts),
         _ => all_straight(world, group),
     };
+    if let Some(notes) = &mut turn.scratch.notes {
+        notes.wishes = notes.own(&wishes).cloned().unwrap_or_default();
+    }
     group.iter().zip(wishes).map(|(known, wishes)| wishes::ways(world, *known, &wishes)).collect()
 }
 
@@ -112,6 +115,9 @@ fn optimized(
         Deployment::Direct => (direct(world, group, intruders, now), Traffic::default()),
         _ => deploy::optimized(turn, group, intruders, contacts),
     };
+    if let Some(notes) = &mut turn.scratch.notes {
+        (notes.decided, notes.talk) = (notes.own(&decided).cloned().flatten(), traffic);
+    }
     let first = decided.iter().flatten().next();
     turn.scratch.optimizations.push(Optimization {
         cycle: now,
@@ -130,7 +136,7 @@ fn optimized(
 }
 
 /// Lets one process decide for all.
-fn direct(
+pub(super) fn direct(
     world: &AirspaceWorld,
     group: &[Known],
     intruders: &[Intruder],
@@ -143,6 +149,9 @@ fn direct(
         |player: usize, k: u64| purpose::sample(&world.streams, group[player].slot, now, k);
     let outcome = optimize(&game, &world.settings, uniform);
     let (rounds, converged) = (outcome.rounds, outcome.converged);
-    let each = outcome.joint.into_iter().zip(outcome.expected);
-    each.map(|(chosen, expected)| Some(Decided { chosen, expected, rounds, converged })).collect()
+    let each = outcome.joint.into_iter().zip(outcome.expected).zip(outcome.q);
+    let decided = |((chosen, expected), chances)| {
+        Some(Decided { chosen, expected, rounds, converged, chances })
+    };
+    each.map(decided).collect()
 }

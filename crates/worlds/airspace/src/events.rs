@@ -1,6 +1,7 @@
 //! The events of a run.
 
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::view::{Happening, Place};
 use sidestep_kernel::{Cycle, EntityId};
 
 /// Kinds of events.
@@ -45,9 +46,20 @@ pub(super) enum Measure {
     Number,
 }
 
+impl Measure {
+    /// Returns its unit.
+    pub(super) fn unit(self) -> &'static str {
+        match self {
+            Self::Distance => "m",
+            Self::Delay => "s",
+            Self::Number => "",
+        }
+    }
+}
+
 impl EventKind {
     /// Returns what its value measures; `None` for kinds without one.
-    fn measure(self) -> Option<Measure> {
+    pub(super) fn measure(self) -> Option<Measure> {
         match self {
             Self::LossOfSeparation | Self::Intruder => Some(Measure::Distance),
             Self::Arrival => Some(Measure::Delay),
@@ -69,6 +81,22 @@ impl EventKind {
         Self::BeyondBound,
         Self::Intruder,
     ];
+
+    /// Returns the kind that it is for viewers, which know no world.
+    pub(super) fn happening(self) -> Happening {
+        match self {
+            Self::LossOfSeparation => Happening::LossOfSeparation,
+            Self::Arrival => Happening::Arrival,
+            Self::Override => Happening::Override,
+            Self::Orbit => Happening::Orbit,
+            Self::Unheard => Happening::Unheard,
+            Self::Deadline => Happening::Deadline,
+            Self::HeldBack => Happening::HeldBack,
+            Self::GroupTooLarge => Happening::GroupTooLarge,
+            Self::BeyondBound => Happening::BeyondBound,
+            Self::Intruder => Happening::Intruder,
+        }
+    }
 
     /// Returns its name in files.
     pub fn name(self) -> &'static str {
@@ -100,6 +128,8 @@ pub struct Event {
     pub other: EntityId,
     /// See [`EventKind`]; 0 where a kind has none.
     pub value: f64,
+    /// Where the airplane is at the end of the cycle.
+    pub at_m: Option<Place>,
 }
 
 impl Event {
@@ -115,7 +145,7 @@ impl Event {
 
     /// Returns an event of one airplane.
     pub fn of(cycle: Cycle, kind: EventKind, airplane: EntityId) -> Self {
-        Self { cycle, kind, airplane, other: airplane, value: 0.0 }
+        Self { cycle, kind, airplane, other: airplane, value: 0.0, at_m: None }
     }
 
     /// Returns an event of two airplanes.

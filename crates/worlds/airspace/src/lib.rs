@@ -24,12 +24,14 @@ pub mod flight;
 mod flight_plan;
 mod foreign;
 mod generate;
+mod inspect;
 mod intruder;
 mod join;
 mod kind;
 mod meanings;
 mod memory;
 pub mod metrics;
+mod notes;
 pub mod objective;
 mod perceive;
 mod purpose;
@@ -77,6 +79,8 @@ pub struct Scratch {
     /// them.
     decide_ns: u64,
     flying: Vec<Slot>,
+    /// What is noted for somebody who asks about an airplane; nothing in a run.
+    notes: Option<Box<notes::Notes>>,
 }
 
 impl Phases for AirspaceWorld {

@@ -25,7 +25,14 @@ impl FlownLeg {
     }
 }
 
-fn trajectories() -> Table<FlownLeg> {
+fn trajectories(callsigns: &[Option<String>]) -> Table<FlownLeg> {
+    let mut names: Vec<String> = callsigns.iter().flatten().cloned().collect();
+    names.sort_unstable();
+    names.dedup();
+    let of = |callsign: &Option<String>| {
+        callsign.as_ref().and_then(|c| names.binary_search(c).ok()).map(|label| label as u32)
+    };
+    let labels: Vec<Option<u32>> = callsigns.iter().map(of).collect();
     Table::new("trajectories")
         .u64("cycle", "cycle of dt in which this leg is flown", |f: &FlownLeg| f.cycle)
         .u32("airplane", "entity id", |f| f.airplane)
@@ -40,6 +47,9 @@ fn trajectories() -> Table<FlownLeg> {
         .f64("climb_m_s", "rate of climb, constant", |f| f.leg.climb_m_s)
         .f64("drift_x_m_s", "velocity of the air east", |f| f.leg.drift_m_s[0])
         .f64("drift_y_m_s", "velocity of the air north", |f| f.leg.drift_m_s[1])
+        .label("callsign", "call sign of the airplane", names, move |f| {
+            labels.get(f.airplane as usize).copied().flatten()
+        })
 }
 
 fn events(callsigns: Vec<Option<String>>) -> Table<Event> {
@@ -91,7 +101,7 @@ impl Rows {
 
     /// Starts to keep rows.
     pub(super) fn begin(&mut self, world: &AirspaceWorld) {
-        self.flown.begin(self.record.trajectories.then(trajectories));
+        self.flown.begin(self.record.trajectories.then(|| trajectories(&callsigns(world))));
         self.events.begin(self.record.events.then(|| events(callsigns(world))));
         self.optimizations.begin(self.record.optimizations.then(optimizations));
     }

@@ -11,7 +11,7 @@ use super::{Scratch, view, words};
 use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
-use sidestep_kernel::view::{Frame, Log, Look, PlaceRows, Scenery};
+use sidestep_kernel::view::{Frame, Inspection, Log, Look, PlaceRows, Scenery, Who};
 use sidestep_kernel::words::{Lines, Said};
 use sidestep_kernel::{Cycle, Digest, Effort, EntityId, InputError, Plan, Run, World};
 use sidestep_scenario::Source;
@@ -184,6 +184,16 @@ impl World for AirspaceWorld {
             log: events.iter().map(view::entry).collect(),
             log_left_out,
         }
+    }
+
+    fn inspect(
+        &self,
+        state: &AirspaceState,
+        _: &Books,
+        now: Cycle,
+        who: Who,
+    ) -> Option<Inspection> {
+        AirspaceWorld::inspect(self, state, now, who)
     }
 
     fn place_rows(&self, _: &Books) -> Vec<PlaceRows> {

@@ -5,7 +5,7 @@ use super::flight::{Airplane, Point, distance_m};
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use sidestep_kernel::view::{
-    Axis, Body, Condition, Entry, Kind, Level, PlaceRows, Pose, Scenery, Shape,
+    Amount, Axis, Body, Condition, Entry, Kind, Level, PlaceRows, Pose, Scenery, Shape,
 };
 use sidestep_kernel::{Cycle, Slot};
 
@@ -160,5 +160,15 @@ pub(super) fn entry(event: &Event) -> Entry {
             (Level::Warning, format!("can be reached by airplane/{other}, now {value:.0} m away"))
         }
     };
-    Entry { cycle: event.cycle, level, who: format!("airplane/{}", event.airplane), words }
+    let airplane = |id| (Kind::Airplane, id, None);
+    Entry {
+        cycle: event.cycle,
+        level,
+        kind: event.kind.happening(),
+        who: airplane(event.airplane),
+        with: event.partner().map(airplane),
+        at_m: event.at_m,
+        value: event.kind.measure().map(|measure| Amount::new(value, measure.unit())),
+        words,
+    }
 }

@@ -9,13 +9,19 @@ use sidestep_kernel::{Cycle, Slot, Turn};
 
 /// Makes the claim of one chain.
 pub(crate) fn claim<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, slot: usize) {
+    claim_box(turn, slot);
+    let &mut Turn { world, state, now, .. } = turn;
+    let decision = Looking { world, state, now, scratch: turn.scratch }.decide(slot as Slot);
+    state.set_decision(slot, decision);
+}
+
+/// Claims the box that a chain may enter.
+pub(crate) fn claim_box<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, slot: usize) {
     let &mut Turn { world, state, now, .. } = turn;
     // A chain alone is in nobody's way, wherever it goes.
     if !world.is_open() {
         state.set_claim(slot, reach(world, &world.chains[slot], &state.body(slot), now));
     }
-    let decision = Looking { world, state, now, scratch: turn.scratch }.decide(slot as Slot);
-    state.set_decision(slot, decision);
 }
 
 /// Returns the box that a chain may enter during one cycle; no part of the chain leaves that box.

@@ -50,6 +50,19 @@ pub(crate) enum Driver<const D: usize> {
     Navigate(Arc<Navigator>),
 }
 
+impl<const D: usize> Driver<D> {
+    /// Returns the name of its kind in files.
+    pub(crate) fn name(&self) -> &'static str {
+        match self {
+            Self::Rest => "rest",
+            Self::Wander(_) => "wander",
+            Self::Script(_) => "script",
+            Self::Targets(_) => "targets",
+            Self::Navigate(_) => "navigate",
+        }
+    }
+}
+
 /// Wandering: ahead, with small random turns to either side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Wander<const D: usize> {

@@ -2,6 +2,7 @@
 
 use super::rods::veto::Reason;
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::view::{Happening, Place};
 use sidestep_kernel::{Cycle, EntityId};
 
 /// Kinds of events.
@@ -77,6 +78,31 @@ impl EventKind {
         Self::NotPlanned,
     ];
 
+    /// Returns the kind that it is for viewers, which know no world.
+    pub(crate) fn happening(self) -> Happening {
+        match self {
+            Self::Veto => Happening::Veto,
+            Self::Penetration => Happening::Penetration,
+            Self::Clear => Happening::Clear,
+            Self::Escape => Happening::Escape,
+            Self::Bumper => Happening::Bumper,
+            Self::Sideways => Happening::Sideways,
+            Self::PulledBack => Happening::PulledBack,
+            Self::Stuck => Happening::Stuck,
+            Self::Changed => Happening::Changed,
+            Self::Broken => Happening::Broken,
+            Self::Reforming => Happening::Reforming,
+            Self::Reformed => Happening::Reformed,
+            Self::GapTooLong => Happening::GapTooLong,
+            Self::NotReformed => Happening::NotReformed,
+            Self::Target => Happening::Target,
+            Self::Done => Happening::Done,
+            Self::GivenUp => Happening::GivenUp,
+            Self::Planned => Happening::Planned,
+            Self::NotPlanned => Happening::NotPlanned,
+        }
+    }
+
     /// Returns its name in files.
     pub fn name(self) -> &'static str {
         match self {
@@ -114,6 +140,8 @@ pub(crate) struct Event {
     pub(crate) kind: EventKind,
     /// The connector concerned.
     pub(crate) connector: u32,
+    /// The place of that connector.
+    pub(crate) at_m: Place,
     /// The reason of a veto.
     pub(crate) reason: Option<Reason>,
     /// The obstacle concerned, if any.

@@ -15,7 +15,7 @@ use super::world::ChainWorld;
 use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
-use sidestep_kernel::view::{Frame, Log, Look, PlaceRows, Scenery};
+use sidestep_kernel::view::{Frame, Inspection, Log, Look, PlaceRows, Scenery, Who};
 use sidestep_kernel::words::{Lines, Said};
 use sidestep_kernel::{Cycle, Digest, Effort, EntityId, InputError, Plan, Run, Simulation, World};
 use sidestep_scenario::Source;
@@ -186,11 +186,21 @@ impl<const D: usize> World for ChainWorld<D> {
             cycle: now,
             time_s: self.starts_s(now),
             bodies: self.visible_bodies(state, now),
-            scans: self.scans(state, now, look.scanning_bodies),
+            scans: self.scans(state, now, &look.scans),
             odometry: Vec::new(),
             log: events.iter().map(entry).collect(),
             log_left_out,
         }
+    }
+
+    fn inspect(
+        &self,
+        state: &ChainState<D>,
+        _: &Books,
+        now: Cycle,
+        who: Who,
+    ) -> Option<Inspection> {
+        ChainWorld::inspect(self, state, now, who)
     }
 
     fn place_rows(&self, books: &Books) -> Vec<PlaceRows> {

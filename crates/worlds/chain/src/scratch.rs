@@ -3,6 +3,7 @@
 use super::events::Event;
 use super::formation::Solid;
 use super::motion::escape::Escaper;
+use super::notes::Notes;
 use super::rods::geometry::{Point, in_dimensions};
 use super::rods::obstacle::{Obstacle, Obstacles};
 use super::rods::propagate::Propagator;
@@ -36,6 +37,8 @@ pub struct Scratch<const D: usize> {
     pub(crate) escaped: Vec<Point<D>>,
     /// Events of this task.
     pub(crate) events: Vec<Event>,
+    /// What is noted for somebody who asks about a chain; nothing in a run.
+    pub(crate) notes: Option<Box<Notes<D>>>,
 }
 
 impl<const D: usize> Scratch<D> {
@@ -55,6 +58,7 @@ impl<const D: usize> Scratch<D> {
             robots_gap_m: f64::INFINITY,
             escaped: Vec::new(),
             events: Vec::new(),
+            notes: None,
         }
     }
 

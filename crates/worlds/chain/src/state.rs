@@ -269,6 +269,11 @@ impl<const D: usize> ChainState<D> {
         Ok(Self::of(bodies.into_iter()))
     }
 
+    /// Returns a copy on which a cycle can be tried.
+    pub(crate) fn copied(&self) -> Self {
+        Self::of((0..self.len()).map(|slot| self.body(slot).clone()))
+    }
+
     /// Returns the number of chains.
     pub fn len(&self) -> usize {
         self.cells.len()

@@ -11,7 +11,8 @@ use super::scratch::Scratch;
 use super::state::{Body as ChainBody, ChainState};
 use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN};
 use sidestep_kernel::view::{
-    Axis, Body, Condition, Entry, Kind, Level, Place, PlaceRows, Pose, Scan, Scenery, Shape,
+    Amount, Axis, Body, Condition, Entry, Kind, Level, Place, PlaceRows, Pose, Scan, Scans,
+    Scenery, Shape, Who,
 };
 use sidestep_kernel::{Cycle, EntityId, Slot};
 use std::ops::RangeInclusive;
@@ -69,12 +70,23 @@ impl<const D: usize> ChainWorld<D> {
         bodies
     }
 
-    /// Returns the laser scans that the leaders on wheels of the first chains are about to take.
-    pub(crate) fn scans(&self, state: &ChainState<D>, now: Cycle, leaders: usize) -> Vec<Scan> {
+    /// Returns the laser scans that leaders on wheels are about to take.
+    pub(crate) fn scans(&self, state: &ChainState<D>, now: Cycle, of: &Scans) -> Vec<Scan> {
         let scratch = &mut Scratch::new(self);
+        scratch.scan.keeps_truth = true;
         let mut looking = Looking { world: self, state, now, scratch };
+        let mut scan = |slot| scan_of(&mut looking, slot);
         let slots = 0..state.len() as Slot;
-        slots.filter_map(|slot| scan_of(&mut looking, slot)).take(leaders).collect()
+        match of {
+            Scans::First(leaders) => slots.filter_map(scan).take(*leaders).collect(),
+            Scans::Of(bodies) => {
+                let asked = |&(_, slot, part): &Who| {
+                    let scan = slots.contains(&slot).then(|| scan(slot))??;
+                    (scan.of.2 == part).then_some(scan)
+                };
+                bodies.iter().filter_map(asked).collect()
+            }
+        }
     }
 }
 
@@ -85,12 +97,14 @@ fn scan_of<const D: usize>(looking: &mut Looking<'_, D>, slot: Slot) -> Option<S
     let beams = laser.readings(&looking.scratch.scan);
     let beyond = |range_m: f64| if range_m < laser.range_m() { range_m } else { f64::INFINITY };
     let (bearings_rad, ranges_m) = beams.map(|(b, range_m)| (b, beyond(range_m))).unzip();
+    let true_m = laser.truths(&looking.scratch.scan).map(beyond).collect();
     Some(Scan {
         of: (Kind::Connector, slot, Some(sight.agent as u32)),
         sensor: LASER.into(),
         pose: Pose::heading([x_m, y_m, 0.0], sight.leader.pose.heading_rad),
         bearings_rad,
         ranges_m,
+        true_m,
         range_m: laser.range_m(),
     })
 }
@@ -207,40 +221,64 @@ fn cuboid_pose<const D: usize>(cuboid: &Cuboid<D>) -> Pose {
     Pose::axes(in_dimensions(cuboid.center), [x, y, cross(x, y)])
 }
 
+/// Stands for the unit of events without a value.
+const NO_VALUE: &str = "none";
+
 /// Describes an event in words.
 pub(crate) fn entry(event: &Event) -> Entry {
+    let (level, unit, words) = told(event);
+    Entry {
+        cycle: event.cycle,
+        level,
+        kind: event.kind.happening(),
+        who: (Kind::Connector, event.chain, Some(event.connector)),
+        with: event.obstacle.map(who_of_obstacle),
+        at_m: Some(event.at_m),
+        value: (unit != NO_VALUE).then(|| Amount::new(event.value, unit)),
+        words,
+    }
+}
+
+/// Returns the severity of an event, the unit of its value, and its words.
+fn told(event: &Event) -> (Level, &'static str, String) {
     let value = event.value;
     let what = event.obstacle.map(obstacle_in_words);
     let because = what.as_ref().map_or(String::new(), |what| format!(", because of {what}"));
     let reason = event.reason.map_or("", |reason| reason.name());
-    let (level, words) = match event.kind {
-        EventKind::Veto => (Level::Warning, format!("objects: {reason}{because}")),
+    match event.kind {
+        EventKind::Veto => (Level::Warning, "m", format!("objects: {reason}{because}")),
         EventKind::Penetration => {
             let what = what.unwrap_or_else(|| "an obstacle".into());
-            (Level::Error, format!("is {value:.4} m inside {what}"))
+            (Level::Error, "m", format!("is {value:.4} m inside {what}"))
         }
-        EventKind::Clear => (Level::Info, "is clear of obstacles again".into()),
-        EventKind::Escape => (Level::Info, format!("gets out of the way{because}")),
-        EventKind::Bumper => (Level::Warning, "touches something with its bumper".into()),
-        EventKind::Sideways => (Level::Info, format!("goes on {value:.2} rad to the side")),
-        EventKind::PulledBack => (Level::Info, "is pulled back by the other end".into()),
-        EventKind::Stuck => (Level::Warning, "is stuck".into()),
-        EventKind::Changed => (Level::Info, "has changed".into()),
-        EventKind::Broken => (Level::Error, format!("breaks, {value} parts are scattered")),
-        EventKind::Reforming => (Level::Info, "sets out to be joined again".into()),
-        EventKind::Reformed => (Level::Info, "is joined again".into()),
-        EventKind::GapTooLong => (Level::Warning, gap_in_words(value, event.missing)),
+        EventKind::Clear => (Level::Info, NO_VALUE, "is clear of obstacles again".into()),
+        EventKind::Escape => (Level::Info, "", format!("gets out of the way{because}")),
+        EventKind::Bumper => (Level::Warning, "m", "touches something with its bumper".into()),
+        EventKind::Sideways => (Level::Info, "rad", format!("goes on {value:.2} rad to the side")),
+        EventKind::PulledBack => (Level::Info, NO_VALUE, "is pulled back by the other end".into()),
+        EventKind::Stuck => (Level::Warning, NO_VALUE, "is stuck".into()),
+        EventKind::Changed => (Level::Info, NO_VALUE, "has changed".into()),
+        EventKind::Broken => (Level::Error, "", format!("breaks, {value} parts are scattered")),
+        EventKind::Reforming => (Level::Info, "", "sets out to be joined again".into()),
+        EventKind::Reformed => (Level::Info, NO_VALUE, "is joined again".into()),
+        EventKind::GapTooLong => (Level::Warning, "m", gap_in_words(value, event.missing)),
         EventKind::NotReformed => {
-            (Level::Warning, format!("cannot be joined, off by {value:.3} m"))
+            (Level::Warning, "m", format!("cannot be joined, off by {value:.3} m"))
         }
-        EventKind::Target => (Level::Info, format!("has reached target {value}")),
-        EventKind::Done => (Level::Info, format!("has done task {value}")),
-        EventKind::GivenUp => (Level::Warning, format!("has given up task {value}")),
-        EventKind::Planned => (Level::Info, format!("follows a plan of {value} pieces")),
-        EventKind::NotPlanned => (Level::Warning, format!("has no plan to target {value}")),
-    };
-    let who = format!("connector/{}/{}", event.chain, event.connector);
-    Entry { cycle: event.cycle, level, who, words }
+        EventKind::Target => (Level::Info, "", format!("has reached target {value}")),
+        EventKind::Done => (Level::Info, "", format!("has done task {value}")),
+        EventKind::GivenUp => (Level::Warning, "", format!("has given up task {value}")),
+        EventKind::Planned => (Level::Info, "", format!("follows a plan of {value} pieces")),
+        EventKind::NotPlanned => (Level::Warning, "", format!("has no plan to target {value}")),
+    }
+}
+
+/// Returns which body an obstacle is: another chain stands for all of its parts.
+pub(crate) fn who_of_obstacle(id: u32) -> Who {
+    match id.checked_sub(OTHER_CHAIN) {
+        Some(chain) => (Kind::Rods, chain, None),
+        None => (Kind::Obstacle, id, None),
+    }
 }
 
 fn gap_in_words(wanting_m: f64, missing: u32) -> String {

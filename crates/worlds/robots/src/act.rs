@@ -14,8 +14,19 @@ use sidestep_kernel::space::BoxWord;
 pub(super) struct Verdict {
     /// Number of steps that are made.
     pub(super) steps: usize,
-    /// Kind of the obstacle that stopped it, and side of the body that touched it.
-    pub(super) contact: Option<(u8, Side)>,
+    /// What stopped it.
+    pub(super) contact: Option<Touch>,
+}
+
+/// An obstacle that stops a walk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Touch {
+    /// Kind of the obstacle.
+    pub(super) kind: u8,
+    /// Side of the body that touches it.
+    pub(super) side: Side,
+    /// The body that stands there; none for a wall.
+    pub(super) by: Option<Slot>,
 }
 
 impl<T: BoxWord> Scene<'_, T> {
@@ -38,14 +49,7 @@ impl<T: BoxWord> Scene<'_, T> {
         let Some(action) = body.actions.get(usize::from(cell.action.get())) else {
             return self.toggle(slot, scratch);
         };
-        let drawn = match self.world.obstacle_rule {
-            ObstacleRule::Cut | ObstacleRule::Stay => action.distribution.sample(word),
-            ObstacleRule::Renormalise => match self.rescaled(action, slot) {
-                Ok(distribution) => distribution.sample(word),
-                Err(blocked) => blocked,
-            },
-        };
-        let walk = &action.walks[drawn];
+        let walk = &action.walks[self.drawn(action, slot, word)];
         if all_free(self.floor, self.base(cell), &walk.whole.enter) {
             self.make_whole(walk, slot);
             if scratch.keep_motions {
@@ -54,6 +58,18 @@ impl<T: BoxWord> Scene<'_, T> {
             }
         } else {
             self.blocked(walk, slot, scratch);
+        }
+    }
+
+    /// Returns the number of the transition in which an action ends; `word` is the body's draw.
+    #[inline(always)]
+    pub(super) fn drawn(&self, action: &Action, slot: Slot, word: u32) -> usize {
+        match self.world.obstacle_rule {
+            ObstacleRule::Cut | ObstacleRule::Stay => action.distribution.sample(word),
+            ObstacleRule::Renormalise => match self.rescaled(action, slot) {
+                Ok(distribution) => distribution.sample(word),
+                Err(blocked) => blocked,
+            },
         }
     }
 
@@ -107,32 +123,41 @@ impl<T: BoxWord> Scene<'_, T> {
                     cell.facing.set((cell.facing.get() + walk.turn) % 4);
                 }
             }
-            Some((kind, side)) => self.touch(cell, kind, side, scratch),
+            Some(touch) => self.touch(cell, touch, scratch),
         }
     }
 
     /// Notes a contact in the body's cell, in its counters and, where events are kept, as an event.
-    fn touch(&self, cell: &BodyCell, kind: u8, side: Side, scratch: &mut Scratch) {
+    fn touch(&self, cell: &BodyCell, touch: Touch, scratch: &mut Scratch) {
+        let Touch { kind, side, by } = touch;
         cell.contact.set(contact_word(kind, side as u8));
         let (body, kinds) = (cell.id, self.world.kinds.len());
         self.state.contacts.add(body as usize * kinds + usize::from(kind), 1);
         if scratch.keep_events {
-            let event = EventKind::Contact { kind, side };
-            scratch.events.push(Event { cycle: self.now, body, event });
+            let with = by.map(|slot| self.cell(slot).id);
+            let event = EventKind::Contact { kind, side, with };
+            scratch.events.push(self.event(cell, event));
         }
+    }
+
+    /// Returns an event of a body, which is where it happens.
+    fn event(&self, cell: &BodyCell, event: EventKind) -> Event {
+        let at = self.world.map_position(cell.at());
+        Event { cycle: self.now, body: cell.id, at, event }
     }
 
     /// Returns how far a walk gets: to the first step that enters a box that is not free.
     #[inline]
-    fn judge(&self, walk: &Walk, slot: Slot) -> Verdict {
+    pub(super) fn judge(&self, walk: &Walk, slot: Slot) -> Verdict {
         let base = self.base(self.cell(slot));
         for (steps, step) in walk.steps.iter().enumerate() {
             for &offset in &step.enter {
                 let word = self.floor.get(at(base, offset));
                 // A path that turns back enters boxes that the body itself still covers.
                 if !word.is_free() && word.slot() != slot {
-                    let contact = Some((self.state.kind_of(word), step.side));
-                    return Verdict { steps, contact };
+                    let by = (word != T::WALL).then(|| word.slot());
+                    let kind = self.state.kind_of(word);
+                    return Verdict { steps, contact: Some(Touch { kind, side: step.side, by }) };
                 }
             }
         }
@@ -193,7 +218,7 @@ impl<T: BoxWord> Scene<'_, T> {
         cell.facing.set(u8::from(opens));
         if scratch.keep_events {
             let event = if opens { EventKind::Opened } else { EventKind::Closed };
-            scratch.events.push(Event { cycle: self.now, body: cell.id, event });
+            scratch.events.push(self.event(cell, event));
         }
     }
 

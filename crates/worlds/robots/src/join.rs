@@ -15,7 +15,7 @@ use sidestep_kernel::space::BoxWord;
 /// A body's place in the order of its group.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
-    key: (u8, u32, u32),
+    pub(super) key: (u8, u32, u32),
     pub(super) slot: Slot,
     pub(super) word: u32,
 }

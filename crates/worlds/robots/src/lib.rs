@@ -19,6 +19,7 @@ pub mod bundle;
 pub mod decide;
 pub mod effector;
 pub mod exact;
+mod inspect;
 mod join;
 mod kind;
 mod law;
@@ -64,6 +65,8 @@ pub struct Event {
     pub cycle: Cycle,
     /// The body that it happened to.
     pub body: EntityId,
+    /// Column and row of its lower-left box, where it then is.
+    pub at: (u32, u32),
     /// The kind of event, with its details.
     pub event: EventKind,
 }
@@ -77,6 +80,8 @@ pub enum EventKind {
         kind: u8,
         /// Side of the robot that touched it.
         side: Side,
+        /// The body touched; none for a wall.
+        with: Option<EntityId>,
     },
     /// A door has opened.
     Opened,

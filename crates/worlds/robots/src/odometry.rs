@@ -36,10 +36,15 @@ impl Claimed {
         self.facing = (self.facing + turn) % 4;
     }
 
-    /// Returns the pose in meters.
-    pub(super) fn pose(&self, box_m: f64) -> Pose {
+    /// Returns the pose in meters; `turns` are those of the headings.
+    pub(super) fn pose(&self, box_m: f64, turns: &[[f64; 4]; 4]) -> Pose {
         let [x_m, y_m] = self.at_boxes.map(|boxes| boxes as f64 * box_m);
-        Pose::heading([x_m, y_m, 0.0], f64::from(self.facing) * FRAC_PI_2)
+        Pose { at_m: [x_m, y_m, 0.0], turn: turns[usize::from(self.facing)] }
+    }
+
+    /// Returns the turn of each heading in the frame in which wheels began to count.
+    pub(super) fn turns() -> [[f64; 4]; 4] {
+        [0.0, 1.0, 2.0, 3.0].map(|quarters| Pose::heading([0.0; 3], quarters * FRAC_PI_2).turn)
     }
 }
 
@@ -72,7 +77,7 @@ mod tests {
         );
         let mut run = robots_run(&Source::new("corridor.toml", text, ""), 1)
             .unwrap_or_else(|e| panic!("{e}"));
-        run.watch();
+        run.watch_odometry();
         let mut seen = Vec::new();
         for _ in 0..=cycles {
             let frame = run.frame(Look::BODIES);

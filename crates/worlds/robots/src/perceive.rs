@@ -37,6 +37,24 @@ impl<T: BoxWord> Scene<'_, T> {
     #[inline]
     fn robot_decides(&self, model: &RobotModel, slot: Slot, scratch: &mut Scratch) -> Intent {
         let cell = self.cell(slot);
+        let (decision, memory) = self.decision(model, slot, scratch);
+        store_memory(cell, memory);
+        self.note(cell, decision);
+        let known = usize::from(decision.action) < model.body.effector.actions.len();
+        debug_assert!(known, "behaviors choose among the effector's actions");
+        if known { Intent::action(decision.action) } else { Intent::IDLE }
+    }
+
+    /// Returns a robot's decision, and its memory after that; its readings and what it hears are in
+    /// the scratch.
+    #[inline(always)]
+    pub(super) fn decision(
+        &self,
+        model: &RobotModel,
+        slot: Slot,
+        scratch: &mut Scratch,
+    ) -> (Decision, Memory) {
+        let cell = self.cell(slot);
         let nearest = self.sense(model, cell, scratch);
         scratch.heard.clear();
         if let Some(radio) = &self.world.radio {
@@ -56,11 +74,7 @@ impl<T: BoxWord> Scene<'_, T> {
         let mut memory = memory_of(cell);
         let mut draws = self.world.streams.draws(cell.id, self.now, purpose::DECIDE);
         let decision = model.behaviour.decide(&percept, &mut memory, &mut draws);
-        store_memory(cell, memory);
-        self.note(cell, decision);
-        let known = usize::from(decision.action) < model.body.effector.actions.len();
-        debug_assert!(known, "behaviors choose among the effector's actions");
-        if known { Intent::action(decision.action) } else { Intent::IDLE }
+        (decision, memory)
     }
 
     /// Records the parts of a decision beside the action: trips and broadcasts.
@@ -109,6 +123,23 @@ impl<T: BoxWord> Scene<'_, T> {
             }
         }
         nearest
+    }
+
+    /// Returns for each beam of a sensor what it meets first, and the distance to that in boxes.
+    pub(super) fn met(&self, sensor: &MountedSensor, cell: &BodyCell) -> Vec<Option<(T, f64)>> {
+        let base = self.base(cell);
+        let boxes = &*sensor.boxes[usize::from(cell.facing.get())];
+        let mut from = 0;
+        let beam = |&end: &u16| {
+            let span = from..usize::from(end);
+            from = usize::from(end);
+            let mut all =
+                boxes[span.clone()].iter().zip(&sensor.distances[span]).flat_map(|(four, far)| {
+                    four.offsets.iter().map(|&o| self.floor.get(at(base, o))).zip(*far)
+                });
+            all.find(|(word, _)| !word.is_free())
+        };
+        sensor.ends.iter().map(beam).collect()
     }
 
     /// Returns the intent of a mover: people and the like continue as before or draw a new
@@ -288,7 +319,7 @@ pub(super) fn contact_of_word(word: u16) -> Option<Contact> {
 }
 
 #[inline]
-fn memory_of(cell: &BodyCell) -> Memory {
+pub(super) fn memory_of(cell: &BodyCell) -> Memory {
     Memory { words: std::array::from_fn(|k| cell.memory[k].get()) }
 }
 

@@ -12,7 +12,7 @@ use sidestep_kernel::ports::{
     BlockBuffer, Buffer, Buffers, ColumnSpec, ColumnType, RecordError, Recorder, RowBuffer, Table,
     TableSchema, Values,
 };
-use sidestep_kernel::view::Log;
+use sidestep_kernel::view::{Log, Plane};
 use sidestep_kernel::{Cycle, EntityId};
 use std::ops::Range;
 
@@ -32,7 +32,7 @@ const CYCLE: &str = "cycle, counted from 0";
 const BODY: &str = "entity id: robots first, then people, then doors";
 
 /// Returns the table of poses, which are recorded as whole columns because they are many.
-fn trajectories() -> TableSchema {
+fn trajectories(world: &RobotsWorld) -> TableSchema {
     let column = ColumnSpec::new;
     let columns = vec![
         column("cycle", ColumnType::U64, "the pose at the beginning of this cycle"),
@@ -41,7 +41,23 @@ fn trajectories() -> TableSchema {
         column("row_boxes", ColumnType::U32, "row of the body's lower-left box, from the south"),
         ColumnSpec::label("heading", "where the body looks", HEADING_NAMES),
     ];
-    TableSchema { name: "trajectories".into(), columns }
+    TableSchema { about: about_boxes(world), ..TableSchema::new("trajectories", columns) }
+}
+
+/// Returns what turns boxes into meters of the world, and ids into kinds of bodies.
+fn about_boxes(world: &RobotsWorld) -> Vec<(String, String)> {
+    let Plane { origin_m: [x, y], yaw_rad } = world.map.plane;
+    let box_m = world.map.box_size_m;
+    let numbers = [("box_m", box_m), ("origin_x_m", x), ("origin_y_m", y), ("yaw_rad", yaw_rad)];
+    let mut about: Vec<_> = numbers.map(|(name, v)| (name.into(), v.to_string())).into();
+    let ids: Vec<EntityId> = (0..world.bodies.len() as EntityId).collect();
+    // Bodies of one kind have ids in a row.
+    for same in ids.chunk_by(|&a, &b| world.visible_kind(a) == world.visible_kind(b)) {
+        if let (Some(first), Some(last)) = (same.first(), same.last()) {
+            about.push((format!("ids_{}", world.visible_kind(*first)), format!("{first}-{last}")));
+        }
+    }
+    about
 }
 
 fn events(world: &RobotsWorld) -> Table<Event> {
@@ -141,7 +157,7 @@ pub struct Books {
     gathered: Vec<Event>,
     /// and those that wait for the next frame.
     pub(super) log: Log<Event>,
-    /// What the wheels of each robot claim, by id, while somebody watches.
+    /// What the wheels of each robot claim, by id, while somebody watches that.
     odometry: Option<Vec<Claimed>>,
     sensor_samples: Vec<SensorSample>,
     motion_samples: Vec<MotionSample>,
@@ -156,7 +172,7 @@ impl Books {
     /// Starts to keep rows from cycle `now` on.
     pub(super) fn begin(&mut self, world: &RobotsWorld, state: &mut RobotsState, now: Cycle) {
         let record = &self.record;
-        self.rows.trajectories.begin(record.trajectories.then(trajectories));
+        self.rows.trajectories.begin(record.trajectories.then(|| trajectories(world)));
         self.rows.events.begin(record.events.then(|| events(world)));
         self.rows.readings.begin(record.calibration.then(|| readings(Vocabulary::of(world))));
         self.rows.motions.begin(record.calibration.then(motions));
@@ -177,14 +193,18 @@ impl Books {
         }
     }
 
-    /// Starts to keep what frames tell of the time between them.
-    pub(super) fn watch(&mut self, world: &RobotsWorld) {
+    /// Starts to keep the events that frames tell.
+    pub(super) fn watch(&mut self) {
         self.log.is_kept = true;
+    }
+
+    /// Starts to keep what wheels claim.
+    pub(super) fn watch_odometry(&mut self, world: &RobotsWorld) {
         // Robots have the first ids.
         self.odometry.get_or_insert_with(|| vec![Claimed::default(); world.robots.len()]);
     }
 
-    /// Returns what the wheels of each robot claim, by id; nothing unless somebody watches.
+    /// Returns what the wheels of each robot claim, by id; nothing unless somebody watches that.
     pub(super) fn odometry(&self) -> &[Claimed] {
         self.odometry.as_deref().unwrap_or_default()
     }

@@ -10,7 +10,7 @@ use super::{Scratch, words};
 use serde_json::{Value, json};
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
-use sidestep_kernel::view::{Frame, Look, PlaceRows, Scenery};
+use sidestep_kernel::view::{Frame, Inspection, Look, PlaceRows, Scenery, Who};
 use sidestep_kernel::words::{Lines, Said};
 use sidestep_kernel::{Cycle, Digest, Effort, EntityId, InputError, Plan, Run, World};
 use sidestep_scenario::Source;
@@ -101,7 +101,11 @@ impl World for RobotsWorld {
     }
 
     fn watch(&self, books: &mut Books) {
-        books.watch(self);
+        books.watch();
+    }
+
+    fn watch_odometry(&self, books: &mut Books) {
+        books.watch_odometry(self);
     }
 
     fn prepare(&self, books: &Books, scratch: &mut Scratch) {
@@ -151,11 +155,15 @@ impl World for RobotsWorld {
             cycle: now,
             time_s: now as f64 * CYCLE_S,
             bodies: self.visible_bodies(state),
-            scans: self.scans(state, now, look.scanning_bodies),
+            scans: self.scans(state, now, &look.scans),
             odometry: self.claimed_poses(books.odometry()),
             log: events.iter().map(|event| self.entry(event)).collect(),
             log_left_out,
         }
+    }
+
+    fn inspect(&self, state: &RobotsState, _: &Books, now: Cycle, who: Who) -> Option<Inspection> {
+        RobotsWorld::inspect(self, state, now, who)
     }
 
     fn place_rows(&self, _: &Books) -> Vec<PlaceRows> {

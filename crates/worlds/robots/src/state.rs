@@ -101,7 +101,7 @@ pub struct RobotsState {
 }
 
 /// One body's share of the state, in one cache line.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 #[repr(align(64))]
 pub struct BodyCell {
     /// Lower-left box, as a [`Position`] word.
@@ -239,6 +239,21 @@ impl RobotsState {
             contacts: Column::filled(n * world.kinds.len(), 0),
             bids: (0..bids).map(|_| AtomicU64::new(0)).collect(),
             voices: Voices::silent(if world.radio.is_some() { n } else { 0 }),
+            frames: None,
+        }
+    }
+
+    /// Returns a copy on which a cycle can be tried. It knows no boxes as visited, and records no poses.
+    pub(super) fn copied(&self, world: &RobotsWorld) -> Self {
+        Self {
+            floor: self.floor.clone(),
+            visited: Marks::none(world.walls.len()),
+            bodies: self.bodies.clone(),
+            kinds: self.kinds.clone(),
+            slot_of_id: self.slot_of_id.clone(),
+            contacts: self.contacts.clone(),
+            bids: Box::default(),
+            voices: self.voices.clone(),
             frames: None,
         }
     }

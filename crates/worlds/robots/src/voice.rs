@@ -8,10 +8,10 @@ use sidestep_kernel::{Column, Cycle, EntityId};
 /// read while the other is written, by parity of the cycle in which it is read. Every robot writes in
 /// every cycle, also where it does not act, so that the page being read holds the last word of all,
 /// whatever their periods, and the page being written holds nothing that anybody needs.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Voices([Page; 2]);
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Page {
     words: Column<u64>,
     /// 1 for a robot that has broadcast a word, because every word is a possible one.

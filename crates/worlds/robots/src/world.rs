@@ -210,6 +210,8 @@ pub struct MountedSensor {
     pub(super) table: ReadingTable,
     /// The boxes that its beams cross, for each heading.
     pub(super) boxes: [Box<[Crossed]>; 4],
+    /// The distance in boxes to each of them, the same for all headings.
+    pub(super) distances: Box<[[f64; BEAM_STEP]]>,
     /// End of each beam's boxes in the lists of `boxes`.
     pub(super) ends: Box<[u16]>,
     /// The row of each beam's report when it meets nothing.
@@ -250,6 +252,7 @@ impl MountedSensor {
         };
         let boxes = [0, 1, 2, 3]
             .map(|heading| beams.iter().flatten().map(|&four| crossed(four, heading)).collect());
+        let distances = beams.iter().flatten().map(|four| four.map(|c| c.distance)).collect();
         let mut end = 0;
         let ends = beams.iter().map(|beam| {
             end += beam.len() as u16;
@@ -258,7 +261,7 @@ impl MountedSensor {
         let ends = ends.collect();
         let (table, nothing) = (ReadingTable::new(&model, reliable)?, model.nothing());
         let nothing_row = table.row(nothing);
-        Ok(Self { model, table, boxes, ends, nothing_row, nothing })
+        Ok(Self { model, table, boxes, distances, ends, nothing_row, nothing })
     }
 
     /// Returns whether every reading is the truth.
@@ -278,6 +281,11 @@ impl MountedSensor {
         };
         self.is_reliable()
             || all(&self.model.distance_confusion) && self.model.confusion.iter().all(|m| all(m))
+    }
+
+    /// Returns the observation that a kind designates.
+    pub(super) fn designates(&self, kind: u8) -> u8 {
+        self.model.designates[usize::from(kind)]
     }
 
     /// Returns the true reading of a beam that meets `kind` at distance class `class`. A kind that

@@ -123,7 +123,7 @@ impl<R> Table<R> {
     /// Returns its name and columns.
     pub fn schema(&self) -> TableSchema {
         let columns = self.columns.iter().map(|column| column.spec.clone()).collect();
-        TableSchema { name: self.name.clone(), columns }
+        TableSchema::new(&self.name, columns)
     }
 
     /// Returns the values of all columns in these rows.

@@ -50,13 +50,23 @@ impl ColumnSpec {
     }
 }
 
-/// One table: name and columns.
+/// One table: name, columns, and what holds for all of its rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TableSchema {
     /// File stem, e.g. `trajectories`.
     pub name: String,
     /// The columns in order.
     pub columns: Vec<ColumnSpec>,
+    /// Facts without which the rows cannot be read in full, by name: the side of a box, the kinds of
+    /// bodies. A name ends in the unit where the fact has one.
+    pub about: Vec<(String, String)>,
+}
+
+impl TableSchema {
+    /// Creates a table of which nothing else is to be known.
+    pub fn new(name: impl Into<String>, columns: Vec<ColumnSpec>) -> Self {
+        Self { name: name.into(), columns, about: Vec::new() }
+    }
 }
 
 #[cfg(test)]

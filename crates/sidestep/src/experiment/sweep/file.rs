@@ -188,19 +188,7 @@ impl Sweep {
         }
         let reader = Reader { source };
         let until = file.until.as_ref().map(|section| reader.until(section)).transpose()?;
-        let replicates = match (&file.replicates, &file.until) {
-            (Some(n), Some(_)) => {
-                let cause = "`replicates` and `until` both say how often to run";
-                let remedy = "leave `replicates` out; `until.max_runs` is the limit";
-                return Err(source.error(Some(n.span()), cause, remedy));
-            }
-            (Some(n), None) => reader.count(*n.get_ref(), n.span(), "replicates")?,
-            (None, Some(until)) => {
-                let max = until.get_ref().max_runs.unwrap_or(MAX_RUNS.into());
-                reader.count(max, until.span(), "max_runs")?
-            }
-            (None, None) => REPLICATES,
-        };
+        let replicates = reader.replicates(&file)?;
         Ok(Self {
             place: source.place.clone(),
             scenario: source.path(&file.scenario),
@@ -271,6 +259,23 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
+    /// Returns how often each variant is run, at most.
+    fn replicates(&self, file: &SweepFile) -> Result<u32, InputError> {
+        match (&file.replicates, &file.until) {
+            (Some(n), Some(_)) => {
+                let cause = "`replicates` and `until` both say how often to run";
+                let remedy = "leave `replicates` out; `until.max_runs` is the limit";
+                Err(self.source.error(Some(n.span()), cause, remedy))
+            }
+            (Some(n), None) => self.count(*n.get_ref(), n.span(), "replicates"),
+            (None, Some(until)) => {
+                let max = until.get_ref().max_runs.unwrap_or(MAX_RUNS.into());
+                self.count(max, until.span(), "max_runs")
+            }
+            (None, None) => Ok(REPLICATES),
+        }
+    }
+
     fn factors(&self, table: &Spanned<toml::Table>) -> Result<Vec<Factor>, InputError> {
         let factor = |(key, value): (String, Value)| match value {
             Value::Array(values) if !values.is_empty() => Ok(Factor { key, values }),

@@ -17,6 +17,7 @@
 //! groups.rs    runs by variant and replicate, and the mean over any group of variants
 //! compare.rs   a variant against the baseline, on the same replicates
 //! summary.rs   a summary of the table: every number with its interval and number of runs
+//! summarize.rs a table -> its summary
 //! told.rs      a plan's runs -> their summary
 //! text.rs      the summary as tables
 //! charts.rs    the summary as figures
@@ -40,6 +41,7 @@ pub mod plan;
 pub mod rounds;
 pub mod rows;
 pub mod seeds;
+mod summarize;
 pub mod summary;
 pub mod table;
 mod text;

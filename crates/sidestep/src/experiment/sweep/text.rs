@@ -4,21 +4,74 @@ use super::Label;
 use super::compare::Comparison;
 use super::label::sentence;
 use super::summary::{
-    Described, LeftOut, MetricSummary, NOT_ASKED_FOR, Numbers, Quantile, Share, Summary,
+    Described, LeftOut, MetricSummary, NOT_ASKED_FOR, Numbers, Quantile, Section, Share, Summary,
     VariantMetric,
 };
 use crate::statistics::Interval;
-use sidestep_document::{Estimate, Table};
+use sidestep_document::{Estimate, Figure, Table};
 use sidestep_kernel::math;
 
-pub(super) fn tables(summary: &Summary) -> Vec<Table> {
+impl Summary {
+    /// Returns the summary as tables.
+    pub fn tables(&self) -> Vec<Table> {
+        tables(self)
+    }
+
+    /// Returns a short summary for a terminal: means and differences with their intervals.
+    pub fn brief(&self) -> Vec<Table> {
+        brief(self)
+    }
+
+    /// Returns the whole summary in one table: of every metric and variant the mean, the difference from
+    /// the baseline, p and n; of samples of a box of parameters how each metric goes with each of them.
+    pub fn overview(&self) -> Table {
+        match self.trends.is_empty() {
+            true => overview(self),
+            false => trends(self),
+        }
+    }
+
+    /// Returns what all tables of metrics have in common, to be told once.
+    pub fn footnotes(&self) -> Vec<&'static str> {
+        footnotes(self)
+    }
+
+    /// Returns the summary metric by metric.
+    pub fn sections(&self) -> Vec<Section> {
+        let section = |metric: &MetricSummary| Section {
+            name: metric.name.clone(),
+            title: sentence(&metric.label),
+            meaning: metric.meaning,
+            figures: self
+                .figures
+                .iter()
+                .filter(|(of, _)| *of == metric.name)
+                .map(|(_, f)| f.clone())
+                .collect(),
+            tables: of_metric(self, metric).into_iter().map(Table::folded).collect(),
+        };
+        self.metrics.iter().map(section).collect()
+    }
+
+    /// Returns the metrics that are not shown, if there are any.
+    pub fn left_out(&self) -> Option<Table> {
+        left_out(self)
+    }
+
+    /// Returns the summary as figures: each metric over each parameter.
+    pub fn figures(&self) -> Vec<Figure> {
+        self.figures.iter().map(|(_, figure)| figure.clone()).collect()
+    }
+}
+
+fn tables(summary: &Summary) -> Vec<Table> {
     let of_metrics = summary.metrics.iter().flat_map(|metric| of_metric(summary, metric));
     of_metrics.chain(left_out(summary)).collect()
 }
 
 /// Returns a table per metric with the most important numbers: means and differences, each with its
 /// interval and number of runs.
-pub(super) fn brief(summary: &Summary) -> Vec<Table> {
+fn brief(summary: &Summary) -> Vec<Table> {
     summary.metrics.iter().map(|metric| brief_of(summary, metric)).collect()
 }
 
@@ -65,7 +118,7 @@ fn center(variant: &VariantMetric) -> String {
 }
 
 /// Returns a table of all metrics in all variants: mean, difference from the baseline, p and n.
-pub(super) fn overview(summary: &Summary) -> Table {
+fn overview(summary: &Summary) -> Table {
     let title = match &summary.baseline {
         Some(name) => format!("All metrics, compared with {name}"),
         None => "All metrics".into(),
@@ -106,7 +159,7 @@ fn difference(comparison: &Comparison) -> String {
 }
 
 /// Returns a table of how each metric goes with each parameter.
-pub(super) fn trends(summary: &Summary) -> Table {
+fn trends(summary: &Summary) -> Table {
     let note = "Spearman's rank correlation over the variants, from -1 to 1: near 1 the metric rises with \
                 the parameter, near -1 it falls. 95 % intervals by Fisher's transformation.";
     let columns = ["metric", "goes with", "rank correlation", "n"];
@@ -125,7 +178,7 @@ pub(super) fn trends(summary: &Summary) -> Table {
 }
 
 /// Returns what the tables of all metrics have in common.
-pub(super) fn footnotes(summary: &Summary) -> Vec<&'static str> {
+fn footnotes(summary: &Summary) -> Vec<&'static str> {
     let mut notes = Vec::new();
     let has = |is_share: bool| summary.metrics.iter().any(|m| m.is_share == is_share);
     if has(false) {
@@ -165,7 +218,7 @@ const EFFECTS: &str = "Main effects are means over all variants that have the le
                        their seeds.";
 
 /// Returns the tables of a metric.
-pub(super) fn of_metric(summary: &Summary, metric: &MetricSummary) -> Vec<Table> {
+fn of_metric(summary: &Summary, metric: &MetricSummary) -> Vec<Table> {
     let mut tables = vec![values(metric)];
     if let Some(baseline) = &summary.baseline {
         tables.push(differences(metric, baseline));
@@ -301,7 +354,7 @@ fn effects(metric: &MetricSummary) -> Table {
 }
 
 /// Returns the reasons why metrics are not shown, if there are such metrics.
-pub(super) fn left_out(summary: &Summary) -> Option<Table> {
+fn left_out(summary: &Summary) -> Option<Table> {
     let mut table = Table::new("Metrics not shown", "", &["metric", "why"]);
     let asked = |l: &&LeftOut| l.reason != NOT_ASKED_FOR;
     summary

@@ -41,7 +41,7 @@ patience_s = 1000.0
 ";
 
 /// Two chains, each between two discs that go through each other.
-const CAUGHT: &str = r#"
+pub(crate) const CAUGHT: &str = r#"
 [chain]
 dt_s = 0.02
 escape_speed_m_s = 1.0
@@ -118,7 +118,7 @@ navigator = { noise_m = 0.01 }
 ";
 
 /// A snake in space, past balls that stand still and balls that fly.
-const SNAKE: &str = "
+pub(crate) const SNAKE: &str = "
 [chain]
 dimensions = 3
 [[fields]]
@@ -261,7 +261,7 @@ patience_s = 1000.0
 ";
 
 /// An arm whose tool is behind a wall of which it knows no way round but by a plan.
-const PLANNED: &str = "
+pub(crate) const PLANNED: &str = "
 [chain]
 dt_s = 0.05
 [[obstacles]]

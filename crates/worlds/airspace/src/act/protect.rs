@@ -72,6 +72,9 @@ pub(super) fn shielded(
     let allowed = beset.iter().zip(wishes).map(|(one, (wishes, own))| one.allowed(wishes, own));
     let allowed: Vec<Vec<usize>> = allowed.collect();
     let decisions = decided(turn, &flyers, &allowed, &candidates, contacts);
+    if let Some(notes) = &mut turn.scratch.notes {
+        notes.shielded(&flyers, &candidates, &decisions, dtau_s);
+    }
     let mut flown = Vec::with_capacity(group.len());
     for (k, mut wishes) in candidates.into_iter().enumerate() {
         let way = decisions[k].candidate.map(|wish| wishes.swap_remove(wish));
@@ -103,6 +106,9 @@ fn decided(
     let candidates: Vec<Vec<Way>> = allowed.iter().zip(wishes).map(of).collect();
     let (mut decisions, traffic) = deploy::shielded(turn, seen, &candidates, contacts);
     turn.scratch.exchanged.add(traffic);
+    if let Some(notes) = &mut turn.scratch.notes {
+        notes.exchanged = traffic;
+    }
     for (decision, allowed) in decisions.iter_mut().zip(allowed) {
         decision.candidate = decision.candidate.map(|k| allowed[k]);
     }

@@ -224,11 +224,11 @@ fn exact(team: &mut [Coordinator], migration: &mut Migration<'_>) {
     let places: Vec<usize> = above.airplanes.iter().map(|a| a.place).collect();
     let outcome =
         optimize(&game, &migration.settings(), |player, k| hosts[places[player]].uniform(k));
-    let each = outcome.joint.into_iter().zip(outcome.expected);
-    for (airplane, (chosen, expected)) in above.airplanes.iter_mut().zip(each) {
+    let each = outcome.joint.into_iter().zip(outcome.expected).zip(outcome.q);
+    for (airplane, ((chosen, expected), chances)) in above.airplanes.iter_mut().zip(each) {
         let (rounds, converged) = (outcome.rounds, outcome.converged);
-        airplane.decided =
-            (!airplane.is_presumed).then_some(Decided { chosen, expected, rounds, converged });
+        let decided = Decided { chosen, expected, rounds, converged, chances };
+        airplane.decided = (!airplane.is_presumed).then_some(decided);
     }
     hand_back(above, team, migration);
 }

@@ -42,6 +42,10 @@ pub struct Decided {
     pub rounds: u32,
     /// Whether the distributions had settled.
     pub converged: bool,
+    /// The probability of every action at the end, for those who ask: no coordinator carries it
+    /// from airplane to airplane, where it is empty.
+    #[serde(skip)]
+    pub chances: Vec<f64>,
 }
 
 /// Outcome of an agent.

@@ -116,6 +116,7 @@ impl OwnShip {
             expected: player.expected().to_vec(),
             rounds,
             converged: calm >= stop.calm_rounds,
+            chances: player.q.clone(),
         })
     }
 

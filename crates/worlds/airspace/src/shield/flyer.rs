@@ -61,7 +61,7 @@ impl Flyer {
     }
 
     /// Returns the orbit to a side that it holds, or that it enters where it is.
-    pub(super) fn orbit(&self, side: Side) -> Orbit {
+    pub(crate) fn orbit(&self, side: Side) -> Orbit {
         Orbit::from(self.held, self.v_m_s, side.sign() * self.orbit_rad_s)
     }
 

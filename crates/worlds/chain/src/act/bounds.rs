@@ -22,6 +22,7 @@ impl<const D: usize> Acting<'_, D> {
         // Out of the range of coordinates nothing escapes.
         let Ok(escaped) = escaped else { return };
         self.body.tally.escapes.add(&escaped);
+        self.note(|notes| notes.escapes = escaped.moves);
         self.scratch.escaped.copy_from_slice(self.body.chain.points());
         self.take_leader_along();
         // Only the first of several cycles of escape in a row is an event.

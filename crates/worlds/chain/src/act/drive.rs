@@ -3,6 +3,7 @@
 use super::Acting;
 use crate::driver::{Driver, Targets, Task, Wander, wander};
 use crate::events::EventKind;
+use crate::notes::Wanted;
 use crate::rods::geometry::{Point, along, distance, in_dimensions, towards};
 use crate::script::Motion;
 use crate::swarm::drive::Pose;
@@ -29,7 +30,10 @@ impl<const D: usize> Acting<'_, D> {
         let Some(task) = self.task() else { return };
         let is_late = self.world.starts_s(self.body.driving.cycles + 1) >= task.lasts_s;
         self.body.driving.cycles += 1;
-        match self.wish(task) {
+        let wish = self.wish(task);
+        let wanted = self.wanted(task, wish);
+        self.note(|notes| notes.wish = Some(wanted));
+        match wish {
             Wish::Rest => {}
             Wish::Go(_) | Wish::Steer(_) if self.gives_way => self.give_way(task),
             Wish::Go(to) => {
@@ -42,6 +46,22 @@ impl<const D: usize> Acting<'_, D> {
         if is_late {
             self.next_task(EventKind::Done);
         }
+    }
+
+    /// Returns a wish in words.
+    fn wanted(&self, task: &Task<D>, wish: Wish<D>) -> Wanted<D> {
+        let (words, to) = match wish {
+            Wish::Rest => ("rest", None),
+            Wish::Go(to) if self.gives_way => ("wait, because parts get out of the way", Some(to)),
+            Wish::Go(to) => ("go", Some(to)),
+            Wish::Follow => {
+                let plan = self.body.plan.as_ref().and_then(|plan| plan.way.front());
+                ("follow its plan", plan.map(|posture| posture[task.agent]))
+            }
+            Wish::Steer(pose) => ("steer", Some(in_dimensions(pose.at))),
+            Wish::Done => ("its task is done", None),
+        };
+        Wanted { words, to }
     }
 
     /// Returns where the initiator wants to be at the end of the cycle.

@@ -30,6 +30,7 @@ impl<const D: usize> Acting<'_, D> {
             true => self.lead(task, to),
             false => self.climb(task, to),
         };
+        self.note(|notes| notes.climbed = Some(climbed.clone()));
         let way = sub(self.body.chain.points()[task.agent], at);
         self.body.driving.way_m.wanted += distance(at, to);
         self.body.driving.way_m.gone += norm(way);
@@ -163,6 +164,7 @@ impl<const D: usize> Acting<'_, D> {
     /// event.
     pub(super) fn vetoed(&mut self, veto: &Veto<D>) {
         self.body.tally.add_veto(veto.reason);
+        self.note(|notes| notes.vetoes.push(*veto));
         let objection = Some(Objection { by: veto.by as u32, reason: veto.reason });
         let driving = &self.body.driving;
         if driving.told.is_none() || driving.objection != objection {

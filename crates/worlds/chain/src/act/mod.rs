@@ -19,7 +19,8 @@ mod wheels;
 
 use super::driver::Task;
 use super::events::{Event, EventKind};
-use super::rods::geometry::Bounds;
+use super::notes::Notes;
+use super::rods::geometry::{Bounds, in_dimensions};
 use super::scratch::Scratch;
 use super::state::Body;
 use super::swarm::leader::Decision;
@@ -46,27 +47,36 @@ pub(crate) struct Acting<'a, const D: usize> {
 
 /// Lets the chains of one conflict group act, one after the other.
 pub(crate) fn act<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, group: &mut [Slot]) {
-    let &mut Turn { world, state, now, .. } = turn;
     group.sort_unstable();
     for &slot in &*group {
-        let claim = state.claim(slot as usize);
-        let meets = |s: &Slot| *s != slot && state.claim(*s as usize).meets(&claim);
-        turn.scratch.gather(world, state, now + 1, group.iter().copied().filter(meets));
-        let mut body = state.body_mut(slot as usize);
-        let mut acting = Acting {
-            world,
-            spec: &world.chains[slot as usize],
-            slot,
-            now,
-            decision: state.decision(slot as usize),
-            claim,
-            gives_way: false,
-            body: &mut body,
-            scratch: turn.scratch,
-            puts_off: false,
-        };
-        acting.act();
+        act_one(turn, group, slot);
     }
+}
+
+/// Lets one chain of a conflict group act.
+pub(crate) fn act_one<const D: usize>(
+    turn: &mut Turn<'_, ChainWorld<D>>,
+    group: &[Slot],
+    slot: Slot,
+) {
+    let &mut Turn { world, state, now, .. } = turn;
+    let claim = state.claim(slot as usize);
+    let meets = |s: &Slot| *s != slot && state.claim(*s as usize).meets(&claim);
+    turn.scratch.gather(world, state, now + 1, group.iter().copied().filter(meets));
+    let mut body = state.body_mut(slot as usize);
+    let mut acting = Acting {
+        world,
+        spec: &world.chains[slot as usize],
+        slot,
+        now,
+        decision: state.decision(slot as usize),
+        claim,
+        gives_way: false,
+        body: &mut body,
+        scratch: turn.scratch,
+        puts_off: false,
+    };
+    acting.act();
 }
 
 impl<'a, const D: usize> Acting<'a, D> {
@@ -102,8 +112,18 @@ impl<'a, const D: usize> Acting<'a, D> {
 
     /// Returns an event of this chain.
     fn event(&self, kind: EventKind, connector: usize, value: f64) -> Event {
-        let (cycle, chain, connector) = (self.now, self.slot, connector as u32);
-        Event { cycle, chain, kind, connector, reason: None, obstacle: None, missing: 0, value }
+        let (cycle, chain) = (self.now, self.slot);
+        let at_m = in_dimensions(self.body.chain.points()[connector]);
+        let (connector, reason, obstacle, missing) = (connector as u32, None, None, 0);
+        Event { cycle, chain, kind, connector, at_m, reason, obstacle, missing, value }
+    }
+
+    /// Notes something for somebody who asks about this chain.
+    fn note(&mut self, note: impl FnOnce(&mut Notes<D>)) {
+        let slot = self.slot;
+        if let Some(notes) = self.scratch.notes.as_deref_mut().filter(|notes| notes.slot == slot) {
+            note(notes);
+        }
     }
 
     /// Records an event.

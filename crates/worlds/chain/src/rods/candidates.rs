@@ -260,11 +260,7 @@ impl<const D: usize> Scene<'_, D> {
                     true
                 }
                 Err(refusal) => {
-                    // A free direction that fails for another reason is more informative than the
-                    // first objection.
-                    if !matches!(refusal.reason, Reason::BothSidesBlocked | Reason::BendLimit) {
-                        why.get_or_insert(refusal);
-                    }
+                    keep_informative(why, refusal);
                     false
                 }
             }
@@ -312,6 +308,14 @@ impl<const D: usize> Scene<'_, D> {
                 work.blocks.push(*block);
             }
         });
+    }
+}
+
+/// Keeps the first refusal that is more informative than the first objection: a free direction that fails
+/// for another reason.
+fn keep_informative(why: &mut Option<Refusal>, refusal: Refusal) {
+    if !matches!(refusal.reason, Reason::BothSidesBlocked | Reason::BendLimit) {
+        why.get_or_insert(refusal);
     }
 }
 

@@ -75,13 +75,7 @@ pub fn reform<const D: usize>(
     may_come: MayCome,
 ) -> Result<Reformed, InputError> {
     let (first, last) = (*scattered.start(), *scattered.end());
-    if first == 0 || last + 1 >= chain.points().len() || first > last {
-        return Err(InputError::new(
-            "scattered connectors",
-            format!("are {first} to {last}, of a chain of {}", chain.points().len()),
-            "leave a whole end on both sides",
-        ));
-    }
+    check_ends(chain, first, last)?;
     let before = chain.points().to_vec();
     let (low, high) = (first - 1, last + 1);
     let have_m: f64 = chain.rods()[low..high].iter().map(|r| r.max_m).sum();
@@ -115,6 +109,18 @@ pub fn reform<const D: usize>(
     let off_m = chain.max_rod_violation_m();
     chain.points_mut().copy_from_slice(&before);
     Ok(Reformed::NotReached { off_m })
+}
+
+fn check_ends<const D: usize>(
+    chain: &Chain<D>,
+    first: usize,
+    last: usize,
+) -> Result<(), InputError> {
+    if 0 < first && first <= last && last + 1 < chain.points().len() {
+        return Ok(());
+    }
+    let cause = format!("are {first} to {last}, of a chain of {}", chain.points().len());
+    Err(InputError::new("scattered connectors", cause, "leave a whole end on both sides"))
 }
 
 /// Whether all rods between two connectors are within their limits.

@@ -94,7 +94,8 @@ impl<const D: usize> Compiler<'_, D> {
         let plans = s.plans(chain.connectors().iter().any(|c| c.mobility == Mobility::Fixed));
         if s.connector >= n {
             let cause = format!("connector = {} of a chain of {n}", s.connector);
-            return Err(self.source.error(at, cause, "count from 0"));
+            let remedy = format!("count from 0: the last connector is {}", n - 1);
+            return Err(self.source.error(at, cause, remedy));
         }
         self.has_only_its_own(s, plans, at.clone())?;
         Ok(Task {

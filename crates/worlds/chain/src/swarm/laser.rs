@@ -52,6 +52,10 @@ pub struct Laser {
 pub struct Scan {
     /// Range of every beam of the full circle, as in [`Laser`]; beams that are not read hold 0.
     ranges_m: Vec<f64>,
+    /// The same without errors, where that is wanted.
+    true_m: Vec<f64>,
+    /// Whether ranges without errors are kept.
+    pub keeps_truth: bool,
 }
 
 impl Laser {
@@ -120,6 +124,9 @@ impl Laser {
         obstacles.visit(&near, |o| self.look(pose, turn, &o.core, o.radius_m, scan));
         for body in bodies.into_iter().filter(|body| body.bounds().meets(&near)) {
             self.look(pose, turn, &body.core, body.radius_m, scan);
+        }
+        if scan.keeps_truth {
+            scan.true_m.clone_from(&scan.ranges_m);
         }
         if self.noise_std_m > 0.0 {
             for beam in self.read_beams() {
@@ -191,8 +198,18 @@ impl Laser {
     pub fn readings<'a>(&'a self, scan: &'a Scan) -> impl Iterator<Item = (f64, f64)> + 'a {
         let rightmost = -(self.beams_per_side as f64);
         let bearing_rad = move |k: usize| (rightmost + k as f64) * self.step_rad();
-        let ranges_m = self.read_beams().filter_map(|beam| scan.ranges_m.get(beam).copied());
-        ranges_m.enumerate().map(move |(k, range_m)| (bearing_rad(k), range_m))
+        self.read(&scan.ranges_m).enumerate().map(move |(k, range_m)| (bearing_rad(k), range_m))
+    }
+
+    /// Returns the ranges without errors in the order of [`Self::readings`]; none unless they were
+    /// kept.
+    pub fn truths<'a>(&'a self, scan: &'a Scan) -> impl Iterator<Item = f64> + 'a {
+        self.read(&scan.true_m)
+    }
+
+    /// Returns the values of the beams that it reads, from the rightmost on.
+    fn read<'a>(&'a self, of_all: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+        self.read_beams().filter_map(|beam| of_all.get(beam).copied())
     }
 
     /// Returns the least range within a sector of beams, given by its ends relative to the heading,

@@ -48,6 +48,18 @@ impl Layer {
         Self::TargetCheck,
         Self::KeepMoving,
     ];
+
+    /// Returns its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::CloseLeft => "close left",
+            Self::CloseRight => "close right",
+            Self::FarLeft => "far left",
+            Self::FarRight => "far right",
+            Self::TargetCheck => "target check",
+            Self::KeepMoving => "keep moving",
+        }
+    }
 }
 
 /// The rule for when a wall counts as being left. The slides do not say.

@@ -57,7 +57,7 @@ pub(super) fn estimates(f: &mut Formatter<'_>, all: &[Estimate], heading: &Headi
             let (row, column) = (heading.row, heading.column);
             let heads = ["count", "of", "probability", "95 % interval"];
             let [count, of, probability, interval] = heads;
-            writeln!(f, "  {row:12} {column:14} {count:>10} {of:>7}  {probability}  {interval}")?;
+            writeln!(f, "  {row:12} {column:13} {count:>10} {of:>7}  {probability}  {interval}")?;
         }
         line(f, estimate)?;
     }
@@ -69,7 +69,7 @@ fn line(f: &mut Formatter<'_>, e: &Estimate) -> Result {
     let decimals = if e.count.fract() == 0.0 { 0 } else { 2 };
     writeln!(
         f,
-        "  {:12} {:14} {:>10.decimals$} {:>7.0}  {:>11.5}  [{:.5}, {:.5}]",
+        "  {:12} {:13} {:>10.decimals$} {:>7.0}  {:>11.5}  [{:.5}, {:.5}]",
         e.row, e.column, e.count, e.of, e.probability, e.interval.low, e.interval.high
     )
 }
@@ -80,7 +80,10 @@ pub(super) fn thin(f: &mut Formatter<'_>, thin: &[ThinRow], below: u32) -> Resul
         return writeln!(f, "\nEvery row has at least {below} counts.");
     }
     writeln!(f, "\nRows with fewer than {below} counts")?;
-    thin.iter().try_for_each(|row| writeln!(f, "  {} {}: {}", row.table, row.row, row.count))
+    let decimals = |count: f64| if (count - count.round()).abs() < 0.005 { 0 } else { 2 };
+    thin.iter().try_for_each(|row| {
+        writeln!(f, "  {} {}: {:.*}", row.table, row.row, decimals(row.count), row.count)
+    })
 }
 
 /// Writes how well a part of the events predicts the rest.
@@ -93,16 +96,18 @@ pub(super) fn hold_out(f: &mut Formatter<'_>, fits: &[Fit]) -> Result {
         "  {table:18} {learned:>8} {held:>8} {chi2:>8} {df:>4} {p:>7} {loss:>9} {floor:>9}"
     )?;
     for fit in fits {
+        // Without degrees of freedom nothing was tested.
+        let tested = |number: String| if fit.degrees_of_freedom == 0 { "-".into() } else { number };
         let shown = |loss: Option<f64>| loss.map_or("-".to_string(), |loss| format!("{loss:.5}"));
         writeln!(
             f,
-            "  {:18} {:>8.0} {:>8.0} {:>8.2} {:>4} {:>7.4} {:>9} {:>9}",
+            "  {:18} {:>8.0} {:>8.0} {:>8} {:>4} {:>7} {:>9} {:>9}",
             fit.table,
             fit.trained_on,
             fit.held_out,
-            fit.chi_square,
+            tested(format!("{:.2}", fit.chi_square)),
             fit.degrees_of_freedom,
-            fit.p_value,
+            tested(format!("{:.4}", fit.p_value)),
             shown(fit.log_loss),
             shown(fit.log_loss_floor)
         )?;

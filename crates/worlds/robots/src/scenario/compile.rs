@@ -88,8 +88,8 @@ struct Compiler<'a> {
     map: Arc<GridMap>,
     office_doors: Vec<Rect>,
     kinds: Kinds,
-    sensors: BTreeMap<String, Located<SensorSection>>,
-    effectors: BTreeMap<String, Located<EffectorSection>>,
+    sensors: Sensors,
+    effectors: Effectors,
     streams: Streams,
     types: Vec<BodyType>,
     bodies: Vec<Body>,
@@ -109,16 +109,7 @@ impl<'a> Compiler<'a> {
         let source = Arc::new(source.clone());
         let (head, file) = source.parse_world::<RobotsFile>()?;
         let (map, office_doors) = load_map(&source, &file.map)?;
-        let (mut sensors, mut effectors) = (BTreeMap::new(), BTreeMap::new());
-        let presets = Source::new("presets", include_str!("../presets.toml"), "");
-        add_profile(Arc::new(presets), &mut sensors, &mut effectors)?;
-        for profile in &file.profiles {
-            let path = source.path(profile.get_ref());
-            let profile = Source::read(&path, &[])?;
-            add_profile(Arc::new(profile), &mut sensors, &mut effectors)?;
-        }
-        add_all(&source, &file.sensors, &mut sensors);
-        add_all(&source, &file.effectors, &mut effectors);
+        let (sensors, effectors) = known_tables(&source, &file)?;
         idle::refuse(&source, &file, own, !office_doors.is_empty())?;
         let kinds = Kinds::new(&source, &file)?;
         check_tables(&kinds, &sensors, &effectors)?;
@@ -244,7 +235,7 @@ impl<'a> Compiler<'a> {
 
 /// Returns as many rings of wall as the longest path has steps, and as a beam may be read past a
 /// wall.
-fn border(file: &RobotsFile, effectors: &BTreeMap<String, Located<EffectorSection>>) -> u32 {
+fn border(file: &RobotsFile, effectors: &Effectors) -> u32 {
     let named = file.robots.0.iter().filter_map(|robots| robots.get_ref().effector.as_ref());
     let known = named.filter_map(|name| effectors.get(name.get_ref()));
     let transitions = known.flat_map(|e| e.section.get_ref().actions.values());
@@ -266,19 +257,36 @@ fn actions_at_headings(
 }
 
 /// Checks every table, whether or not a robot uses it.
-fn check_tables(
-    kinds: &Kinds,
-    sensors: &BTreeMap<String, Located<SensorSection>>,
-    effectors: &BTreeMap<String, Located<EffectorSection>>,
-) -> Result<(), InputError> {
+fn check_tables(kinds: &Kinds, sensors: &Sensors, effectors: &Effectors) -> Result<(), InputError> {
     sensors.iter().try_for_each(|(name, at)| tables::sensor(name, at, kinds, false).map(drop))?;
     effectors.iter().try_for_each(|(name, at)| tables::effector(name, at).map(drop))
 }
 
+type Sensors = BTreeMap<String, Located<SensorSection>>;
+type Effectors = BTreeMap<String, Located<EffectorSection>>;
+
+/// Returns the sensors and effectors that a scenario may name: ours, those of its profiles, its own.
+fn known_tables(
+    source: &Arc<Source>,
+    file: &RobotsFile,
+) -> Result<(Sensors, Effectors), InputError> {
+    let (mut sensors, mut effectors) = (BTreeMap::new(), BTreeMap::new());
+    let presets = Source::new("presets", include_str!("../presets.toml"), "");
+    add_profile(Arc::new(presets), &mut sensors, &mut effectors)?;
+    for profile in &file.profiles {
+        let path = source.path(profile.get_ref());
+        let profile = Source::read(&path, &[])?;
+        add_profile(Arc::new(profile), &mut sensors, &mut effectors)?;
+    }
+    add_all(source, &file.sensors, &mut sensors);
+    add_all(source, &file.effectors, &mut effectors);
+    Ok((sensors, effectors))
+}
+
 fn add_profile(
     source: Arc<Source>,
-    sensors: &mut BTreeMap<String, Located<SensorSection>>,
-    effectors: &mut BTreeMap<String, Located<EffectorSection>>,
+    sensors: &mut Sensors,
+    effectors: &mut Effectors,
 ) -> Result<(), InputError> {
     let file: ProfileFile = source.parse()?;
     if *file.format.get_ref() != sidestep_scenario::FORMAT {

@@ -64,7 +64,8 @@ pub enum RecoverError {
     },
     /// No joint values bring the connector there: a rod has a wrong length, or axes forbid it.
     #[error(
-        "connector {connector} is {distance_m:e} m from the nearest place its joints can bring it to"
+        "connector {connector} is {distance_m:.3} m from the nearest place to which its joints can bring it while the \
+         others are where they are"
     )]
     DoesNotFit {
         /// Index of the connector.

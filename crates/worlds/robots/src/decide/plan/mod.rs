@@ -184,14 +184,7 @@ fn notice(mood: &mut Mood, way: Way<'_>, percept: &Percept<'_>, draws: &mut Draw
         mood.bump_left = 0;
         mood.yield_pending = false;
     }
-    let (col, row) = percept.at;
-    let rise_back = moved.and_then(|d| way.field.rise(col, row, (d + 2) % 4));
-    mood.stuck = match rise_back {
-        _ if way.is_done && way.field.is_goal(col, row) => mood.stuck.saturating_sub(1),
-        Some(1) => mood.stuck.saturating_sub(2),
-        Some(-1) => mood.stuck.saturating_add(3),
-        _ => mood.stuck.saturating_add(1),
-    };
+    mood.stuck = progress(mood.stuck, way, percept.at, moved);
     if mood.stuck >= STUCK + mood.rank / 8 {
         mood.stuck = 0;
         if !way.is_done {
@@ -203,6 +196,17 @@ fn notice(mood: &mut Mood, way: Way<'_>, percept: &Percept<'_>, draws: &mut Draw
     if let Some(contact) = percept.contact.filter(|contact| contact.kind != WALL) {
         mood.bump = (percept.heading + contact.side as u8) % 4;
         mood.bump_left = BUMP;
+    }
+}
+
+/// Returns how stuck a robot is after a move in this direction: less, the nearer the goal it came.
+fn progress(stuck: u8, way: Way<'_>, (col, row): (u32, u32), moved: Option<u8>) -> u8 {
+    let rise_back = moved.and_then(|d| way.field.rise(col, row, (d + 2) % 4));
+    match rise_back {
+        _ if way.is_done && way.field.is_goal(col, row) => stuck.saturating_sub(1),
+        Some(1) => stuck.saturating_sub(2),
+        Some(-1) => stuck.saturating_add(3),
+        _ => stuck.saturating_add(1),
     }
 }
 

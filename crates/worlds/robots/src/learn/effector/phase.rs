@@ -23,8 +23,13 @@ pub struct Outcome {
 /// A number this close to a whole one counts as whole, because text files round.
 const WHOLE_TOLERANCE: f64 = 1e-6;
 
+/// Displacements beyond this number of boxes count as this one: no map is as large, and a log whose poses jump
+/// like that must not make numbers overflow.
+const FARTHEST: f64 = 1e9;
+
 /// Returns the two whole numbers around `x` and their probabilities; one alone where `x` is whole.
 pub fn average(x: f64) -> Vec<(i32, f64)> {
+    let x = x.clamp(-FARTHEST, FARTHEST);
     let whole = x.round();
     if (x - whole).abs() <= WHOLE_TOLERANCE {
         return vec![(whole as i32, 1.0)];
@@ -72,6 +77,14 @@ pub fn forward_class(ahead: i32, left: i32) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_displacement_beyond_all_maps_ends_at_the_farthest_box() {
+        for (x, end) in [(4.4e12, 1_000_000_000), (-2_147_483_647.5, -1_000_000_000)] {
+            assert_eq!(average(x), [(end, 1.0)]);
+            assert_eq!(outcomes(x, -x, 0.0)[0].0, Outcome { ahead: end, left: -end, quarters: 0 });
+        }
+    }
 
     #[test]
     fn a_displacement_is_shared_by_the_boxes_around_its_end() {

@@ -115,7 +115,7 @@ pub enum ArmReason {
     Blocked(Hit),
     /// The tip gets to the target, but no posture was found in which it is turned as asked.
     #[error(
-        "the tip gets there, but not turned as asked: the best of {starts} starts is {error_m:.6} m and {error_rad:.6} rad off"
+        "the tip can get there, but not turned as asked: the best of {starts} starts is {error_m:.6} m and {error_rad:.6} rad off"
     )]
     NotTurned {
         /// Postures that the search started from.

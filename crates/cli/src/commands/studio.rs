@@ -1,0 +1,116 @@
+//! `sidestep studio`: the server of the page that watches, steers and replays runs.
+
+use crate::console::Console;
+use crate::exit::{ExitCode, Failure};
+use crate::interrupt;
+use crate::plan::WorkersArg;
+use crate::worlds;
+use clap::Args;
+use serde_json::json;
+use sidestep_server::{Options, Studio};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+const EXAMPLES: &str = "\
+Examples:
+  sidestep studio                          choose from the current folder
+  sidestep studio scenarios/robots/office.toml
+  sidestep studio runs/office              replay a recorded run
+  sidestep studio scenarios --port 8000 --no-open
+  sidestep studio --addr 0.0.0.0           for others, who need its token
+
+The page may read what lies below the folders that are named, the folders of the files that are \
+named, or else the current folder. It writes nothing. Ctrl-C ends it.";
+
+/// The time between two looks at whether to end.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Watch, steer and replay runs in the browser.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct StudioArgs {
+    /// Scenarios, run folders and MCAP files to open, and folders to choose from
+    #[arg(value_name = "SCENARIO|DIR|FILE")]
+    named: Vec<PathBuf>,
+
+    /// Address to listen at; any but a loopback address asks for a token
+    #[arg(long, value_name = "HOST", default_value = "127.0.0.1")]
+    addr: String,
+
+    /// Port; 0 for any free one [default: the first free one from 7800 on]
+    #[arg(long, value_name = "N")]
+    port: Option<u16>,
+
+    /// Do not open the page in a browser
+    #[arg(long)]
+    no_open: bool,
+
+    /// Refuse scenario texts that are changed in the page
+    #[arg(long)]
+    read_only: bool,
+
+    #[command(flatten)]
+    workers: WorkersArg,
+}
+
+/// Runs the command until it is interrupted.
+///
+/// # Errors
+/// When something that is named is not there, or the port cannot be had.
+pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Failure> {
+    interrupt::listen()?;
+    let studio = Studio::start(Options {
+        worlds: worlds(),
+        program: format!("sidestep {}", sidestep_session::build()),
+        named: args.named.clone(),
+        host: args.addr.clone(),
+        port: args.port,
+        read_only: args.read_only,
+        workers: args.workers.count(),
+    })?;
+    let url = studio.url();
+    if studio.is_open_to_others() {
+        console.warn(
+            "others can reach this studio: whoever has its address with the token can run scenarios\n  \
+             and read what it may read; what is sent is not encrypted",
+        );
+    }
+    console.result_or_short(
+        &json!({ "url": url }),
+        || format!("{url}\n"),
+        || format!("The studio is at {url}\nCtrl-C ends it.\n"),
+    );
+    // The arguments of a process are there for all users of a machine to read, so no browser is given the token.
+    match (args.no_open, studio.is_open_to_others()) {
+        (true, _) => {}
+        (false, true) => console.note("Open the address yourself: it has the token in it."),
+        (false, false) => open(&url, console),
+    }
+    while !interrupt::requested() {
+        if studio.has_ended() {
+            let remedy = "please report it with the lines above";
+            return Err(Failure::stopped("the server has ended by itself, which is a bug", remedy));
+        }
+        std::thread::sleep(LOOK);
+    }
+    drop(studio);
+    Ok(ExitCode::Done)
+}
+
+/// Opens a page in the user's browser, if there is one.
+fn open(url: &str, console: Console) {
+    let (program, args): (&str, &[&str]) = match () {
+        () if cfg!(windows) => ("cmd", &["/c", "start", ""]),
+        () if cfg!(target_os = "macos") => ("open", &[]),
+        () => ("xdg-open", &[]),
+    };
+    let mut command = Command::new(program);
+    command.args(args).arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    let started = command.spawn();
+    match started {
+        // Its end is nobody's business, but must be waited for.
+        Ok(mut child) => drop(std::thread::spawn(move || child.wait())),
+        Err(_) => console.note("No browser could be started: open the address yourself."),
+    }
+}

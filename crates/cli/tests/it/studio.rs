@@ -1,0 +1,417 @@
+//! D1 for the studio: its digest is that of `run`; and nothing that a page sends ends a session or the process.
+
+use crate::support::{Ended, Place, signal, wait_for};
+use serde_json::{Value, json};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::Child;
+use std::time::{Duration, Instant};
+use tungstenite::client::IntoClientRequest;
+use tungstenite::{Message, WebSocket};
+
+/// The command while it runs.
+struct Studio {
+    child: Child,
+    url: String,
+}
+
+impl Studio {
+    fn start(place: &Place, args: &[&str]) -> Self {
+        let all = [&["studio", "--no-open", "--port", "0", "--quiet"], args].concat();
+        let mut child = place.start(&all);
+        let out = child.stdout.take().expect("its output");
+        let mut url = String::new();
+        BufReader::new(out).read_line(&mut url).expect("a line");
+        assert!(url.starts_with("http://"), "{url}");
+        Self { child, url: url.trim().into() }
+    }
+
+    /// Host and port.
+    fn host(&self) -> &str {
+        self.url.trim_start_matches("http://").split('/').next().expect("a host")
+    }
+
+    fn connect(&self) -> TcpStream {
+        let stream = TcpStream::connect(self.host()).expect("it listens");
+        stream.set_read_timeout(Some(Duration::from_secs(60))).expect("a time");
+        stream
+    }
+
+    /// Opens a socket, with further headers; or returns the status of the refusal.
+    fn socket(&self, headers: &[(&'static str, &str)]) -> Result<Page, u16> {
+        let address = format!("ws://{}/socket", self.host());
+        let mut request = address.into_client_request().expect("an address");
+        for (name, value) in headers {
+            request.headers_mut().insert(*name, value.parse().expect("a value"));
+        }
+        match tungstenite::client(request, self.connect()) {
+            Ok((socket, _)) => Ok(Page { socket, id: 0, notices: Vec::new(), frames: Vec::new() }),
+            Err(tungstenite::HandshakeError::Failure(tungstenite::Error::Http(answer))) => {
+                Err(answer.status().as_u16())
+            }
+            Err(other) => panic!("{other}"),
+        }
+    }
+
+    fn page(&self) -> Page {
+        let origin = format!("http://{}", self.host());
+        self.socket(&[("origin", &origin)]).expect("its own page")
+    }
+
+    /// Sends a request by hand; returns the answer.
+    fn http(&self, request: &str) -> String {
+        let mut stream = self.connect();
+        stream.write_all(request.replace('\n', "\r\n").as_bytes()).expect("sent");
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).expect("an answer");
+        answer
+    }
+
+    /// Ends it by a signal.
+    fn end(mut self, name: &str) -> Ended {
+        signal(&self.child, name);
+        let status = self.child.wait().expect("it ends");
+        let mut stderr = Vec::new();
+        self.child.stderr.take().expect("errors").read_to_end(&mut stderr).expect("read");
+        Ended(std::process::Output { status, stdout: Vec::new(), stderr })
+    }
+}
+
+impl Drop for Studio {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// A page that speaks with it.
+struct Page {
+    socket: WebSocket<TcpStream>,
+    id: u32,
+    notices: Vec<Value>,
+    frames: Vec<Vec<u8>>,
+}
+
+impl Page {
+    /// Waits for something that is no frame.
+    fn read(&mut self) -> Value {
+        loop {
+            match self.socket.read().expect("a message") {
+                Message::Text(text) => return serde_json::from_str(&text).expect("JSON"),
+                Message::Binary(bytes) => self.frames.push(bytes.into()),
+                Message::Ping(_) | Message::Pong(_) => {}
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+
+    fn send(&mut self, text: impl Into<String>) {
+        self.socket.send(Message::text(text.into())).expect("sent");
+    }
+
+    /// Asks and waits for the reply.
+    fn reply(&mut self, call: Value) -> Value {
+        self.id += 1;
+        let id = self.id;
+        self.send(json!({ "id": id, "call": call }).to_string());
+        self.wait_reply(id)
+    }
+
+    fn wait_reply(&mut self, id: u32) -> Value {
+        loop {
+            let value = self.read();
+            match value.get("id") {
+                Some(found) if *found == id => return value,
+                _ => self.notices.push(value),
+            }
+        }
+    }
+
+    fn ask(&mut self, call: Value) -> Value {
+        let reply = self.reply(call.clone());
+        assert!(reply.get("problem").is_none(), "{call}: {reply}");
+        reply["answer"].clone()
+    }
+
+    fn open(&mut self, path: &str) -> Value {
+        self.ask(
+            json!({ "do": "open", "what": { "kind": "scenario", "path": path }, "seed": null }),
+        )
+    }
+
+    fn last_over(&self, session: &Value) -> Option<Value> {
+        let is_it = |n: &&Value| n["notice"] == "status" && n["session"] == *session;
+        self.notices.iter().rfind(is_it).filter(|status| status["state"] == "over").cloned()
+    }
+
+    /// Waits until a session has come to its end; returns its status.
+    fn over(&mut self, session: &Value) -> Value {
+        loop {
+            if let Some(status) = self.last_over(session) {
+                return status;
+            }
+            let value = self.read();
+            self.notices.push(value);
+        }
+    }
+
+    /// Plays as fast as it goes, and takes all frames; returns the last status.
+    fn play_to_the_end(&mut self) -> Value {
+        self.ask(json!({ "do": "credit", "session": 1, "frames": 5 }));
+        self.ask(json!({ "do": "play", "session": 1, "speed": "fastest" }));
+        // What was told of an earlier end is over.
+        self.notices.retain(|notice| notice["notice"] != "status");
+        loop {
+            if let Some(status) = self.last_over(&json!(1)) {
+                return status;
+            }
+            let seen = self.frames.len();
+            let value = self.read();
+            self.notices.push(value);
+            let shown = self.frames.len() - seen;
+            self.ask(json!({ "do": "credit", "session": 1, "frames": shown }));
+        }
+    }
+}
+
+#[test]
+fn a_scenario_played_in_the_studio_comes_to_the_digest_of_run() {
+    let place = Place::new();
+    let digest = place.json(&["run", "s.toml"])["digest"].clone();
+    let studio = Studio::start(&place, &["s.toml", "--workers", "2"]);
+    let mut page = studio.page();
+    let hello = page.read();
+    assert_eq!((&hello["notice"], &hello["version"]), (&"hello".into(), &1.into()));
+    assert_eq!(hello["open"], json!([{ "kind": "scenario", "path": "s.toml" }]));
+    let listed = page.ask(json!({ "do": "files", "folder": "." }));
+    assert_eq!(listed["entries"][0]["about"], "robots: small");
+    let opened = page.open("s.toml");
+    assert_eq!((&opened["session"], &opened["scene"]["dimensions"]), (&1.into(), &2.into()));
+    let over = page.play_to_the_end();
+    assert_eq!((&over["digest"], &over["cycle"]), (&digest, &3000.0.into()));
+    assert!(!page.frames.is_empty() && page.frames.iter().all(|frame| frame.starts_with(b"SSTF")));
+    assert_eq!(page.notices.iter().filter(|notice| notice["notice"] == "cast").count(), 1);
+    page.ask(json!({ "do": "seek", "session": 1, "cycle": 10 }));
+    assert_eq!(page.play_to_the_end()["digest"], digest, "and again from an earlier cycle");
+}
+
+#[test]
+fn noise_is_answered_with_problems_and_the_session_goes_on() {
+    let place = Place::new();
+    let studio = Studio::start(&place, &["s.toml"]);
+    let mut page = studio.page();
+    page.open("s.toml");
+    let deep = "[".repeat(100_000);
+    for noise in ["", "{", "null", "[]", "\u{0}", "{\"id\":1}", &deep] {
+        page.send(noise);
+        assert!(
+            page.wait_reply(if noise.len() == 8 { 1 } else { 0 })["problem"].is_object(),
+            "{noise:.20}"
+        );
+    }
+    page.socket.send(Message::binary(vec![0xff; 1000])).expect("sent");
+    assert!(page.wait_reply(0)["problem"].is_object());
+    page.send(" ".repeat(20_000_000));
+    assert!(page.wait_reply(0)["problem"]["cause"].as_str().is_some_and(|c| c.contains("bytes")));
+    for call in [
+        json!({ "do": "play", "session": 77, "speed": "fastest" }),
+        json!({ "do": "close", "session": 77 }),
+        json!({ "do": "check", "session": 77, "text": "" }),
+        json!({ "do": "files", "folder": "/" }),
+        json!({ "do": "open", "what": { "kind": "recording", "path": "s.toml" }, "seed": null }),
+        json!({ "do": "open", "what": { "kind": "new", "world": "mars" }, "seed": null }),
+    ] {
+        assert!(page.reply(call.clone())["problem"].is_object(), "{call}");
+    }
+    for _ in 0..1000 {
+        page.send("noise");
+    }
+    (0..1000).for_each(|_| drop(page.wait_reply(0)));
+    page.ask(json!({ "do": "step", "session": 1, "cycles": 3 }));
+    // A page that breaks off in the middle of a word harms nobody else.
+    let mut other = studio.page();
+    other.open("s.toml");
+    other.socket.get_mut().write_all(&[0x81, 0xfe, 0xff]).expect("sent");
+    drop(other);
+    assert_eq!(page.play_to_the_end()["cycle"], 3000.0);
+}
+
+#[test]
+fn a_page_has_so_many_sessions_and_closes_them_one_by_one() {
+    let place = Place::new();
+    let studio = Studio::start(&place, &[]);
+    let mut page = studio.page();
+    let numbers: Vec<Value> = (0..4).map(|_| page.open("s.toml")["session"].clone()).collect();
+    assert_eq!(numbers, [1, 2, 3, 4]);
+    let open = json!({ "do": "open", "what": { "kind": "scenario", "path": "s.toml" }, "seed": 7 });
+    assert!(page.reply(open.clone())["problem"].is_object());
+    page.ask(json!({ "do": "close", "session": 2 }));
+    assert_eq!(page.ask(open)["status"]["seed"], "7");
+    // Sessions belong to their socket.
+    let mut other = studio.page();
+    assert!(other.reply(json!({ "do": "pause", "session": 1 }))["problem"].is_object());
+}
+
+#[test]
+fn a_page_that_reads_nothing_for_a_while_does_not_stop_the_run() {
+    let place = Place::new();
+    let studio = Studio::start(&place, &["s.toml"]);
+    let mut page = studio.page();
+    let text = place.read("s.toml").replace("cycles = 3000", "cycles = 100000000");
+    page.open("s.toml");
+    page.ask(json!({ "do": "restart", "session": 1, "seed": null, "text": text }));
+    page.ask(json!({ "do": "credit", "session": 1, "frames": 1000 }));
+    page.ask(json!({ "do": "play", "session": 1, "speed": "fastest" }));
+    std::thread::sleep(Duration::from_secs(2));
+    let before = page.frames.len();
+    page.ask(json!({ "do": "pause", "session": 1 }));
+    let cycle = |frame: &Vec<u8>| f64::from_le_bytes(*frame[16..].first_chunk().expect("a cycle"));
+    assert!(page.frames.len() > before && page.frames.last().map(cycle) > Some(1000.0));
+}
+
+#[test]
+fn a_studio_that_only_reads_takes_no_text() {
+    let place = Place::new();
+    let studio = Studio::start(&place, &["s.toml", "--read-only"]);
+    let mut page = studio.page();
+    assert_eq!(page.read()["read_only"], true);
+    page.open("s.toml");
+    let source = page.ask(json!({ "do": "source", "session": 1 }));
+    assert_eq!(source["read_only"], true);
+    for call in ["restart", "check"] {
+        let mut call = json!({ "do": call, "session": 1, "text": source["text"] });
+        if call["do"] == "restart" {
+            call["seed"] = Value::Null;
+        }
+        let remedy = page.reply(call)["problem"]["remedy"].clone();
+        assert!(remedy.as_str().is_some_and(|remedy| remedy.contains("--read-only")), "{remedy}");
+    }
+    page.ask(json!({ "do": "restart", "session": 1, "seed": 8, "text": null }));
+}
+
+#[test]
+fn only_its_own_page_may_ask() {
+    let place = Place::new();
+    let studio = Studio::start(&place, &[]);
+    let status = |headers: &[_]| studio.socket(headers).err();
+    assert_eq!(status(&[("origin", "http://evil.example")]), Some(403));
+    assert_eq!(status(&[("host", "evil.example")]), Some(421));
+    assert_eq!(status(&[]), None, "a program that is no browser");
+    let get = |host: &str, path: &str| {
+        studio.http(&format!("GET {path} HTTP/1.1\nHost: {host}\nConnection: close\n\n"))
+    };
+    assert!(get("evil.example", "/").starts_with("HTTP/1.1 421"));
+    let answer = get(studio.host(), "/");
+    assert!(
+        answer.starts_with("HTTP/1.1 200") && answer.contains("default-src 'self'"),
+        "{answer}"
+    );
+    for path in ["/../../s.toml", "/s.toml", "/%2e%2e/s.toml", "//etc/passwd.txt"] {
+        assert!(get(studio.host(), path).starts_with("HTTP/1.1 404"), "{path}");
+    }
+}
+
+#[test]
+fn a_studio_that_others_can_reach_asks_for_its_token() {
+    let place = Place::new();
+    let studio = Studio::start(&place, &["--addr", "0.0.0.0"]);
+    let token = studio.url.split("#token=").nth(1).expect("a token").to_string();
+    assert_eq!(token.len(), 32);
+    assert_eq!(studio.socket(&[]).err(), Some(401));
+    let enter = |token: &str| {
+        let (host, bytes) = (studio.host(), token.len());
+        let head = format!(
+            "POST /enter HTTP/1.1\nHost: {host}\nConnection: close\nContent-Length: {bytes}"
+        );
+        studio.http(&format!("{head}\n\n{token}"))
+    };
+    assert!(enter(&token[1..]).starts_with("HTTP/1.1 401"));
+    assert!(enter(&"x".repeat(1000)).starts_with("HTTP/1.1 413"));
+    let entered = enter(&token);
+    assert!(
+        entered.starts_with("HTTP/1.1 204") && entered.contains("HttpOnly; SameSite=Strict"),
+        "{entered}"
+    );
+    let cookie = entered.split("set-cookie: ").nth(1).and_then(|rest| rest.split(';').next());
+    assert_eq!(studio.socket(&[("cookie", cookie.expect("a cookie"))]).err(), None);
+    let said = studio.end("INT").err();
+    assert!(said.contains("warning: others can reach"), "{said}");
+}
+
+#[test]
+fn what_cannot_be_served_is_wrong_input() {
+    let place = Place::new();
+    let studio = Studio::start(&place, &[]);
+    let port = studio.host().split(':').nth(1).expect("a port");
+    let ended = place.run(&["studio", "--no-open", "--port", port]);
+    assert_eq!((ended.code(), ended.out().as_str()), (2, ""));
+    assert!(
+        ended.err().contains("the port is in use") && ended.err().contains("--port "),
+        "{}",
+        ended.err()
+    );
+    for args in [&["nowhere.toml"][..], &["--addr", "192.0.2.1"]] {
+        let ended = place.run(&[&["studio", "--no-open"], args].concat());
+        assert_eq!(ended.code(), 2, "{}", ended.err());
+        assert!(ended.err().contains("help:"), "{}", ended.err());
+    }
+}
+
+#[test]
+fn signals_end_all_sessions_and_the_process() {
+    for name in ["INT", "TERM", "HUP"] {
+        let place = Place::new();
+        let studio = Studio::start(&place, &["s.toml"]);
+        let mut page = studio.page();
+        page.open("s.toml");
+        page.ask(json!({ "do": "play", "session": 1, "speed": { "times": 0.1 } }));
+        let started = Instant::now();
+        let ended = studio.end(name);
+        assert_eq!(ended.code(), 0, "{name}: {}", ended.err());
+        assert!(started.elapsed() < Duration::from_secs(20));
+    }
+}
+
+#[test]
+fn a_page_finds_the_studio_again_after_it_was_killed_and_started_anew() {
+    let place = Place::new();
+    let mut studio = Studio::start(&place, &["s.toml"]);
+    let port = studio.host().split(':').nth(1).expect("a port").to_string();
+    studio.page().open("s.toml");
+    studio.child.kill().expect("killed");
+    studio.child.wait().expect("ended");
+    let again = || place.start(&["studio", "--no-open", "--quiet", "--port", &port, "s.toml"]);
+    let mut child = again();
+    wait_for("the port", || TcpStream::connect(studio.host()).is_ok());
+    studio.page().open("s.toml");
+    child.kill().expect("killed");
+    child.wait().expect("ended");
+}
+
+#[test]
+fn recordings_are_replayed_and_a_damaged_one_is_a_problem() {
+    let place = Place::new();
+    let recorded =
+        place.json(&["run", "s.toml", "--out", "r", "--mcap", "x.mcap", "--mcap-every", "100"]);
+    let bytes = std::fs::read(place.path("x.mcap")).expect("read");
+    place.write("cut.mcap", &bytes[..bytes.len() / 2]);
+    let studio = Studio::start(&place, &["r", "x.mcap", "cut.mcap"]);
+    let mut page = studio.page();
+    let kinds: Vec<Value> =
+        page.read()["open"].as_array().expect("a list").iter().map(|o| o["kind"].clone()).collect();
+    assert_eq!(kinds, ["recording"; 3]);
+    let open =
+        |path| json!({ "do": "open", "what": { "kind": "recording", "path": path }, "seed": null });
+    let problem = page.reply(open("cut.mcap"))["problem"].clone();
+    assert!(
+        !problem["cause"].as_str().expect("a cause").is_empty()
+            && !problem["remedy"].as_str().expect("a remedy").is_empty()
+    );
+    for path in ["r", "x.mcap"] {
+        let session = page.ask(open(path))["session"].clone();
+        page.ask(json!({ "do": "seek", "session": session, "cycle": 3000 }));
+        let last = page.over(&session);
+        assert_eq!(last["digest"], recorded["digest"]);
+        assert!(last["banner"].as_str().is_some_and(|b| b.contains("the recorded one")), "{last}");
+    }
+}

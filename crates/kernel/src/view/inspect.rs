@@ -1,0 +1,319 @@
+//! What a body perceives and decides, and what comes of it: facts for a panel, and marks for the scene.
+
+use super::body::Who;
+use super::pose::Place;
+use crate::units::Cycle;
+use serde::Serialize;
+
+/// What a body perceives and decides in a cycle, and what will come of it. It names no world.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Inspection {
+    /// The body.
+    pub who: Who,
+    /// The cycle that is about to run.
+    pub cycle: Cycle,
+    /// What people call the body.
+    pub title: String,
+    /// What is known of it, by topic.
+    pub sections: Vec<Section>,
+    /// What to draw over the scene.
+    pub marks: Vec<Mark>,
+}
+
+/// Facts about one topic.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Section {
+    /// The topic.
+    pub title: String,
+    /// Single facts.
+    pub facts: Vec<Fact>,
+    /// Facts of the same kind about several things.
+    pub table: Option<Table>,
+}
+
+/// A fact.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Fact {
+    /// The question that it answers.
+    pub label: String,
+    /// The answer.
+    pub value: Value,
+}
+
+/// The value of a fact.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Value {
+    /// A number.
+    Number {
+        /// The number itself.
+        value: f64,
+        /// Its unit; empty for plain numbers.
+        unit: &'static str,
+    },
+    /// A share or probability, from 0 to 1.
+    Share(f64),
+    /// Words.
+    Text(String),
+    /// A body.
+    Who(Who),
+    /// A place in meters.
+    Place(Place),
+    /// Whether it is so.
+    Yes(bool),
+    /// Nothing, or not known.
+    None,
+}
+
+/// Facts of the same kind about several things.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Table {
+    /// Heads of the columns.
+    pub columns: Vec<String>,
+    /// A value for each column, by row.
+    pub rows: Vec<Vec<Value>>,
+}
+
+/// Something to draw over the scene.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Mark {
+    /// Its part in what is told.
+    pub role: Role,
+    /// Words for it.
+    pub label: String,
+    /// From 0 to 1: how likely, how strong; 1 where that means nothing.
+    pub weight: f64,
+    /// What is drawn.
+    pub shape: MarkShape,
+}
+
+/// The part of a mark in what is told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// What is there to be perceived.
+    True,
+    /// What is perceived.
+    Reported,
+    /// What the body wants.
+    Wish,
+    /// What it will have done.
+    Done,
+    /// What stands against it, or is not done.
+    Refused,
+    /// What it claims for its action.
+    Claim,
+    /// The others with which it is in conflict.
+    Group,
+    /// What may come.
+    Predicted,
+    /// What was chosen of that.
+    Chosen,
+    /// What it knows of others.
+    Known,
+    /// What it can always fall back to.
+    Orbit,
+    /// Where it wants to get.
+    Target,
+}
+
+/// The shape of a mark, in meters.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "type", rename_all = "lowercase")]
+pub enum MarkShape {
+    /// A polyline.
+    Line {
+        /// Its points.
+        points_m: Vec<Place>,
+    },
+    /// A polygon.
+    Area {
+        /// Its corners, counterclockwise.
+        corners_m: Vec<Place>,
+    },
+    /// A point.
+    Point {
+        /// Its place.
+        at_m: Place,
+    },
+    /// A level circle.
+    Circle {
+        /// Its center.
+        at_m: Place,
+        /// Its radius.
+        radius_m: f64,
+    },
+}
+
+impl Inspection {
+    /// Creates an inspection that tells nothing yet.
+    pub fn new(who: Who, cycle: Cycle, title: impl Into<String>) -> Self {
+        Self { who, cycle, title: title.into(), sections: Vec::new(), marks: Vec::new() }
+    }
+
+    /// Adds a section, unless it is empty.
+    pub fn tell(&mut self, section: Section) {
+        if !section.facts.is_empty() || section.table.is_some() {
+            self.sections.push(section);
+        }
+    }
+
+    /// Adds a mark that is as strong as can be.
+    pub fn mark(&mut self, role: Role, label: impl Into<String>, shape: MarkShape) {
+        self.weigh(role, label, 1.0, shape);
+    }
+
+    /// Adds a mark with a weight, which is kept between 0 and 1.
+    pub fn weigh(&mut self, role: Role, label: impl Into<String>, weight: f64, shape: MarkShape) {
+        self.marks.push(Mark { role, label: label.into(), weight: weight.clamp(0.0, 1.0), shape });
+    }
+
+    /// Returns the section with a title.
+    pub fn section(&self, title: &str) -> Option<&Section> {
+        self.sections.iter().find(|section| section.title == title)
+    }
+
+    /// Returns the value of a fact, by the titles of its section and itself.
+    pub fn value(&self, section: &str, label: &str) -> Option<&Value> {
+        let fact = self.section(section)?.facts.iter().find(|fact| fact.label == label)?;
+        Some(&fact.value)
+    }
+
+    /// Returns all marks in a role.
+    pub fn marks_of(&self, role: Role) -> impl Iterator<Item = &Mark> {
+        self.marks.iter().filter(move |mark| mark.role == role)
+    }
+}
+
+impl Section {
+    /// Creates a section without facts.
+    pub fn new(title: impl Into<String>) -> Self {
+        Self { title: title.into(), facts: Vec::new(), table: None }
+    }
+
+    /// Adds a fact.
+    #[must_use]
+    pub fn fact(mut self, label: impl Into<String>, value: impl Into<Value>) -> Self {
+        self.facts.push(Fact { label: label.into(), value: value.into() });
+        self
+    }
+
+    /// Adds a fact where there is one.
+    #[must_use]
+    pub fn fact_if(self, label: &str, value: Option<impl Into<Value>>) -> Self {
+        match value {
+            Some(value) => self.fact(label, value),
+            None => self,
+        }
+    }
+
+    /// Adds a table, unless it has no rows.
+    #[must_use]
+    pub fn table(self, table: Table) -> Self {
+        Self { table: (!table.rows.is_empty()).then_some(table), ..self }
+    }
+}
+
+impl Table {
+    /// Creates a table without rows.
+    pub fn new<const N: usize>(columns: [&str; N]) -> Self {
+        Self { columns: columns.map(String::from).to_vec(), rows: Vec::new() }
+    }
+
+    /// Adds a row, which must have a value for each column.
+    pub fn row<const N: usize>(&mut self, values: [Value; N]) {
+        assert_eq!(N, self.columns.len(), "a value for each column");
+        self.rows.push(values.into());
+    }
+
+    /// Returns the values of a column, by its head.
+    pub fn column(&self, head: &str) -> Option<impl Iterator<Item = &Value>> {
+        let k = self.columns.iter().position(|column| column == head)?;
+        Some(self.rows.iter().map(move |row| &row[k]))
+    }
+}
+
+impl Value {
+    /// Creates a number with a unit.
+    pub fn number(value: f64, unit: &'static str) -> Self {
+        Self::Number { value, unit }
+    }
+
+    /// Creates a number of meters; infinity is none.
+    pub fn meters(value: f64) -> Self {
+        if value.is_finite() { Self::number(value, "m") } else { Self::None }
+    }
+
+    /// Creates a number of degrees from radians.
+    pub fn degrees(value_rad: f64) -> Self {
+        Self::number(value_rad.to_degrees(), "°")
+    }
+
+    /// Creates a number of things.
+    pub fn count(value: impl TryInto<u32>) -> Self {
+        Self::number(f64::from(value.try_into().unwrap_or(u32::MAX)), "")
+    }
+
+    /// Creates words.
+    pub fn text(words: impl Into<String>) -> Self {
+        Self::Text(words.into())
+    }
+}
+
+impl From<&str> for Value {
+    fn from(words: &str) -> Self {
+        Self::Text(words.into())
+    }
+}
+
+impl From<String> for Value {
+    fn from(words: String) -> Self {
+        Self::Text(words)
+    }
+}
+
+impl From<Who> for Value {
+    fn from(who: Who) -> Self {
+        Self::Who(who)
+    }
+}
+
+impl From<Place> for Value {
+    fn from(at_m: Place) -> Self {
+        Self::Place(at_m)
+    }
+}
+
+impl From<bool> for Value {
+    fn from(is_so: bool) -> Self {
+        Self::Yes(is_so)
+    }
+}
+
+impl<T: Into<Self>> From<Option<T>> for Value {
+    fn from(value: Option<T>) -> Self {
+        value.map_or(Self::None, Into::into)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Kind;
+    use super::*;
+
+    #[test]
+    fn what_was_told_is_found_again_and_empty_sections_are_left_out() {
+        let who = (Kind::Robot, 3, None);
+        let mut told = Inspection::new(who, 7, "robot 3");
+        told.tell(Section::new("nothing").table(Table::new(["a"])));
+        let mut table = Table::new(["other", "apart"]);
+        table.row([who.into(), Value::meters(f64::INFINITY)]);
+        told.tell(Section::new("sees").fact("heading", Value::degrees(0.0)).table(table));
+        told.weigh(Role::Wish, "on", 1.5, MarkShape::Point { at_m: [0.0; 3] });
+        assert_eq!(told.sections.len(), 1);
+        assert_eq!(told.value("sees", "heading"), Some(&Value::number(0.0, "°")));
+        let table = told.section("sees").and_then(|s| s.table.as_ref()).unwrap();
+        assert_eq!(table.column("apart").unwrap().collect::<Vec<_>>(), [&Value::None]);
+        assert_eq!(told.marks_of(Role::Wish).map(|m| m.weight).collect::<Vec<_>>(), [1.0]);
+    }
+}

@@ -1,0 +1,136 @@
+//! The events of a session, each kept once, however often its cycle is computed.
+
+use crate::encode::event;
+use crate::protocol::{Answer, Event};
+use sidestep::kernel::Cycle;
+use sidestep::kernel::view::{Entry, Frame};
+
+/// The number of events that are kept; further ones are counted.
+const MOST_EVENTS: usize = 100_000;
+/// Events that are not kept are counted for so many cycles together.
+const LOST_TOGETHER: Cycle = 1024;
+/// The number of events that a frame holds, the last ones.
+const MOST_IN_FRAME: usize = 100;
+
+/// The events of one run.
+#[derive(Debug, Default)]
+pub(crate) struct Chronicle {
+    /// As the kernel tells them: most are never asked for, and those that are get their words then.
+    kept: Vec<Entry>,
+    /// The cycle from which on nothing was computed yet.
+    frontier: Cycle,
+    /// How many were not kept, about when.
+    lost: Vec<(Cycle, u64)>,
+    /// Those since the last frame that was sent.
+    fresh: Vec<Entry>,
+    fresh_left_out: u64,
+}
+
+impl Chronicle {
+    /// Takes over what happened before a frame.
+    pub(crate) fn note(&mut self, frame: &mut Frame) {
+        self.freshen(&frame.log, frame.log_left_out);
+        self.note_ahead(frame);
+    }
+
+    /// Takes over what happened before a frame that nobody watches.
+    pub(crate) fn note_ahead(&mut self, frame: &mut Frame) {
+        let mut log = std::mem::take(&mut frame.log);
+        if frame.cycle <= self.frontier {
+            return;
+        }
+        let known = log.partition_point(|entry| entry.cycle < self.frontier);
+        let room = MOST_EVENTS.saturating_sub(self.kept.len());
+        let lost = (log.len() - known).saturating_sub(room) as u64 + frame.log_left_out;
+        self.kept.extend(log.drain(known..).take(room));
+        self.lose(frame.cycle - 1, lost);
+        self.frontier = frame.cycle;
+    }
+
+    fn lose(&mut self, cycle: Cycle, lost: u64) {
+        match self.lost.last_mut() {
+            _ if lost == 0 => {}
+            Some((last, count)) if *last / LOST_TOGETHER == cycle / LOST_TOGETHER => *count += lost,
+            _ => self.lost.push((cycle, lost)),
+        }
+    }
+
+    /// Returns the cycle up to which all is known.
+    pub(crate) fn frontier(&self) -> Cycle {
+        self.frontier
+    }
+
+    /// Keeps the last ones for the next frame that is sent.
+    fn freshen(&mut self, log: &[Entry], left_out: u64) {
+        let last = &log[log.len().saturating_sub(MOST_IN_FRAME)..];
+        let too_many = (self.fresh.len() + last.len()).saturating_sub(MOST_IN_FRAME);
+        self.fresh.drain(..too_many);
+        self.fresh.extend_from_slice(last);
+        self.fresh_left_out += left_out + (log.len() - last.len() + too_many) as u64;
+    }
+
+    /// Takes the last events since the last call, and the number of those that are not among them.
+    pub(crate) fn take_fresh(&mut self) -> (Vec<Event>, u64) {
+        let events = self.fresh.drain(..).map(|entry| event(&entry)).collect();
+        (events, std::mem::take(&mut self.fresh_left_out))
+    }
+
+    /// Returns at most so many of the events of some cycles.
+    pub(crate) fn answer(&self, from: Cycle, until: Cycle, most: u32) -> Answer {
+        let start = self.kept.partition_point(|entry| entry.cycle < from);
+        let end = self.kept.partition_point(|entry| entry.cycle < until).max(start);
+        let entries: Vec<Event> =
+            self.kept[start..end].iter().take(most as usize).map(event).collect();
+        let lost = self.lost.iter().filter(|(cycle, _)| (from..until).contains(cycle));
+        let lost: u64 = lost.map(|(_, count)| count).sum();
+        let left_out = (end - start - entries.len()) as u64 + lost;
+        Answer::Events { entries, left_out, known_until: self.frontier as f64 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep::kernel::view::{Entry, Happening, Kind, Level};
+
+    fn frame(cycle: Cycle, happened: &[Cycle]) -> Frame {
+        let entry = |&cycle: &Cycle| {
+            let (kind, who) = (Happening::Contact, (Kind::Robot, 3, None));
+            let (with, at_m, value, words) = (None, None, None, format!("at {cycle}"));
+            Entry { cycle, level: Level::Info, kind, who, with, at_m, value, words }
+        };
+        Frame { cycle, log: happened.iter().map(entry).collect(), ..Frame::default() }
+    }
+
+    fn cycles(answer: &Answer) -> (Vec<f64>, u64) {
+        let Answer::Events { entries, left_out, .. } = answer else { panic!("no events") };
+        (entries.iter().map(|event| event.cycle).collect(), *left_out)
+    }
+
+    #[test]
+    fn what_is_computed_again_is_not_told_twice() {
+        let mut chronicle = Chronicle::default();
+        chronicle.note(&mut frame(10, &[1, 5, 9]));
+        chronicle.note(&mut frame(6, &[5]));
+        chronicle.note(&mut frame(14, &[9, 10, 12]));
+        assert_eq!(cycles(&chronicle.answer(0, 99, 99)), (vec![1.0, 5.0, 9.0, 10.0, 12.0], 0));
+        assert_eq!(cycles(&chronicle.answer(5, 12, 99)), (vec![5.0, 9.0, 10.0], 0));
+        assert_eq!(cycles(&chronicle.answer(0, 99, 2)), (vec![1.0, 5.0], 3));
+        assert_eq!(cycles(&chronicle.answer(9, 3, 2)), (vec![], 0));
+        assert_eq!(chronicle.take_fresh().0.len(), 7, "a frame shows what led to it");
+        assert_eq!(chronicle.take_fresh().0.len(), 0);
+    }
+
+    #[test]
+    fn frames_and_memory_hold_so_many_and_the_rest_is_counted() {
+        let mut chronicle = Chronicle::default();
+        let happened: Vec<Cycle> = vec![3; MOST_EVENTS + 7];
+        chronicle.note(&mut Frame { log_left_out: 2, ..frame(4, &happened) });
+        let (shown, left_out) = chronicle.take_fresh();
+        assert_eq!(
+            (shown.len(), left_out),
+            (MOST_IN_FRAME, (MOST_EVENTS + 7 - MOST_IN_FRAME + 2) as u64)
+        );
+        assert_eq!(cycles(&chronicle.answer(0, 9, u32::MAX)).1, 9);
+    }
+}

@@ -1,0 +1,150 @@
+//! Frames as bytes, and what is told beside them. The layout is in [`protocol`](crate::protocol).
+
+mod cast;
+mod plain;
+
+pub(crate) use plain::{body, event, problem, scan, scene, who};
+
+use crate::protocol::{Cast, FrameText, SessionId, VERSION};
+use cast::Troupe;
+use sidestep::kernel::view::{Body, Condition, Frame, Kind, Pose, Scenery, Shape};
+use std::collections::BTreeMap;
+
+/// First bytes of a frame.
+const MAGIC: u32 = 0x4654_5353;
+/// Bytes before the first column.
+const HEADER_BYTES: usize = 56;
+
+/// Makes the frames of a session, and a cast whenever the bodies are no longer those of the last one.
+pub struct Encoder {
+    session: SessionId,
+    dimensions: u8,
+    names: BTreeMap<(Kind, u32), String>,
+    troupe: Option<Troupe>,
+    casts: u32,
+}
+
+impl Encoder {
+    /// Creates an encoder for a run with this scenery.
+    pub fn new(session: SessionId, scenery: &Scenery) -> Self {
+        let names = BTreeMap::new();
+        let mut encoder = Self { session, dimensions: 2, names, troupe: None, casts: 0 };
+        encoder.restart(scenery);
+        encoder
+    }
+
+    /// Goes over to another run; casts are counted on.
+    pub fn restart(&mut self, scenery: &Scenery) {
+        let named = |(kind, number, name): &(Kind, u32, String)| ((*kind, *number), name.clone());
+        self.names = scenery.names.iter().map(named).collect();
+        self.dimensions = scenery.dimensions;
+        self.troupe = None;
+    }
+
+    /// Returns a frame as bytes, and the cast that it begins, if it begins one.
+    pub fn encode(
+        &mut self,
+        frame: &Frame,
+        text: &FrameText,
+        left_out: u32,
+    ) -> (Option<Cast>, Vec<u8>) {
+        let is_new = !self.troupe.as_ref().is_some_and(|troupe| troupe.is_of(&frame.bodies));
+        if is_new {
+            self.casts += 1;
+            self.troupe = Some(Troupe::of(&frame.bodies, self.dimensions));
+        }
+        let cast = self
+            .troupe
+            .as_ref()
+            .filter(|_| is_new)
+            .map(|troupe| troupe.cast(self.session, self.casts, &frame.bodies, &self.names));
+        // Text of numbers and strings: nothing in it can fail.
+        let text = serde_json::to_vec(text).unwrap_or_default();
+        (cast, self.bytes(frame, &text, left_out))
+    }
+
+    fn bytes(&self, frame: &Frame, text: &[u8], left_out: u32) -> Vec<u8> {
+        let bodies = &frame.bodies;
+        let lines: Vec<&[[f64; 3]]> = bodies.iter().filter_map(points).collect();
+        let count: usize = lines.iter().map(|points| points.len()).sum();
+        let d = usize::from(self.dimensions);
+        let floats = (d + if d == 2 { 1 } else { 4 }) * bodies.len() + d * count;
+        let flags = bodies.len().next_multiple_of(4);
+        let size = HEADER_BYTES + 4 * (floats + lines.len() + 1) + flags + text.len();
+        let mut out = Vec::with_capacity(size);
+        let counts = [bodies.len(), lines.len(), count, text.len()];
+        self.header(&mut out, frame, counts.map(|n| n as u32), left_out);
+        put(&mut out, bodies.iter().flat_map(|body| body.pose.at_m.into_iter().take(d)));
+        match d {
+            2 => put(&mut out, bodies.iter().map(|body| heading_rad(&body.pose))),
+            _ => put(&mut out, bodies.iter().flat_map(|body| body.pose.turn)),
+        }
+        put_starts(&mut out, &lines);
+        put(
+            &mut out,
+            lines.iter().copied().flatten().flat_map(|at_m| at_m.iter().copied().take(d)),
+        );
+        out.extend(bodies.iter().map(|body| code(body.state)));
+        out.resize(out.len() + flags - bodies.len(), 0);
+        out.extend_from_slice(text);
+        debug_assert_eq!(out.len(), size);
+        out
+    }
+
+    fn header(&self, out: &mut Vec<u8>, frame: &Frame, counts: [u32; 4], left_out: u32) {
+        out.extend(MAGIC.to_le_bytes());
+        out.extend((VERSION as u16).to_le_bytes());
+        out.extend([self.dimensions, 0]);
+        out.extend(self.session.to_le_bytes());
+        out.extend(self.casts.to_le_bytes());
+        out.extend((frame.cycle as f64).to_le_bytes());
+        out.extend(frame.time_s.to_le_bytes());
+        counts.iter().chain(&[left_out, 0]).for_each(|n| out.extend(n.to_le_bytes()));
+    }
+}
+
+/// Returns the points of a body that is a line.
+fn points(body: &Body) -> Option<&[[f64; 3]]> {
+    match &body.shape {
+        Shape::Line { points_m, .. } => Some(points_m),
+        _ => None,
+    }
+}
+
+/// Writes a column of numbers.
+fn put(out: &mut Vec<u8>, numbers: impl Iterator<Item = f64>) {
+    numbers.for_each(|number| out.extend_from_slice(&(number as f32).to_le_bytes()));
+}
+
+/// Writes the number of the first point of each line, and of the one behind the last.
+fn put_starts(out: &mut Vec<u8>, lines: &[&[[f64; 3]]]) {
+    let mut start = 0_u32;
+    out.extend(start.to_le_bytes());
+    for points in lines {
+        start += points.len() as u32;
+        out.extend(start.to_le_bytes());
+    }
+}
+
+/// Returns the heading of a body that is turned about the vertical axis alone.
+fn heading_rad(pose: &Pose) -> f64 {
+    let [_, _, z, w] = pose.turn;
+    f64::from(2.0 * (z as f32).atan2(w as f32))
+}
+
+fn code(condition: Condition) -> u8 {
+    match condition {
+        Condition::Plain => 0,
+        Condition::Leading => 1,
+        Condition::Open => 2,
+        Condition::Touching => 3,
+        Condition::Failed => 4,
+    }
+}
+
+/// The conditions of a body, by their codes.
+const CONDITIONS: [Condition; 5] =
+    [Condition::Plain, Condition::Leading, Condition::Open, Condition::Touching, Condition::Failed];
+
+#[cfg(test)]
+mod tests;

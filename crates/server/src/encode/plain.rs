@@ -1,0 +1,127 @@
+//! What the kernel shows, in the words of the protocol.
+
+use crate::protocol::{Event, Floor, Look, Problem, Scan, Scene, Shape, StillBody, Who};
+use sidestep::kernel::view::{self, Body, Entry, Level, Occupancy, Scenery};
+use sidestep::kernel::{InputError, Simulation};
+
+/// Returns what stays as it is.
+pub(crate) fn scene(run: &dyn Simulation, scenery: &Scenery, is_recording: bool) -> Scene {
+    let still = |body: &Body| still_body(body, scenery);
+    Scene {
+        name: scenery.name.clone(),
+        world: run.world().into(),
+        agent: run.agent().into(),
+        dimensions: scenery.dimensions,
+        cycle_s: scenery.cycle_s,
+        floor: scenery.floor.as_ref().map(floor),
+        bodies: scenery.bodies.iter().map(still).collect(),
+        is_recording,
+    }
+}
+
+fn still_body(body: &Body, scenery: &Scenery) -> StillBody {
+    let own = |(kind, number, _): &&(_, u32, String)| (*kind, *number) == (body.kind, body.number);
+    StillBody {
+        who: who(&body.who()),
+        name: scenery.names.iter().find(own).map(|(_, _, name)| name.clone()),
+        at_m: body.pose.at_m,
+        turn: body.pose.turn,
+        shape: shape(&body.shape),
+        look: look(body, scenery.dimensions),
+    }
+}
+
+fn floor(floor: &view::Floor) -> Floor {
+    let mut runs: Vec<u32> = Vec::new();
+    for occupancy in &floor.boxes {
+        let code = match occupancy {
+            Occupancy::Free => 0,
+            Occupancy::Wall => 1,
+            Occupancy::Unknown => 2,
+        };
+        match runs.as_mut_slice() {
+            [.., last, count] if *last == code => *count += 1,
+            _ => runs.extend([code, 1]),
+        }
+    }
+    let view::Floor { width, height, box_m, plane, .. } = *floor;
+    Floor { width, height, box_m, origin_m: plane.origin_m, yaw_rad: plane.yaw_rad, runs }
+}
+
+/// Returns the shape of a body.
+pub(super) fn shape(shape: &view::Shape) -> Shape {
+    match *shape {
+        view::Shape::Cuboid { size_m } => Shape::Cuboid { size_m },
+        view::Shape::Cylinder { radius_m, height_m } => Shape::Cylinder { radius_m, height_m },
+        view::Shape::Sphere { radius_m } => Shape::Sphere { radius_m },
+        view::Shape::Line { ref points_m, thickness_m } => {
+            Shape::Line { points_m: points_m.clone(), thickness_m }
+        }
+        view::Shape::Dart { length_m, width_m } => Shape::Dart { length_m, width_m },
+    }
+}
+
+/// Returns the look of a body.
+pub(super) fn look(body: &Body, dimensions: u8) -> Look {
+    let view::Appearance { color, opacity, layer, .. } = body.appearance(dimensions);
+    Look { color, opacity, layer }
+}
+
+/// Returns which body it is.
+pub(crate) fn who(&(kind, number, part): &view::Who) -> Who {
+    Who { kind: kind.name().into(), number, part }
+}
+
+/// Returns a scan.
+pub(crate) fn scan(scan: &view::Scan) -> Scan {
+    let in_range = |range_m: &f64| range_m.is_finite().then_some(*range_m);
+    Scan {
+        of: who(&scan.of),
+        sensor: scan.sensor.clone(),
+        at_m: scan.pose.at_m,
+        turn: scan.pose.turn,
+        bearings_rad: scan.bearings_rad.clone(),
+        ranges_m: scan.ranges_m.iter().map(in_range).collect(),
+        true_m: scan.true_m.iter().map(in_range).collect(),
+        range_m: scan.range_m,
+    }
+}
+
+/// Returns an event.
+pub(crate) fn event(entry: &Entry) -> Event {
+    let level = match entry.level {
+        Level::Info => "info",
+        Level::Warning => "warning",
+        Level::Error => "error",
+    };
+    Event {
+        cycle: entry.cycle as f64,
+        level: level.into(),
+        kind: entry.kind.name().into(),
+        who: Some(who(&entry.who)),
+        with: entry.with.as_ref().map(who),
+        at_m: entry.at_m,
+        value: entry.value.as_ref().map(|amount| amount.value),
+        unit: entry.value.as_ref().map_or_else(String::new, |amount| amount.unit.to_string()),
+        words: entry.words.clone(),
+    }
+}
+
+/// Returns the body that a page names; `None` where there is no such kind.
+pub(crate) fn body(who: &Who) -> Option<view::Who> {
+    Some((view::Kind::from_name(&who.kind)?, who.number, who.part))
+}
+
+/// Returns an error of the program's own.
+pub(crate) fn problem(error: &InputError) -> Problem {
+    let (line, column) = error.position().unzip();
+    let number = |n: Option<usize>| n.and_then(|n| u32::try_from(n).ok());
+    Problem {
+        place: error.place().into(),
+        line: number(line),
+        column: number(column),
+        cause: error.cause().into(),
+        remedy: error.remedy().into(),
+        is_warning: false,
+    }
+}

@@ -1,0 +1,160 @@
+//! The layout of frames, byte by byte, and when a cast begins.
+
+use super::*;
+use crate::protocol::Scan;
+use sidestep::kernel::view::{COLORS, Pose};
+
+fn scenery(dimensions: u8) -> Scenery {
+    Scenery {
+        name: "s".into(),
+        dimensions,
+        cycle_s: 0.5,
+        floor: None,
+        bodies: Vec::new(),
+        names: vec![(Kind::Robot, 1, "Anna".into())],
+    }
+}
+
+fn robot(number: u32, at_m: [f64; 3], heading_rad: f64) -> Body {
+    let shape = Shape::Cylinder { radius_m: 0.25, height_m: 1.0 };
+    Body::new(Kind::Robot, number, Pose::heading(at_m, heading_rad), shape)
+}
+
+fn line(points_m: Vec<[f64; 3]>) -> Body {
+    let shape = Shape::Line { points_m, thickness_m: 0.1 };
+    Body::new(Kind::Rods, 0, Pose::at([0.0; 3]), shape)
+}
+
+fn frame(bodies: Vec<Body>) -> Frame {
+    Frame { cycle: 7, time_s: 3.5, bodies, ..Frame::default() }
+}
+
+const NOTHING: FrameText = FrameText { scans: Vec::new(), events: Vec::new(), events_left_out: 0 };
+
+/// Reads a frame from its first byte to its last.
+struct Reader<'a>(&'a [u8]);
+
+impl Reader<'_> {
+    fn take<const N: usize>(&mut self) -> [u8; N] {
+        let (taken, rest) = self.0.split_first_chunk().expect("enough bytes");
+        self.0 = rest;
+        *taken
+    }
+
+    fn u32s<const N: usize>(&mut self) -> [u32; N] {
+        std::array::from_fn(|_| u32::from_le_bytes(self.take()))
+    }
+
+    fn f32s<const N: usize>(&mut self) -> [f32; N] {
+        std::array::from_fn(|_| f32::from_le_bytes(self.take()))
+    }
+
+    fn f64(&mut self) -> f64 {
+        f64::from_le_bytes(self.take())
+    }
+}
+
+#[test]
+fn a_frame_of_a_plane_has_the_documented_layout() {
+    let touching = robot(1, [3.0, 4.0, 0.5], 1.0).when(true, Condition::Touching);
+    let bodies = vec![robot(0, [1.0, 2.0, 0.5], -2.0), touching];
+    let mut encoder = Encoder::new(9, &scenery(2));
+    let (cast, bytes) = encoder.encode(&frame(bodies), &NOTHING, 5);
+    let mut read = Reader(&bytes);
+    assert_eq!(read.take(), *b"SSTF");
+    assert_eq!(read.take(), [1, 0, 2, 0], "version, dimensions");
+    assert_eq!(read.u32s(), [9, 1], "session, cast");
+    assert_eq!((read.f64(), read.f64()), (7.0, 3.5));
+    let text = br#"{"scans":[],"events":[],"events_left_out":0}"#;
+    assert_eq!(read.u32s(), [2, 0, 0, text.len() as u32, 5, 0]);
+    assert_eq!(bytes.len() - read.0.len(), 56);
+    assert_eq!(read.f32s(), [1.0, 2.0, 3.0, 4.0]);
+    let [a, b] = read.f32s();
+    assert!((a + 2.0).abs() < 1e-5 && (b - 1.0).abs() < 1e-5, "{a} {b}");
+    assert_eq!(read.u32s(), [0], "no line");
+    assert_eq!(read.take(), [0, 3, 0, 0], "conditions, padded");
+    assert_eq!(read.0, text);
+    let cast = cast.expect("the first frame begins a cast");
+    assert_eq!((cast.session, cast.cast), (9, 1));
+    assert_eq!((cast.kinds, cast.kind), (vec!["robot".to_string()], vec![0, 0]));
+    assert_eq!((cast.number, cast.part, cast.shape), (vec![0, 1], vec![-1, -1], vec![0, 0]));
+    assert_eq!(cast.looks[usize::from(cast.look[1])][0].color, COLORS[1]);
+    assert_eq!((cast.names, cast.is_agent), (vec![(1, "Anna".to_string())], vec![true, true]));
+}
+
+#[test]
+fn a_frame_of_space_has_quaternions_and_points_of_lines() {
+    let rods = line(vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+    let bodies = vec![rods.clone(), robot(0, [7.0, 8.0, 9.0], 0.0), rods];
+    let (cast, bytes) = Encoder::new(1, &scenery(3)).encode(&frame(bodies), &NOTHING, 0);
+    let mut read = Reader(&bytes[32..]);
+    assert_eq!(read.u32s::<3>(), [3, 2, 4], "bodies, lines, points");
+    read.0 = &bytes[56..];
+    assert_eq!(read.f32s(), [0.0, 0.0, 0.0, 7.0, 8.0, 9.0, 0.0, 0.0, 0.0]);
+    assert_eq!(read.f32s::<12>()[4..8], [0.0, 0.0, 0.0, 1.0]);
+    assert_eq!(read.u32s(), [0, 2, 4]);
+    assert_eq!(read.f32s(), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    assert_eq!(read.take(), [0; 4]);
+    let cast = cast.expect("a cast");
+    assert_eq!(cast.shape, [0, 1, 0]);
+    let without = crate::protocol::Shape::Line { points_m: vec![], thickness_m: 0.1 };
+    assert_eq!(cast.shapes[0], without);
+}
+
+#[test]
+fn every_column_starts_at_a_multiple_of_four_bytes() {
+    for n in 0..9 {
+        let bodies = (0..n).map(|k| robot(k, [0.0; 3], 0.0)).collect();
+        let (_, bytes) = Encoder::new(1, &scenery(2)).encode(&frame(bodies), &NOTHING, 0);
+        let text = serde_json::to_vec(&NOTHING).expect("text").len();
+        assert_eq!((bytes.len() - text) % 4, 0, "{n} bodies");
+    }
+}
+
+#[test]
+fn a_cast_stays_while_bodies_move_and_changes_with_who_they_are() {
+    let mut encoder = Encoder::new(1, &scenery(2));
+    let mut begins = |bodies| encoder.encode(&frame(bodies), &NOTHING, 0).0.map(|c| c.cast);
+    let two = || vec![robot(0, [0.0; 3], 0.0), line(vec![[0.0; 3]; 2])];
+    assert_eq!(begins(two()), Some(1));
+    assert_eq!(begins(vec![robot(0, [9.0; 3], 1.0), line(vec![[1.0; 3]; 5])]), None);
+    assert_eq!(begins(two().into_iter().rev().collect()), Some(2), "another order");
+    assert_eq!(begins(two()), Some(3));
+    let wider = Shape::Cylinder { radius_m: 0.5, height_m: 1.0 };
+    assert_eq!(begins(vec![Body { shape: wider, ..robot(0, [0.0; 3], 0.0) }]), Some(4));
+    let pushed = robot(0, [0.0; 3], 0.0).moving([1.0, 0.0, 0.0]);
+    assert_eq!(begins(vec![pushed]), Some(5));
+}
+
+#[test]
+fn a_height_begins_a_cast_in_space_and_none_in_a_plane() {
+    let door = |height_m: f64| {
+        let shape = Shape::Cuboid { size_m: [1.0, 0.2, height_m] };
+        frame(vec![Body::new(Kind::Door, 0, Pose::at([0.0; 3]), shape)])
+    };
+    for (dimensions, begins) in [(2, false), (3, true)] {
+        let mut encoder = Encoder::new(1, &scenery(dimensions));
+        encoder.encode(&door(2.0), &NOTHING, 0);
+        assert_eq!(encoder.encode(&door(0.1), &NOTHING, 0).0.is_some(), begins);
+    }
+}
+
+#[test]
+fn scans_and_events_are_the_text_of_a_frame_and_nothing_in_range_is_null() {
+    let seen = sidestep::kernel::view::Scan {
+        of: (Kind::Robot, 1, None),
+        sensor: "eye".into(),
+        pose: Pose::at([0.0; 3]),
+        bearings_rad: vec![0.0, 1.0],
+        ranges_m: vec![2.0, f64::INFINITY],
+        true_m: vec![f64::INFINITY, 3.0],
+        range_m: 4.0,
+    };
+    let scans: Vec<Scan> = vec![scan(&seen)];
+    let text = FrameText { scans, events: Vec::new(), events_left_out: 3 };
+    let (_, bytes) = Encoder::new(1, &scenery(2)).encode(&frame(vec![]), &text, 0);
+    let read: serde_json::Value = serde_json::from_slice(&bytes[60..]).expect("JSON");
+    assert_eq!(read["scans"][0]["ranges_m"], serde_json::json!([2.0, null]));
+    assert_eq!(read["scans"][0]["true_m"], serde_json::json!([null, 3.0]));
+    assert_eq!(read["events_left_out"], 3);
+}

@@ -1,0 +1,291 @@
+//! What a page may read: files below the folders that were named at start, after links are resolved.
+
+use crate::encode::problem;
+use crate::protocol::{FileEntry, FileKind, Problem};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use sidestep::scenario::{Source, Worlds};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Entries of a folder beyond this number are left out.
+const MOST_ENTRIES: usize = 1000;
+/// Larger files are not looked into when a folder is listed.
+const MOST_BYTES: u64 = 1 << 20;
+/// Files of other programs are looked into, so many in a folder.
+const MOST_FOREIGN: usize = 50;
+
+/// The folders and files that may be read.
+#[derive(Debug, Clone)]
+pub(crate) struct Files(Arc<Vec<Root>>);
+
+/// A folder or a file that was named at start.
+#[derive(Debug)]
+struct Root {
+    /// As it was named.
+    path: PathBuf,
+    /// Where it really is.
+    real: PathBuf,
+}
+
+/// The first keys of a TOML file, by which it is known.
+#[derive(Deserialize)]
+struct Known {
+    world: Option<String>,
+    name: Option<String>,
+    scenario: Option<IgnoredAny>,
+}
+
+impl Files {
+    /// Allows what lies below these folders, and these files.
+    ///
+    /// # Errors
+    /// When one of them is not there.
+    pub(crate) fn below(named: &[PathBuf]) -> Result<Self, Problem> {
+        let root = |path: &PathBuf| {
+            let real = path.canonicalize().map_err(|e| {
+                let remedy = "name a scenario, a recording or a folder that is there";
+                Problem::new(path.display().to_string(), e.to_string(), remedy)
+            })?;
+            Ok(Root { path: path.clone(), real })
+        };
+        let roots: Result<Vec<Root>, Problem> = named.iter().map(root).collect();
+        Ok(Self(Arc::new(roots?)))
+    }
+
+    /// Returns the first folder that was named.
+    pub(crate) fn first_folder(&self) -> PathBuf {
+        let folder = self.0.iter().find(|root| root.real.is_dir());
+        folder.map_or_else(PathBuf::new, |root| root.path.clone())
+    }
+
+    /// Returns a path that a page may read.
+    ///
+    /// # Errors
+    /// When it is not there, or elsewhere.
+    pub(crate) fn find(&self, path: &str) -> Result<PathBuf, Problem> {
+        let found = PathBuf::from(path);
+        // What is not there and what may not be read is told alike: a page learns nothing about the rest of the disk.
+        // A pipe or a device might keep whoever reads it waiting for ever.
+        let is_plain = |real: &Path| real.is_file() || real.is_dir();
+        let is_allowed =
+            found.canonicalize().is_ok_and(|real| self.holds(&real) && is_plain(&real));
+        match is_allowed {
+            true => Ok(found),
+            false => {
+                let cause = "is not below the folders that were named at start";
+                let remedy = "start the studio with its folder: sidestep studio FOLDER";
+                Err(Problem::new(path, cause, remedy))
+            }
+        }
+    }
+
+    fn holds(&self, real: &Path) -> bool {
+        self.0.iter().any(|root| real.starts_with(&root.real))
+    }
+
+    /// Refuses a text of a page that names a file elsewhere: whatever key it is, a value that is the path of
+    /// something that is there.
+    ///
+    /// # Errors
+    /// With the value.
+    pub(crate) fn check_text(&self, source: &Source) -> Result<(), Problem> {
+        let table: serde_json::Value = source.parse().map_err(|e| problem(&e))?;
+        let mut open = vec![&table];
+        while let Some(value) = open.pop() {
+            match value {
+                serde_json::Value::Array(items) => open.extend(items),
+                serde_json::Value::Object(members) => open.extend(members.values()),
+                serde_json::Value::String(text) => self.check_value(source, text)?,
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn check_value(&self, source: &Source, text: &str) -> Result<(), Problem> {
+        let real = source.path(Path::new(text)).canonicalize();
+        match real.is_ok_and(|real| !self.holds(&real)) {
+            true => self.find(text).map(drop).map_err(|p| Problem { place: text.into(), ..p }),
+            false => Ok(()),
+        }
+    }
+
+    /// Lists what can be opened in a folder, or all that was named at start.
+    ///
+    /// # Errors
+    /// When it is no folder that may be read.
+    pub(crate) fn list(
+        &self,
+        folder: Option<&str>,
+        worlds: Worlds,
+    ) -> Result<Vec<FileEntry>, Problem> {
+        let Some(folder) = folder else {
+            let named = |root: &Root| entry(&root.path, worlds, &mut 0);
+            return Ok(self.0.iter().filter_map(named).collect());
+        };
+        let path = self.find(folder)?;
+        let told = |e: std::io::Error| {
+            Problem::new(folder, format!("cannot be listed: {e}"), "name a folder that may be read")
+        };
+        let mut paths = Vec::new();
+        for item in fs::read_dir(&path).map_err(told)?.take(MOST_ENTRIES) {
+            paths.push(item.map_err(told)?.path());
+        }
+        paths.sort();
+        let mut foreign = 0;
+        let listed = paths.iter().filter(|path| path.canonicalize().is_ok_and(|p| self.holds(&p)));
+        let mut entries: Vec<FileEntry> =
+            listed.filter_map(|path| entry(path, worlds, &mut foreign)).collect();
+        entries.sort_by_key(|entry| (entry.kind != FileKind::Folder, entry.name.clone()));
+        Ok(entries)
+    }
+}
+
+/// Returns what is to be told of a file or folder; `None` of what cannot be opened. `foreign` counts how many files
+/// of other programs were looked into.
+fn entry(path: &Path, worlds: Worlds, foreign: &mut usize) -> Option<FileEntry> {
+    let name = path.file_name().map_or_else(|| path.to_str(), |name| name.to_str())?;
+    if name.starts_with('.') && name.len() > 1 && name != ".." {
+        return None;
+    }
+    let (kind, about) = match path.is_dir() {
+        true => (kind_of_folder(path), String::new()),
+        false => kind_of_file(path, worlds, foreign)?,
+    };
+    Some(FileEntry { path: path.to_str()?.into(), name: name.into(), kind, about })
+}
+
+fn kind_of_folder(path: &Path) -> FileKind {
+    match () {
+        () if path.join("run.json").is_file() => FileKind::Run,
+        () if path.join("sweep.json").is_file() => FileKind::Sweep,
+        () => FileKind::Folder,
+    }
+}
+
+fn kind_of_file(path: &Path, worlds: Worlds, foreign: &mut usize) -> Option<(FileKind, String)> {
+    let bytes = fs::metadata(path).ok().filter(fs::Metadata::is_file)?.len();
+    let ends_in =
+        |ending: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
+    if ends_in("mcap") {
+        let megabytes = bytes as f64 / 1e6;
+        return Some((FileKind::Recording, format!("{megabytes:.1} MB")));
+    }
+    if bytes > MOST_BYTES {
+        return None;
+    }
+    if ends_in("toml") {
+        let known: Known = Source::read(path, &[]).ok()?.parse().ok()?;
+        return match (known.world, known.scenario) {
+            (Some(world), _) => {
+                let name = known.name.filter(|name| !name.is_empty());
+                Some((
+                    FileKind::Scenario,
+                    name.map_or(world.clone(), |name| format!("{world}: {name}")),
+                ))
+            }
+            (None, Some(_)) => Some((FileKind::Sweep, String::new())),
+            (None, None) => None,
+        };
+    }
+    *foreign += 1;
+    let told = (*foreign <= MOST_FOREIGN).then(|| worlds.translate(path))?.ok()??;
+    told.scenario.is_ok().then(|| (FileKind::Foreign, String::new()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep::worlds::WORLDS;
+
+    /// A folder `in` that may be read, and one beside it that may not.
+    fn places() -> (tempfile::TempDir, Files) {
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, text) in [
+            ("in/a.toml", "format = 1\nworld = \"robots\"\nname = \"crowd\"\n"),
+            ("in/sweep.toml", "scenario = \"a.toml\"\n"),
+            ("in/other.toml", "x = 1\n"),
+            ("in/notes.txt", "words"),
+            ("in/.hidden.toml", "world = \"robots\"\n"),
+            ("in/film.mcap", "..."),
+            ("in/t.scn", "00:00:00.00>CRE A,B738,52,4,90,FL200,250\n"),
+            ("in/run/run.json", "{}"),
+            ("in/deep/b.toml", "format = 1\nworld = \"chain\"\n"),
+            ("out/secret.toml", "format = 1\nworld = \"robots\"\n"),
+        ] {
+            let path = folder.path().join(name);
+            fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+            fs::write(path, text).expect("written");
+        }
+        let files = Files::below(&[folder.path().join("in")]).expect("a folder");
+        (folder, files)
+    }
+
+    #[test]
+    fn a_folder_lists_what_can_be_opened() {
+        let (folder, files) = places();
+        let inside = folder.path().join("in");
+        let listed = files.list(inside.to_str(), WORLDS).expect("listed");
+        let told: Vec<_> =
+            listed.iter().map(|e| (e.name.as_str(), e.kind, e.about.as_str())).collect();
+        assert_eq!(
+            told,
+            [
+                ("deep", FileKind::Folder, ""),
+                ("a.toml", FileKind::Scenario, "robots: crowd"),
+                ("film.mcap", FileKind::Recording, "0.0 MB"),
+                ("run", FileKind::Run, ""),
+                ("sweep.toml", FileKind::Sweep, ""),
+                ("t.scn", FileKind::Foreign, ""),
+            ]
+        );
+        let roots = files.list(None, WORLDS).expect("listed");
+        assert_eq!((roots.len(), roots[0].name.as_str()), (1, "in"));
+        assert!(files.find(&listed[1].path).is_ok());
+    }
+
+    #[test]
+    fn nothing_outside_is_found_by_dots_by_links_or_by_its_whole_path() {
+        let (folder, files) = places();
+        let path = |name: &str| folder.path().join(name).display().to_string();
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink(path("out"), path("in/link")).expect("linked");
+            std::os::unix::fs::symlink(path("out/secret.toml"), path("in/s.toml")).expect("linked");
+        }
+        let outside = [
+            "in/../out/secret.toml",
+            "out/secret.toml",
+            "in/link/secret.toml",
+            "in/s.toml",
+            "in/gone.toml",
+        ];
+        let problems: Vec<Problem> =
+            outside.iter().map(|name| files.find(&path(name)).expect_err(name)).collect();
+        assert!(
+            problems.iter().all(|p| p.cause == problems[0].cause),
+            "nothing is told of what is there"
+        );
+        assert!(files.list(Some(&path("out")), WORLDS).is_err());
+        assert!(files.list(Some(&path("in/..")), WORLDS).is_err());
+        assert!(files.find("/etc/passwd").is_err() && files.find("").is_err());
+        let listed = files.list(Some(&path("in")), WORLDS).expect("listed");
+        assert!(listed.iter().all(|e| e.name != "link" && e.name != "s.toml"), "{listed:?}");
+        assert!(files.find(&path("in/deep/../a.toml")).is_ok());
+    }
+
+    #[test]
+    fn a_text_names_files_inside_alone() {
+        let (folder, files) = places();
+        let check = |text: &str| {
+            let source = Source::new("s.toml", text, folder.path().join("in"));
+            files.check_text(&source).map_err(|problem| problem.place)
+        };
+        assert_eq!(check("a = \"deep/b.toml\"\nb = [{ c = \"no such file\" }]"), Ok(()));
+        assert_eq!(check("a = [{ b = \"../out/secret.toml\" }]"), Err("../out/secret.toml".into()));
+        assert_eq!(check("a = \"/etc/passwd\""), Err("/etc/passwd".into()));
+        assert_eq!(check("a = = 1"), Err("s.toml".into()));
+    }
+}

@@ -1,0 +1,228 @@
+//! Who may ask: the right host and origin on every request, and a token where others can reach the port.
+//!
+//! A page of somebody else may make a browser ask a server on this machine. So the `Host` must be one of ours (else
+//! a name that was bound anew to this machine would do), and the `Origin`, which scripts cannot change, must be the
+//! page's own. A server that listens on the machine alone needs no more; any other wants a token: it is in the
+//! address's fragment, which is never sent, and the page exchanges it for a cookie that no script can read. Browsers
+//! send that cookie to the name that it was got under alone, so there any name of the machine will do.
+
+use axum::http::HeaderMap;
+use axum::http::header::{COOKIE, HOST, ORIGIN};
+use std::net::{IpAddr, SocketAddr};
+
+/// The name of the cookie, followed by the port: cookies are shared by all ports of a host.
+const COOKIE_NAME: &str = "sidestep-studio-";
+
+/// Why a request is refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Refusal {
+    /// It was sent to another name than ours.
+    Host,
+    /// A page of somebody else sent it.
+    Origin,
+    /// It does not know the token.
+    Token,
+}
+
+/// The rules of one server.
+#[derive(Debug, Clone)]
+pub(crate) struct Guard {
+    port: u16,
+    /// A name of this machine beside its numbers, if the server was told one.
+    name: Option<String>,
+    token: Option<String>,
+}
+
+impl Guard {
+    /// Returns the rules of a server at an address; `name` is the host that its user named.
+    ///
+    /// # Errors
+    /// When the system gives no random numbers for the token.
+    pub(crate) fn new(address: SocketAddr, name: &str) -> std::io::Result<Self> {
+        let token = match address.ip().is_loopback() {
+            true => None,
+            false => Some(token()?),
+        };
+        let is_name = name.parse::<IpAddr>().is_err();
+        let name = is_name.then(|| name.to_ascii_lowercase());
+        Ok(Self { port: address.port(), name, token })
+    }
+
+    /// Returns the token, where one is needed.
+    pub(crate) fn token(&self) -> Option<&str> {
+        self.token.as_deref()
+    }
+
+    /// Checks that a request comes from our own page, or from no page at all.
+    ///
+    /// # Errors
+    /// When it does not.
+    pub(crate) fn admit(&self, headers: &HeaderMap) -> Result<(), Refusal> {
+        let host = only(headers, &HOST).ok_or(Refusal::Host)?;
+        if !self.is_ours(host) {
+            return Err(Refusal::Host);
+        }
+        if !headers.contains_key(ORIGIN) {
+            return Ok(());
+        }
+        let origin = only(headers, &ORIGIN).and_then(|origin| origin.strip_prefix("http://"));
+        match origin.is_some_and(|origin| origin.eq_ignore_ascii_case(host)) {
+            true => Ok(()),
+            false => Err(Refusal::Origin),
+        }
+    }
+
+    /// Checks that a request may do more than read the page.
+    ///
+    /// # Errors
+    /// When it may not.
+    pub(crate) fn trust(&self, headers: &HeaderMap) -> Result<(), Refusal> {
+        self.admit(headers)?;
+        let Some(token) = &self.token else { return Ok(()) };
+        let name = self.cookie_name();
+        let cookies = headers.get_all(COOKIE).iter().filter_map(|value| value.to_str().ok());
+        let mut values = cookies
+            .flat_map(|all| all.split(';'))
+            .filter_map(|cookie| cookie.trim().strip_prefix(name.as_str())?.strip_prefix('='));
+        match values.any(|value| is_same(value, token)) {
+            true => Ok(()),
+            false => Err(Refusal::Token),
+        }
+    }
+
+    /// Returns the cookie for somebody who knows the token.
+    ///
+    /// # Errors
+    /// When it is another.
+    pub(crate) fn enter(&self, said: &str) -> Result<String, Refusal> {
+        let token = self.token.as_deref().unwrap_or_default();
+        match self.token.is_none() || is_same(said.trim(), token) {
+            true => {
+                let name = self.cookie_name();
+                Ok(format!("{name}={token}; HttpOnly; SameSite=Strict; Path=/"))
+            }
+            false => Err(Refusal::Token),
+        }
+    }
+
+    fn cookie_name(&self) -> String {
+        format!("{COOKIE_NAME}{}", self.port)
+    }
+
+    /// Whether a host may be this machine: a number, which nobody can bind anew, `localhost`, the name that was
+    /// given, or any name where a token is needed besides. Any port will do, as one may be forwarded.
+    fn is_ours(&self, host: &str) -> bool {
+        let name = match host.strip_prefix('[') {
+            Some(rest) => rest.split(']').next().unwrap_or_default(),
+            None => host.split(':').next().unwrap_or_default(),
+        };
+        let name = name.to_ascii_lowercase();
+        let is_number = name.parse::<IpAddr>().is_ok();
+        is_number || name == "localhost" || self.name == Some(name) || self.token.is_some()
+    }
+}
+
+/// Returns a header that is there once, as text.
+fn only<'a>(headers: &'a HeaderMap, name: &axum::http::HeaderName) -> Option<&'a str> {
+    let mut values = headers.get_all(name).iter();
+    let value = values.next()?.to_str().ok()?;
+    values.next().is_none().then_some(value)
+}
+
+/// Compares in a time that does not tell where two texts differ.
+fn is_same(said: &str, token: &str) -> bool {
+    let differing = said.bytes().zip(token.bytes()).fold(0, |all, (a, b)| all | (a ^ b));
+    said.len() == token.len() && differing == 0
+}
+
+/// Returns a new token of 128 random bits.
+fn token() -> std::io::Result<String> {
+    let mut bytes = [0_u8; 16];
+    getrandom::fill(&mut bytes).map_err(std::io::Error::other)?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn headers(all: &[(&'static str, &str)]) -> HeaderMap {
+        let mut headers = HeaderMap::new();
+        for (name, value) in all {
+            headers.append(*name, value.parse().expect("a value"));
+        }
+        headers
+    }
+
+    fn local() -> Guard {
+        Guard::new("127.0.0.1:7800".parse().expect("an address"), "127.0.0.1").expect("a guard")
+    }
+
+    fn open() -> Guard {
+        Guard::new("192.0.2.1:7800".parse().expect("an address"), "lab.example").expect("a guard")
+    }
+
+    #[test]
+    fn hosts_are_numbers_localhost_and_the_name_that_was_given() {
+        let admits = |guard: &Guard, host| guard.admit(&headers(&[("host", host)]));
+        for host in
+            ["127.0.0.1:7800", "localhost:7800", "[::1]:7800", "localhost:9999", "LOCALHOST"]
+        {
+            assert_eq!(admits(&local(), host), Ok(()), "{host}");
+        }
+        for host in [
+            "evil.example",
+            "localhost.evil.example:7800",
+            "lab.example:7800",
+            "",
+            "127.0.0.1.evil",
+        ] {
+            assert_eq!(admits(&local(), host), Err(Refusal::Host), "{host}");
+        }
+        for host in ["Lab.Example:7800", "another-name-of-it:7800"] {
+            assert_eq!(admits(&open(), host), Ok(()), "{host}");
+            let without_cookie = open().trust(&headers(&[("host", host)]));
+            assert_eq!(without_cookie, Err(Refusal::Token), "{host}");
+        }
+        assert_eq!(local().admit(&headers(&[])), Err(Refusal::Host));
+        let two = headers(&[("host", "localhost"), ("host", "localhost")]);
+        assert_eq!(local().admit(&two), Err(Refusal::Host));
+    }
+
+    #[test]
+    fn only_our_own_page_may_ask() {
+        let admits =
+            |origin| local().admit(&headers(&[("host", "localhost:7800"), ("origin", origin)]));
+        assert_eq!(admits("http://localhost:7800"), Ok(()));
+        let others = [
+            "http://evil.example",
+            "http://localhost:3000",
+            "http://127.0.0.1:7800",
+            "https://localhost:7800",
+            "null",
+            "",
+        ];
+        for origin in others {
+            assert_eq!(admits(origin), Err(Refusal::Origin), "{origin}");
+        }
+    }
+
+    #[test]
+    fn a_server_that_others_can_reach_wants_its_token() {
+        let guard = open();
+        let token = guard.token().expect("a token").to_string();
+        assert_eq!(token.len(), 32);
+        assert_ne!(Some(token.as_str()), open().token(), "a new one for each server");
+        let trusts =
+            |cookie: &str| guard.trust(&headers(&[("host", "192.0.2.1:7800"), ("cookie", cookie)]));
+        assert_eq!(trusts(""), Err(Refusal::Token));
+        assert_eq!(trusts("sidestep-studio-7800="), Err(Refusal::Token));
+        assert_eq!(trusts(&format!("sidestep-studio-7801={token}")), Err(Refusal::Token));
+        assert_eq!(trusts(&format!("a=b; sidestep-studio-7800={token}")), Ok(()));
+        assert_eq!(guard.enter(&token[1..]), Err(Refusal::Token));
+        assert_eq!(guard.enter(""), Err(Refusal::Token));
+        let cookie = guard.enter(&format!("{token}\n")).expect("known");
+        assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"), "{cookie}");
+        assert!(local().token().is_none() && local().enter("").is_ok());
+    }
+}

@@ -1,0 +1,91 @@
+//! What all sockets of a server share.
+
+use crate::guard::Guard;
+use crate::protocol::{Named, Notice, Problem, SessionId, VERSION};
+use crate::session::Means;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
+
+/// The number of sessions at a time, of all sockets.
+const MOST_SESSIONS: u32 = 12;
+/// The number of sockets at a time.
+const MOST_SOCKETS: usize = 16;
+/// The time that sessions have to end with the server.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// What all sockets share.
+pub(crate) struct House {
+    /// What sessions need to begin.
+    pub(crate) means: Means,
+    /// Who may ask.
+    pub(crate) guard: Guard,
+    program: String,
+    open: Vec<Named>,
+    next: AtomicU32,
+    sessions: Arc<Semaphore>,
+    sockets: Arc<Semaphore>,
+    ending: watch::Receiver<bool>,
+}
+
+impl House {
+    pub(crate) fn new(
+        means: Means,
+        guard: Guard,
+        program: String,
+        open: Vec<Named>,
+        ending: watch::Receiver<bool>,
+    ) -> Self {
+        Self {
+            means,
+            guard,
+            program,
+            open,
+            next: AtomicU32::new(1),
+            sessions: Arc::new(Semaphore::new(MOST_SESSIONS as usize)),
+            sockets: Arc::new(Semaphore::new(MOST_SOCKETS)),
+            ending,
+        }
+    }
+
+    /// Returns what a page is told first.
+    pub(crate) fn hello(&self) -> Notice {
+        Notice::Hello {
+            version: VERSION,
+            program: self.program.clone(),
+            worlds: self.means.worlds.names().into_iter().map(String::from).collect(),
+            read_only: self.means.read_only,
+            open: self.open.clone(),
+        }
+    }
+
+    /// Returns a number for a new session, and its place among all.
+    ///
+    /// # Errors
+    /// When there are too many.
+    pub(crate) fn admit(&self) -> Result<(SessionId, OwnedSemaphorePermit), Problem> {
+        let place = self.sessions.clone().try_acquire_owned().map_err(|_| {
+            let cause = format!("there are {MOST_SESSIONS} sessions already");
+            Problem::new("open", cause, "close one first, here or in another window")
+        })?;
+        Ok((self.next.fetch_add(1, Ordering::Relaxed), place))
+    }
+
+    /// Returns the place of a new socket; `None` if there are too many.
+    pub(crate) fn seat(&self) -> Option<OwnedSemaphorePermit> {
+        self.sockets.clone().try_acquire_owned().ok()
+    }
+
+    /// Waits until the server ends.
+    pub(crate) async fn ended(&self) {
+        // Whoever could end it otherwise is gone: then it ends, too.
+        let _ = self.ending.clone().wait_for(|ends| *ends).await;
+    }
+
+    /// Waits until all sessions have ended, but not for ever.
+    pub(crate) async fn emptied(&self) {
+        let all = self.sessions.acquire_many(MOST_SESSIONS);
+        let _ = tokio::time::timeout(PATIENCE, all).await;
+    }
+}

@@ -1,0 +1,106 @@
+//! The routes of the server, and the headers of all its answers.
+
+use crate::guard::Refusal;
+use crate::house::House;
+use crate::request::MOST_REQUEST_BYTES;
+use crate::{page, socket};
+use axum::Router;
+use axum::extract::ws::WebSocketUpgrade;
+use axum::extract::{DefaultBodyLimit, Request, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use std::sync::Arc;
+
+/// Longest body of a request that is no socket: a token.
+const MOST_BODY_BYTES: usize = 256;
+/// Longest message of a socket. Longer ones than a request may be are answered; beyond this the socket is closed.
+const MOST_MESSAGE_BYTES: usize = 8 * MOST_REQUEST_BYTES;
+
+/// Headers of every answer: the page loads nothing from elsewhere, and is shown in no other page.
+const HEADERS: [(HeaderName, &str); 6] = [
+    (
+        header::CONTENT_SECURITY_POLICY,
+        "default-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    ),
+    (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+    (header::X_FRAME_OPTIONS, "DENY"),
+    (header::REFERRER_POLICY, "no-referrer"),
+    (HeaderName::from_static("cross-origin-opener-policy"), "same-origin"),
+    (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
+];
+
+/// Returns the routes: the page, its socket, and the way in for who has the token.
+pub(crate) fn routes(house: Arc<House>) -> Router {
+    Router::new()
+        .route("/socket", get(upgrade))
+        .route("/enter", get(trusted).post(enter))
+        .fallback(get(file))
+        .layer(DefaultBodyLimit::max(MOST_BODY_BYTES))
+        .layer(from_fn_with_state(house.clone(), guarded))
+        .with_state(house)
+}
+
+/// Lets through what comes from our own page, and adds the headers of every answer.
+async fn guarded(State(house): State<Arc<House>>, request: Request, next: Next) -> Response {
+    let mut response = match house.guard.admit(request.headers()) {
+        Ok(()) => next.run(request).await,
+        Err(refusal) => refusal.into_response(),
+    };
+    for (name, value) in HEADERS {
+        response.headers_mut().insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+async fn upgrade(
+    State(house): State<Arc<House>>,
+    headers: HeaderMap,
+    upgrade: WebSocketUpgrade,
+) -> Response {
+    if let Err(refusal) = house.guard.trust(&headers) {
+        return refusal.into_response();
+    }
+    let upgrade = upgrade.max_message_size(MOST_MESSAGE_BYTES).max_frame_size(MOST_MESSAGE_BYTES);
+    upgrade.on_upgrade(move |socket| socket::serve(socket, house))
+}
+
+/// Tells whether the browser has the cookie.
+async fn trusted(State(house): State<Arc<House>>, headers: HeaderMap) -> Response {
+    match house.guard.trust(&headers) {
+        Ok(()) => StatusCode::NO_CONTENT.into_response(),
+        Err(refusal) => refusal.into_response(),
+    }
+}
+
+/// Gives the cookie to who knows the token.
+async fn enter(State(house): State<Arc<House>>, said: String) -> Response {
+    match house.guard.enter(&said) {
+        Ok(cookie) => (StatusCode::NO_CONTENT, [(header::SET_COOKIE, cookie)]).into_response(),
+        Err(refusal) => refusal.into_response(),
+    }
+}
+
+async fn file(uri: Uri, headers: HeaderMap) -> Response {
+    page::answer(uri.path(), &headers)
+}
+
+impl IntoResponse for Refusal {
+    fn into_response(self) -> Response {
+        match self {
+            Self::Host => {
+                let words = "This name is not the studio's: use the address that it printed.\n";
+                (StatusCode::MISDIRECTED_REQUEST, words).into_response()
+            }
+            Self::Origin => {
+                let words = "Only the studio's own page may ask.\n";
+                (StatusCode::FORBIDDEN, words).into_response()
+            }
+            Self::Token => {
+                let words = "Open the whole address that the studio printed, with its token.\n";
+                (StatusCode::UNAUTHORIZED, words).into_response()
+            }
+        }
+    }
+}

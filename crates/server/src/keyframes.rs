@@ -1,0 +1,137 @@
+//! Checkpoints that are kept as a run goes on, so that any earlier cycle is near one of them.
+//!
+//! They are kept by the time that computing took, not by cycles: what lies between two of them takes about as long
+//! everywhere. Beyond the bound of memory every second one goes, and the next ones are twice as far apart.
+
+use sidestep::kernel::Cycle;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// The least time of computing between two keyframes, before any thinning.
+const SPACING: Duration = Duration::from_millis(20);
+/// Making a keyframe takes at most one part in so many of the time.
+const COST: u32 = 50;
+
+/// The keyframes of one run.
+#[derive(Debug)]
+pub(crate) struct Keyframes {
+    kept: BTreeMap<Cycle, Vec<u8>>,
+    bytes: usize,
+    most_bytes: usize,
+    spacing: Duration,
+    /// The time that computing took since the last keyframe.
+    computed: Duration,
+    /// The time that the last keyframe took.
+    took: Duration,
+}
+
+impl Keyframes {
+    /// Returns a store for so many bytes, without anything in it.
+    pub(crate) fn new(most_bytes: usize) -> Self {
+        let (spacing, zero) = (SPACING, Duration::ZERO);
+        Self { kept: BTreeMap::new(), bytes: 0, most_bytes, spacing, computed: zero, took: zero }
+    }
+
+    /// Notes that computing up to a cycle took a time; returns whether a keyframe of that cycle is wanted.
+    pub(crate) fn is_due(&mut self, cycle: Cycle, took: Duration) -> bool {
+        // What was computed before is kept already.
+        if self.kept.last_key_value().is_some_and(|(&last, _)| cycle <= last) {
+            return false;
+        }
+        self.computed += took;
+        self.kept.is_empty() || self.computed >= self.spacing.max(self.took.saturating_mul(COST))
+    }
+
+    /// Keeps a checkpoint that took a time to make.
+    pub(crate) fn keep(&mut self, cycle: Cycle, checkpoint: Vec<u8>, took: Duration) {
+        (self.computed, self.took) = (Duration::ZERO, took);
+        self.bytes += checkpoint.len();
+        if let Some(before) = self.kept.insert(cycle, checkpoint) {
+            self.bytes -= before.len();
+        }
+        while self.bytes > self.most_bytes && self.kept.len() > 1 {
+            self.thin();
+        }
+    }
+
+    /// Drops every second keyframe, but never the first.
+    fn thin(&mut self) {
+        let mut is_odd = true;
+        self.kept.retain(|_, _| {
+            is_odd = !is_odd;
+            !is_odd
+        });
+        self.bytes = self.kept.values().map(Vec::len).sum();
+        self.spacing = self.spacing.saturating_mul(2);
+    }
+
+    /// Returns the last keyframe that is not after a cycle.
+    pub(crate) fn before(&self, cycle: Cycle) -> Option<(Cycle, &[u8])> {
+        self.kept.range(..=cycle).next_back().map(|(&at, bytes)| (at, bytes.as_slice()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const MS: Duration = Duration::from_millis(1);
+
+    #[test]
+    fn the_first_is_wanted_at_once_and_the_next_ones_after_some_time() {
+        let mut keyframes = Keyframes::new(1000);
+        assert!(keyframes.is_due(0, Duration::ZERO));
+        keyframes.keep(0, vec![0; 10], MS / 100);
+        assert!(!keyframes.is_due(10, 19 * MS));
+        assert!(keyframes.is_due(20, MS));
+        keyframes.keep(20, vec![0; 10], 2 * MS);
+        assert!(!keyframes.is_due(30, 99 * MS), "two in a hundred");
+        assert!(keyframes.is_due(40, MS));
+        assert!(!keyframes.is_due(15, 1000 * MS), "it was computed before");
+    }
+
+    #[test]
+    fn the_nearest_before_is_found_and_nothing_in_an_empty_store() {
+        let mut keyframes = Keyframes::new(1000);
+        assert_eq!(keyframes.before(5), None);
+        for cycle in [0, 10, 20] {
+            keyframes.keep(cycle, vec![cycle as u8], MS);
+        }
+        let at = |cycle| keyframes.before(cycle).map(|(at, bytes)| (at, bytes[0]));
+        assert_eq!(
+            [at(0), at(9), at(10), at(99)],
+            [Some((0, 0)), Some((0, 0)), Some((10, 10)), Some((20, 20))]
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn memory_stays_within_its_bound_and_the_start_is_never_lost(
+            sizes in proptest::collection::vec(1_usize..400, 1..200),
+        ) {
+            let mut keyframes = Keyframes::new(1000);
+            for (cycle, size) in (0..).zip(sizes) {
+                keyframes.keep(cycle, vec![0; size], MS);
+                let kept: usize = keyframes.kept.values().map(Vec::len).sum();
+                prop_assert!(kept <= 1000 && kept == keyframes.bytes);
+                prop_assert_eq!(keyframes.before(0).map(|(at, _)| at), Some(0));
+            }
+        }
+
+        #[test]
+        fn what_is_left_stays_evenly_spread(count in 2_u64..3000) {
+            let mut keyframes = Keyframes::new(1600);
+            let mut cycle = 0;
+            while cycle < count {
+                if keyframes.is_due(cycle, SPACING / 2) {
+                    keyframes.keep(cycle, vec![0; 100], Duration::ZERO);
+                }
+                cycle += 1;
+            }
+            let at: Vec<Cycle> = keyframes.kept.keys().copied().collect();
+            let widest = at.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(0);
+            prop_assert!(widest <= 2 * (count / 7).max(2), "{at:?}");
+        }
+    }
+}

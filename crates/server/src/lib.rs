@@ -1,0 +1,216 @@
+//! The studio's server: any world's runs, watched and steered by a page, over one WebSocket.
+//!
+//! ```text
+//! listen.rs    the port              http.rs      routes and headers      guard.rs   who may ask
+//! page.rs      files of the page     socket.rs    one page                house.rs   what all pages share
+//! request.rs   text -> requests      protocol/    all words and frames    outbox.rs  what waits to be sent
+//! session/     one thread per run    keyframes.rs checkpoints for seeking
+//! encode/      frames as bytes       samples.rs   metrics against time    chronicle.rs   events
+//! files.rs     what may be read
+//! ```
+//! A session is a thread that owns a `Simulation`. Sockets pass requests to it by a channel and take replies, states
+//! and frames from an outbox into which sessions put without waiting. So nothing that a page does or leaves undone
+//! reaches a result, and a slow page loses frames, never the run. Whoever starts the server hands the worlds in.
+
+mod chronicle;
+mod encode;
+mod files;
+mod guard;
+mod house;
+mod http;
+mod keyframes;
+mod listen;
+mod outbox;
+mod page;
+pub mod protocol;
+mod request;
+mod samples;
+mod session;
+mod socket;
+
+pub use encode::Encoder;
+pub use request::{MOST_REQUEST_BYTES, decode};
+
+use files::Files;
+use guard::Guard;
+use house::House;
+use protocol::{Named, Problem};
+use session::Means;
+use sidestep::kernel::InputError;
+use sidestep::scenario::Worlds;
+use sidestep_session::Error;
+use std::net::{SocketAddr, TcpListener};
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+use tokio::runtime::{Builder, Runtime};
+use tokio::sync::watch;
+
+/// The largest number of frames that a session makes in a second.
+pub const FRAMES_PER_S: u32 = 30;
+/// The bound of memory for the keyframes of a session.
+pub const KEYFRAME_BYTES: usize = 256 << 20;
+/// Speeds at which a run can be played, in simulated seconds per second.
+pub const SPEEDS: RangeInclusive<f64> = 0.1..=100.0;
+
+/// How a server is started.
+#[derive(Clone)]
+pub struct Options {
+    /// The worlds.
+    pub worlds: Worlds,
+    /// The program and its build, for people.
+    pub program: String,
+    /// Scenarios and recordings to open, and folders that may be read; the current folder if there are none.
+    pub named: Vec<PathBuf>,
+    /// The address to listen at.
+    pub host: String,
+    /// The port; 0 for any free one, `None` for the first free one of some.
+    pub port: Option<u16>,
+    /// Whether texts of pages are refused.
+    pub read_only: bool,
+    /// The number of worker threads of each session.
+    pub workers: usize,
+}
+
+/// A server that runs, until it is ended or dropped.
+pub struct Studio {
+    address: SocketAddr,
+    token: Option<String>,
+    ending: watch::Sender<bool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Studio {
+    /// Starts a server in a thread of its own.
+    ///
+    /// # Errors
+    /// When something that was named is not there, or the port cannot be had.
+    pub fn start(options: Options) -> Result<Self, Error> {
+        let (folders, open) = divided(&options.named);
+        let files = Files::below(&folders).map_err(|p| input(&p))?;
+        let listener = listen::bind(&options.host, options.port)?;
+        let failed = |e: std::io::Error| {
+            Error::stopped(
+                format!("the server cannot be started: {e}"),
+                "end other programs, and try again",
+            )
+        };
+        let address = listener.local_addr().map_err(failed)?;
+        let guard = Guard::new(address, &options.host).map_err(failed)?;
+        let token = guard.token().map(String::from);
+        let (ending, ends) = watch::channel(false);
+        let Options { worlds, workers, read_only, program, .. } = options;
+        let means = Means { worlds, files, workers, read_only };
+        let house = Arc::new(House::new(means, guard, program, open, ends));
+        let runtime = Builder::new_current_thread().enable_all().max_blocking_threads(4).build();
+        let runtime = runtime.map_err(failed)?;
+        let thread = std::thread::Builder::new().name("studio".into());
+        let thread = thread.spawn(move || serve(runtime, listener, &house)).map_err(failed)?;
+        Ok(Self { address, token, ending, thread: Some(thread) })
+    }
+
+    /// Returns the page's address, with the token in it where one is needed.
+    pub fn url(&self) -> String {
+        let ip = self.address.ip();
+        // Whoever opens it sits at this machine; others know its name.
+        let host = match (ip.is_unspecified(), ip.is_ipv6()) {
+            (true, _) => "localhost".to_string(),
+            (false, true) => format!("[{ip}]"),
+            (false, false) => ip.to_string(),
+        };
+        let token = self.token.as_ref().map(|token| format!("#token={token}")).unwrap_or_default();
+        format!("http://{host}:{}/{token}", self.address.port())
+    }
+
+    /// Whether others than this machine can reach it.
+    pub fn is_open_to_others(&self) -> bool {
+        self.token.is_some()
+    }
+
+    /// Whether it has ended by itself, which is a bug.
+    pub fn has_ended(&self) -> bool {
+        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+}
+
+impl Drop for Studio {
+    /// Ends all sessions, and waits for that.
+    fn drop(&mut self) {
+        self.ending.send_replace(true);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Answers requests until the server is ended.
+fn serve(runtime: Runtime, listener: TcpListener, house: &Arc<House>) {
+    runtime.block_on(async {
+        // Nothing that is bound and not blocking is refused.
+        let Ok(listener) = listen::Limited::new(listener) else { return };
+        let ended = house.clone();
+        let routes = http::routes(house.clone());
+        let served = axum::serve(listener, routes).with_graceful_shutdown(async move { ended.ended().await });
+        // Connections that are still open after a while are cut.
+        tokio::select! {
+            _ = served => {}
+            () = async { house.ended().await; tokio::time::sleep(Duration::from_secs(1)).await; } => {}
+        }
+        house.emptied().await;
+    });
+    runtime.shutdown_timeout(Duration::from_millis(100));
+}
+
+/// Returns the folders that may be read, and what is to be opened.
+fn divided(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<Named>) {
+    let (mut folders, mut open): (Vec<PathBuf>, Vec<Named>) = Default::default();
+    for path in named {
+        let is_run = path.join("run.json").is_file();
+        let is_film = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
+        if !path.is_dir() || is_run {
+            let kind = if is_run || is_film { "recording" } else { "scenario" };
+            open.push(Named { kind: kind.into(), path: path.display().to_string() });
+        }
+        // What a scenario names lies beside it.
+        let folder = match (path.is_dir() || !path.exists(), path.parent()) {
+            (false, Some(parent)) if parent != Path::new("") => parent.to_path_buf(),
+            (false, _) => ".".into(),
+            (true, _) => path.clone(),
+        };
+        if !folders.contains(&folder) {
+            folders.push(folder);
+        }
+    }
+    if folders.is_empty() {
+        folders.push(".".into());
+    }
+    (folders, open)
+}
+
+fn input(problem: &Problem) -> InputError {
+    InputError::new(&problem.place, &problem.cause, &problem.remedy)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_named_is_opened_and_its_folder_may_be_read() {
+        let place = tempfile::tempdir().expect("a folder");
+        let path = |name: &str| place.path().join(name);
+        std::fs::create_dir_all(path("run")).expect("made");
+        std::fs::write(path("run/run.json"), "{}").expect("written");
+        std::fs::write(path("a.toml"), "").expect("written");
+        std::fs::write(path("b.mcap"), "").expect("written");
+        let named = ["run", "a.toml", "b.mcap"].map(path);
+        let (folders, open) = divided(&named);
+        assert_eq!(folders, [path("run"), place.path().to_path_buf()]);
+        let kinds: Vec<&str> = open.iter().map(|named| named.kind.as_str()).collect();
+        assert_eq!(kinds, ["recording", "scenario", "recording"]);
+        assert_eq!(divided(&[]), (vec![".".into()], vec![]));
+        assert_eq!(divided(&["a.toml".into()]).0, [PathBuf::from("a.toml")], "it is not there");
+    }
+}

@@ -1,0 +1,152 @@
+//! What a body perceives, decides and does, for a panel and for marks on the canvas. Names no world.
+
+use super::Who;
+use serde::Serialize;
+
+/// What a body perceives, decides and does.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct Inspection {
+    /// Which body.
+    pub who: Who,
+    /// Cycles done.
+    pub cycle: f64,
+    /// The body's name.
+    pub title: String,
+    /// Facts, by subject.
+    pub sections: Vec<Section>,
+    /// What can be drawn of it.
+    pub marks: Vec<Mark>,
+}
+
+/// Facts on one subject.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct Section {
+    /// The subject.
+    pub title: String,
+    /// The facts.
+    pub facts: Vec<Fact>,
+    /// A table, where facts are many of a kind.
+    pub table: Option<Table>,
+}
+
+/// A fact.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct Fact {
+    /// Its name, in words.
+    pub label: String,
+    /// What it is.
+    pub value: Value,
+}
+
+/// The value of a fact.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(rename_all = "kebab-case")]
+pub enum Value {
+    /// A number.
+    Number {
+        /// The number.
+        value: f64,
+        /// Its unit; may be empty.
+        unit: String,
+    },
+    /// A share or a probability, from 0 to 1.
+    Share(f64),
+    /// Words.
+    Text(String),
+    /// A body.
+    Who(Who),
+    /// A place, in meters.
+    Place([f64; 3]),
+    /// Yes or no.
+    Yes(bool),
+    /// Nothing.
+    None,
+}
+
+/// Facts in rows.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct Table {
+    /// The heads of the columns.
+    pub columns: Vec<String>,
+    /// The rows, each with a value for each column.
+    pub rows: Vec<Vec<Value>>,
+}
+
+/// Something to draw over the scene while the body is selected.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct Mark {
+    /// What it stands for.
+    pub role: Role,
+    /// The same in words.
+    pub label: String,
+    /// From 0 to 1: how likely, how strong; 1 where that means nothing.
+    pub weight: f64,
+    /// Its shape.
+    pub shape: MarkShape,
+}
+
+/// What a mark stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// As it is.
+    True,
+    /// As a sensor reported it.
+    Reported,
+    /// As it was wanted.
+    Wish,
+    /// As it was done.
+    Done,
+    /// What was refused.
+    Refused,
+    /// What is claimed.
+    Claim,
+    /// Those in conflict.
+    Group,
+    /// As it was foreseen.
+    Predicted,
+    /// What was chosen.
+    Chosen,
+    /// What is known of others.
+    Known,
+    /// A way around.
+    Orbit,
+    /// A destination.
+    Target,
+}
+
+/// The shape of a mark.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(tag = "type", rename_all = "lowercase")]
+pub enum MarkShape {
+    /// A polyline.
+    Line {
+        /// Its points, in meters.
+        points_m: Vec<[f64; 3]>,
+    },
+    /// A polygon.
+    Area {
+        /// Its corners, in meters.
+        corners_m: Vec<[f64; 3]>,
+    },
+    /// A point.
+    Point {
+        /// Its place, in meters.
+        at_m: [f64; 3],
+    },
+    /// A circle, parallel to the ground.
+    Circle {
+        /// Its center, in meters.
+        at_m: [f64; 3],
+        /// Its radius, in meters.
+        radius_m: f64,
+    },
+}

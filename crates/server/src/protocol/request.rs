@@ -1,0 +1,173 @@
+//! What a page asks.
+
+use super::SessionId;
+use serde::{Deserialize, Serialize};
+
+/// A request; its reply has the same number.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(deny_unknown_fields)]
+pub struct Request {
+    /// Chosen by the page, from 1 on: a request that cannot be read is answered with number 0.
+    pub id: u32,
+    /// What is asked.
+    pub call: Call,
+}
+
+/// What a page can ask.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Call {
+    /// Lists a folder below those named at start (all of those without one).
+    Files {
+        /// Its path, as a listing gave it.
+        folder: Option<String>,
+    },
+    /// Opens a scenario or a recording: a new session, which is paused at its start and belongs to the socket.
+    Open {
+        /// What is opened.
+        what: Subject,
+        /// Another seed than the scenario's.
+        seed: Option<u64>,
+    },
+    /// Ends a session.
+    Close {
+        /// Which one.
+        session: SessionId,
+    },
+    /// Lets a session go on.
+    Play {
+        /// Which one.
+        session: SessionId,
+        /// How fast.
+        speed: Speed,
+    },
+    /// Lets a session stand still.
+    Pause {
+        /// Which one.
+        session: SessionId,
+    },
+    /// Goes some cycles on and stays paused; answered there.
+    Step {
+        /// Which session.
+        session: SessionId,
+        /// Number of cycles.
+        cycles: u32,
+    },
+    /// Goes to a cycle, earlier or later, and stays paused; answered there. A problem tells that another request
+    /// has changed the way meanwhile.
+    Seek {
+        /// Which session.
+        session: SessionId,
+        /// The cycle; a run that is over before it stays at its end.
+        cycle: u64,
+    },
+    /// Starts anew, with another seed and with another text where they are given. Answered by
+    /// [`Opened`](super::Answer::Opened), with the session's own number; the run before stays if the text is wrong.
+    Restart {
+        /// Which session.
+        session: SessionId,
+        /// Another seed.
+        seed: Option<u64>,
+        /// Another text for the scenario, which is not saved.
+        text: Option<String>,
+    },
+    /// Names the bodies whose scans frames shall hold.
+    Look {
+        /// Which session.
+        session: SessionId,
+        /// The bodies.
+        scans_of: Vec<Who>,
+    },
+    /// Grants the server further frames; it sends none without.
+    Credit {
+        /// Which session.
+        session: SessionId,
+        /// Number of frames.
+        frames: u32,
+    },
+    /// Asks what a body perceives, decides and does.
+    Inspect {
+        /// Which session.
+        session: SessionId,
+        /// Which body.
+        who: Who,
+    },
+    /// Asks for samples of all metrics from the sample of this number on.
+    Metrics {
+        /// Which session.
+        session: SessionId,
+        /// The number of the first sample wanted.
+        from: u32,
+    },
+    /// Asks for the events so far between two cycles (`from` is inside, `until` is not), at most `most`.
+    Events {
+        /// Which session.
+        session: SessionId,
+        /// The first cycle.
+        from: u64,
+        /// The cycle after the last one.
+        until: u64,
+        /// The largest number of events.
+        most: u32,
+    },
+    /// Asks for the scenario's text.
+    Source {
+        /// Which session.
+        session: SessionId,
+    },
+    /// Asks for the problems of a text that stands for the session's scenario.
+    Check {
+        /// Which session.
+        session: SessionId,
+        /// The text.
+        text: String,
+    },
+}
+
+/// What can be opened.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Subject {
+    /// A scenario file, or a foreign file that stands for one.
+    Scenario {
+        /// Its path, as a listing gave it.
+        path: String,
+    },
+    /// The scenario that `sidestep new WORLD` writes.
+    New {
+        /// The world's name.
+        world: String,
+    },
+    /// A run folder or an MCAP file of Sidestep.
+    Recording {
+        /// Its path, as a listing gave it.
+        path: String,
+    },
+}
+
+/// How fast a run is played.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(rename_all = "kebab-case")]
+pub enum Speed {
+    /// Simulated seconds per second, 0.1 to 100.
+    Times(f64),
+    /// As fast as it goes.
+    Fastest,
+}
+
+/// Which body: kind, number, and part of things that have parts.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(deny_unknown_fields)]
+pub struct Who {
+    /// Its kind, e.g. `robot`.
+    pub kind: String,
+    /// Its number among those of its kind.
+    pub number: u32,
+    /// Its part, where the thing has parts.
+    pub part: Option<u32>,
+}

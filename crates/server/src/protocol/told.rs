@@ -1,0 +1,249 @@
+//! What the server says: replies, and notices without a request.
+
+use super::{Cast, Event, Inspection, Scene, SessionId, Speed};
+use serde::Serialize;
+
+/// The reply to a request.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct Reply {
+    /// The request's number; 0 for a request that could not be read.
+    pub id: u32,
+    /// The answer, or why there is none.
+    #[serde(flatten)]
+    pub result: Outcome,
+}
+
+/// What came of a request.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(rename_all = "kebab-case")]
+#[expect(clippy::large_enum_variant, reason = "there is one at a time, for an instant")]
+pub enum Outcome {
+    /// What was asked for.
+    Answer(Answer),
+    /// Why it cannot be had.
+    Problem(Problem),
+}
+
+/// The answer to a request.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(tag = "is", rename_all = "kebab-case")]
+pub enum Answer {
+    /// It was done.
+    Done,
+    /// The content of a folder.
+    Files {
+        /// What can be opened in it, by name.
+        entries: Vec<FileEntry>,
+    },
+    /// A session at its start.
+    Opened {
+        /// Its number.
+        session: SessionId,
+        /// What stays as it is.
+        scene: Scene,
+        /// Its state.
+        status: Status,
+    },
+    /// What a body perceives, decides and does.
+    Inspection(Inspection),
+    /// Samples of all metrics.
+    Metrics {
+        /// The metrics.
+        names: Vec<MetricName>,
+        /// Number of the first sample here: the one that was asked for, or the number of all samples.
+        first: u32,
+        /// How often the samples were thinned by half, and numbered anew, since the session began: ask from 0
+        /// whenever it has changed.
+        thinned: u32,
+        /// The cycle of each sample.
+        cycles: Vec<f64>,
+        /// For each metric, its value in each sample.
+        values: Vec<Vec<Option<f64>>>,
+    },
+    /// Events, the oldest first.
+    Events {
+        /// The events.
+        entries: Vec<Event>,
+        /// Number of events of these cycles that are not here: beyond what was asked for, or never kept.
+        left_out: u64,
+        /// All events before this cycle are known: of a run those so far, of a recording soon all.
+        known_until: f64,
+    },
+    /// The scenario's text.
+    Source {
+        /// Its name in problems.
+        place: String,
+        /// The text.
+        text: String,
+        /// Whether it cannot be replaced by another text.
+        read_only: bool,
+    },
+    /// What is wrong with a text, and what will surprise.
+    Problems {
+        /// Nothing for a valid text without surprises.
+        problems: Vec<Problem>,
+    },
+}
+
+/// An error as people read it: where, what, remedy.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct Problem {
+    /// The file, option or request that is wrong.
+    pub place: String,
+    /// Its line, from 1.
+    pub line: Option<u32>,
+    /// Its column, from 1.
+    pub column: Option<u32>,
+    /// What is wrong.
+    pub cause: String,
+    /// What would be right.
+    pub remedy: String,
+    /// Whether the text is valid all the same.
+    pub is_warning: bool,
+}
+
+impl Problem {
+    /// Returns a problem without a line.
+    pub fn new(
+        place: impl Into<String>,
+        cause: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
+        let (line, column) = (None, None);
+        let (place, cause, remedy) = (place.into(), cause.into(), remedy.into());
+        Self { place, line, column, cause, remedy, is_warning: false }
+    }
+}
+
+/// Something in a folder.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct FileEntry {
+    /// Its path for other requests.
+    pub path: String,
+    /// Its name in its folder.
+    pub name: String,
+    /// What it is.
+    pub kind: FileKind,
+    /// A few words on its content; may be empty.
+    pub about: String,
+}
+
+/// What a file or a folder is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(rename_all = "kebab-case")]
+pub enum FileKind {
+    /// A folder of other things.
+    Folder,
+    /// A scenario.
+    Scenario,
+    /// The folder of a run.
+    Run,
+    /// An MCAP file.
+    Recording,
+    /// A sweep: its file, or its folder.
+    Sweep,
+    /// A file of another program that stands for a scenario.
+    Foreign,
+}
+
+/// What the server says unasked.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(tag = "notice", rename_all = "kebab-case")]
+pub enum Notice {
+    /// First of all.
+    Hello {
+        /// See [`VERSION`](super::VERSION).
+        version: u32,
+        /// The program and its build.
+        program: String,
+        /// The names of all worlds.
+        worlds: Vec<String>,
+        /// Whether texts of the page are refused.
+        read_only: bool,
+        /// What the command line asked to open.
+        open: Vec<Named>,
+    },
+    /// The bodies that the columns of frames with this number stand for; before the first such frame.
+    Cast(Cast),
+    /// The state of a session: when it changes, at most ten times a second.
+    Status(Status),
+    /// A session ended by itself, and why.
+    Ended {
+        /// Which one.
+        session: SessionId,
+        /// Why.
+        problem: Problem,
+    },
+}
+
+/// What the command line named: a kind as in [`Subject`](super::Subject), with its path.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct Named {
+    /// `scenario` or `recording`.
+    pub kind: String,
+    /// Its path.
+    pub path: String,
+}
+
+/// The state of a session.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct Status {
+    /// Which session.
+    pub session: SessionId,
+    /// What it does.
+    pub state: State,
+    /// Cycles done.
+    pub cycle: f64,
+    /// Number of cycles of the whole run; of a recording, those that were recorded.
+    pub cycles_planned: f64,
+    /// Simulated seconds since the start.
+    pub time_s: f64,
+    /// How fast it plays, or played last.
+    pub speed: Speed,
+    /// Cycles per second over the last second.
+    pub cycles_per_s: f64,
+    /// The seed, in decimal digits, as it may be larger than a number of JavaScript can be.
+    pub seed: String,
+    /// Digest of the state, while the run stands still.
+    pub digest: Option<String>,
+    /// Of a recording: whether the digest was confirmed, or will be.
+    pub banner: Option<String>,
+}
+
+/// What a session does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(rename_all = "kebab-case")]
+pub enum State {
+    /// It goes on.
+    Playing,
+    /// It stands still.
+    Paused,
+    /// It is on its way to a cycle that was asked for.
+    Seeking,
+    /// It has come to its end.
+    Over,
+    /// It cannot go on; the notice [`Notice::Ended`] says why.
+    Failed,
+}
+
+/// A metric.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct MetricName {
+    /// Its name in results.
+    pub key: String,
+    /// A few words for it.
+    pub words: String,
+    /// Its unit; may be empty.
+    pub unit: String,
+}

@@ -1,0 +1,63 @@
+//! The page's types are those of the server.
+//!
+//! `SIDESTEP_WRITE=protocol cargo test --release -p sidestep-server protocol` writes them.
+
+use super::*;
+use std::path::Path;
+use ts_rs::{Config, TS};
+
+/// The file that the page imports.
+const TYPES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../studio/src/protocol/types.ts");
+
+const HEAD: &str = "\
+// Written from crates/server/src/protocol by
+// `SIDESTEP_WRITE=protocol cargo test --release -p sidestep-server protocol`. Do not edit.
+";
+
+/// Returns the declaration of a type, with its documentation.
+fn declared<T: TS>(config: &Config) -> String {
+    let docs = T::docs().map(|docs| docs.trim_end().to_string() + "\n").unwrap_or_default();
+    format!("{docs}export {}\n", T::decl(config))
+}
+
+fn types() -> String {
+    let config = Config::new().with_large_int("number");
+    macro_rules! all {
+        ($($name:ty),+ $(,)?) => { [$(declared::<$name>(&config)),+] };
+    }
+    let types = all![
+        Request, Call, Subject, Speed, Who, Reply, Outcome, Answer, Problem, FileEntry, FileKind,
+        MetricName, Notice, Named, Status, State, Scene, Floor, StillBody, Shape, Look, Cast,
+        FrameText, Scan, Event, Inspection, Section, Fact, Value, Table, Mark, Role, MarkShape,
+    ];
+    let version = format!(
+        "/** Version of requests, replies, notices and frames together. */\nexport const VERSION = {VERSION};\n"
+    );
+    let lines = format!("{HEAD}\n{version}\n{}", types.join("\n"));
+    lines.lines().map(|line| line.trim_end().to_string() + "\n").collect()
+}
+
+#[test]
+fn the_page_has_the_types_of_the_protocol() {
+    let (path, expected) = (Path::new(TYPES), types());
+    if std::env::var("SIDESTEP_WRITE").is_ok_and(|what| what == "protocol") {
+        std::fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+        std::fs::write(path, &expected).expect("written");
+    }
+    let found = std::fs::read_to_string(path).unwrap_or_default();
+    assert!(found == expected, "to write {}: see the head of {}", path.display(), file!());
+}
+
+#[test]
+fn every_type_that_is_named_is_declared() {
+    let all = types();
+    let is_doc =
+        |line: &&str| ["*", "/**", "//"].iter().any(|begin| line.trim().starts_with(begin));
+    let code: Vec<&str> = all.lines().filter(|line| !is_doc(line)).collect();
+    let words = code.iter().flat_map(|line| line.split(|c: char| !c.is_ascii_alphanumeric()));
+    for name in words.filter(|word| word.starts_with(|c: char| c.is_ascii_uppercase())) {
+        let declared = [format!("export type {name} "), format!("export const {name} ")];
+        let is_declared = code.iter().any(|line| declared.iter().any(|d| line.starts_with(d)));
+        assert!(is_declared || name == "Array", "{name}");
+    }
+}

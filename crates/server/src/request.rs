@@ -1,0 +1,104 @@
+//! Reads requests: whatever a page sends, there is an answer.
+
+use crate::protocol::{Call, Problem, Request, SessionId};
+use serde::Deserialize;
+
+/// Longest text of a request, in bytes: room for a scenario with a map drawn in it.
+pub const MOST_REQUEST_BYTES: usize = 4 << 20;
+
+/// A request of which nothing but its number can be read.
+#[derive(Deserialize)]
+struct Numbered {
+    id: u32,
+}
+
+/// Returns the request in a text.
+///
+/// # Errors
+/// With the number of the request, 0 if it cannot be found, and what is wrong.
+pub fn decode(text: &str) -> Result<Request, (u32, Problem)> {
+    if text.len() > MOST_REQUEST_BYTES {
+        let cause = format!("it has more than {MOST_REQUEST_BYTES} bytes");
+        return Err((0, Problem::new("request", cause, "send less at a time")));
+    }
+    serde_json::from_str(text).map_err(|error| {
+        let id = serde_json::from_str(text).map_or(0, |Numbered { id }| id);
+        let cause = format!("it cannot be read: {error}");
+        (id, Problem::new("request", cause, "send JSON as the protocol has it"))
+    })
+}
+
+impl Call {
+    /// Returns the session that is asked, if it is one.
+    pub(crate) fn session(&self) -> Option<SessionId> {
+        match *self {
+            Self::Files { .. } | Self::Open { .. } => None,
+            Self::Close { session }
+            | Self::Play { session, .. }
+            | Self::Pause { session }
+            | Self::Step { session, .. }
+            | Self::Seek { session, .. }
+            | Self::Restart { session, .. }
+            | Self::Look { session, .. }
+            | Self::Credit { session, .. }
+            | Self::Inspect { session, .. }
+            | Self::Metrics { session, .. }
+            | Self::Events { session, .. }
+            | Self::Source { session }
+            | Self::Check { session, .. } => Some(session),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::{Speed, Subject};
+    use proptest::prelude::*;
+
+    #[test]
+    fn requests_are_read_as_the_protocol_has_them() {
+        for (text, call) in [
+            (r#"{"do":"files"}"#, Call::Files { folder: None }),
+            (
+                r#"{"do":"open","what":{"kind":"new","world":"robots"},"seed":null}"#,
+                Call::Open { what: Subject::New { world: "robots".into() }, seed: None },
+            ),
+            (
+                r#"{"do":"play","session":3,"speed":{"times":2.5}}"#,
+                Call::Play { session: 3, speed: Speed::Times(2.5) },
+            ),
+            (
+                r#"{"do":"play","session":3,"speed":"fastest"}"#,
+                Call::Play { session: 3, speed: Speed::Fastest },
+            ),
+        ] {
+            let request = decode(&format!(r#"{{"id":7,"call":{text}}}"#)).expect(text);
+            assert_eq!(request, Request { id: 7, call });
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_answered_with_its_number_if_it_has_one() {
+        for (text, id) in [
+            ("", 0),
+            ("[1,2", 0),
+            ("null", 0),
+            (r#"{"id":-1,"call":{}}"#, 0),
+            (r#"{"id":5,"call":{"do":"explode"}}"#, 5),
+            (r#"{"id":6,"call":{"do":"pause","session":1,"more":1}}"#, 6),
+            (r#"{"id":7,"call":{"do":"seek","session":1,"cycle":-3}}"#, 7),
+        ] {
+            assert_eq!(decode(text).map_err(|(id, _)| id), Err(id), "{text}");
+        }
+        let (_, problem) = decode(&" ".repeat(MOST_REQUEST_BYTES + 1)).expect_err("too long");
+        assert!(problem.cause.contains("bytes"));
+    }
+
+    proptest! {
+        #[test]
+        fn no_text_is_a_panic(text in "[{}\\[\\]\",:a-z0-9.-]{0,200}") {
+            let _ = decode(&text);
+        }
+    }
+}

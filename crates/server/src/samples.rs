@@ -1,0 +1,178 @@
+//! Samples of all numbers that a run measures, for lines against time.
+
+use crate::protocol::{Answer, MetricName};
+use serde_json::Value;
+use sidestep::kernel::Cycle;
+use sidestep::scenario::{Meaning, Told, told};
+use std::time::Duration;
+
+/// Samples beyond this number are thinned by half.
+const MOST_SAMPLES: usize = 2048;
+/// Metrics beyond this number are left out.
+const MOST_METRICS: usize = 400;
+/// The least time between two samples, before any thinning.
+const SPACING: Duration = Duration::from_millis(100);
+/// Sampling takes at most one part in so many of the time.
+const COST: u32 = 100;
+
+/// The samples of one run.
+pub(crate) struct Samples {
+    meanings: &'static [Meaning],
+    names: Vec<MetricName>,
+    cycles: Vec<Cycle>,
+    /// For each metric, its value in each sample.
+    values: Vec<Vec<Option<f64>>>,
+    thinned: u32,
+    spacing: Duration,
+    took: Duration,
+}
+
+impl Samples {
+    /// Returns a store for the metrics of a world, without anything in it.
+    pub(crate) fn new(meanings: &'static [Meaning]) -> Self {
+        Self {
+            meanings,
+            names: Vec::new(),
+            cycles: Vec::new(),
+            values: Vec::new(),
+            thinned: 0,
+            spacing: SPACING,
+            took: Duration::ZERO,
+        }
+    }
+
+    /// Whether a sample of a cycle is wanted so long after the last one.
+    pub(crate) fn is_due(&self, cycle: Cycle, since: Duration) -> bool {
+        let Some(&last) = self.cycles.last() else { return true };
+        cycle > last && since >= self.spacing.max(self.took.saturating_mul(COST))
+    }
+
+    /// Whether a cycle comes after all samples.
+    pub(crate) fn is_new(&self, cycle: Cycle) -> bool {
+        self.cycles.last().is_none_or(|&last| cycle > last)
+    }
+
+    /// Keeps the metrics of a cycle, which took a time to be told.
+    pub(crate) fn keep(&mut self, cycle: Cycle, metrics: &Value, took: Duration) {
+        self.took = took;
+        let mut found = Vec::new();
+        numbers(metrics, "", &mut found);
+        let row = self.cycles.len();
+        self.cycles.push(cycle);
+        self.values.iter_mut().for_each(|column| column.push(None));
+        for (key, value) in found {
+            if let Some(metric) = self.metric(key) {
+                self.values[metric][row] = Some(value);
+            }
+        }
+        if self.cycles.len() > MOST_SAMPLES {
+            self.thin();
+        }
+    }
+
+    /// Returns the column of a metric, a new one for a new metric.
+    fn metric(&mut self, key: String) -> Option<usize> {
+        let known = self.names.iter().position(|name| name.key == key);
+        if known.is_some() || self.names.len() == MOST_METRICS {
+            return known;
+        }
+        let Told { words, unit, .. } = told(self.meanings, &key);
+        self.names.push(MetricName { key, words, unit: unit.unwrap_or_default().into() });
+        self.values.push(vec![None; self.cycles.len()]);
+        Some(self.names.len() - 1)
+    }
+
+    /// Drops every second sample, but never the first.
+    fn thin(&mut self) {
+        fn halve<T: Copy>(all: &mut Vec<T>) {
+            *all = all.iter().copied().step_by(2).collect();
+        }
+        halve(&mut self.cycles);
+        self.values.iter_mut().for_each(halve);
+        self.thinned += 1;
+        self.spacing = self.spacing.saturating_mul(2);
+    }
+
+    /// Returns the samples from a number on.
+    pub(crate) fn answer(&self, from: u32) -> Answer {
+        let first = (from as usize).min(self.cycles.len());
+        Answer::Metrics {
+            names: self.names.clone(),
+            first: first as u32,
+            thinned: self.thinned,
+            cycles: self.cycles[first..].iter().map(|&cycle| cycle as f64).collect(),
+            values: self.values.iter().map(|column| column[first..].to_vec()).collect(),
+        }
+    }
+}
+
+/// Collects the numbers of a tree, named by the way to them; lists are no metrics.
+fn numbers(tree: &Value, path: &str, found: &mut Vec<(String, f64)>) {
+    match tree {
+        Value::Number(number) => {
+            found.extend(number.as_f64().map(|number| (path.to_string(), number)));
+        }
+        Value::Object(members) => members.iter().for_each(|(key, value)| match path {
+            "" => numbers(value, key, found),
+            _ => numbers(value, &format!("{path}.{key}"), found),
+        }),
+        _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    /// The names of all metrics, and the samples from a number on.
+    struct Told {
+        keys: Vec<String>,
+        first: u32,
+        cycles: Vec<f64>,
+        values: Vec<Vec<Option<f64>>>,
+    }
+
+    fn told_of(samples: &Samples, from: u32) -> Told {
+        let Answer::Metrics { names, first, cycles, values, .. } = samples.answer(from) else {
+            panic!("no metrics");
+        };
+        Told { keys: names.into_iter().map(|name| name.key).collect(), first, cycles, values }
+    }
+
+    #[test]
+    fn numbers_are_named_by_the_way_to_them_and_new_ones_have_no_past() {
+        let mut samples = Samples::new(&[]);
+        samples.keep(0, &json!({ "a": 1, "list": [1], "of": { "b": 2.5, "word": "x" } }), SPACING);
+        samples.keep(5, &json!({ "a": 2, "of": { "c": 3 } }), SPACING);
+        let all = told_of(&samples, 0);
+        assert_eq!((all.first, all.keys), (0, ["a", "of.b", "of.c"].map(String::from).into()));
+        assert_eq!(all.cycles, [0.0, 5.0]);
+        assert_eq!(all.values, [[Some(1.0), Some(2.0)], [Some(2.5), None], [None, Some(3.0)]]);
+        let last = told_of(&samples, 1);
+        assert_eq!((last.first, last.cycles), (1, vec![5.0]));
+        assert_eq!(last.values[0], [Some(2.0)]);
+        assert_eq!(told_of(&samples, 9).first, 2);
+    }
+
+    #[test]
+    fn samples_stay_within_their_bound_and_keep_the_first() {
+        let mut samples = Samples::new(&[]);
+        (0..5000).for_each(|cycle| samples.keep(cycle, &json!({ "n": cycle }), Duration::ZERO));
+        let Told { cycles, values, .. } = told_of(&samples, 0);
+        assert!(cycles.len() <= MOST_SAMPLES && cycles.len() > MOST_SAMPLES / 4);
+        assert_eq!(cycles[0], 0.0);
+        let same = |(cycle, value): (&f64, &Option<f64>)| Some(*cycle) == *value;
+        assert!(cycles.iter().zip(&values[0]).all(same));
+        assert!(samples.thinned > 0 && samples.spacing > SPACING);
+    }
+
+    #[test]
+    fn a_sample_is_wanted_of_later_cycles_alone() {
+        let mut samples = Samples::new(&[]);
+        assert!(samples.is_due(0, Duration::ZERO));
+        samples.keep(7, &json!({}), Duration::from_millis(5));
+        assert!(!samples.is_due(7, SPACING * 100) && !samples.is_new(7));
+        assert!(samples.is_due(8, SPACING * 5) && !samples.is_due(8, SPACING), "one in a hundred");
+    }
+}

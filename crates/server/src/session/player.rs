@@ -1,0 +1,366 @@
+//! A run that is played: what it does next, and what it answers.
+
+use super::inspect::inspection;
+use super::memory::Memory;
+use super::pace::{Beat, Pace, Rate};
+use super::scout::Scout;
+use super::stage::Stage;
+use super::viewer::{MOST_SCANNING, Viewer};
+use crate::SPEEDS;
+use crate::encode::scene;
+use crate::outbox::Outbox;
+use crate::protocol::{
+    Answer, Call, Notice, Outcome, Problem, Reply, SessionId, Speed, State, Status,
+};
+use sidestep::kernel::view::Scenery;
+use sidestep::kernel::{Cycle, Interrupt};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// The number of events in an answer; whoever wants more asks again.
+const MOST_EVENTS: u32 = 5000;
+
+/// A way to a cycle that a page waits for.
+#[derive(Debug, Clone, Copy)]
+struct Errand {
+    /// The request that is answered on arrival.
+    id: u32,
+    target: Cycle,
+}
+
+/// A run that is played.
+pub(super) struct Player {
+    session: SessionId,
+    outbox: Arc<Outbox>,
+    interrupt: Interrupt,
+    pub(super) stage: Stage,
+    scenery: Scenery,
+    viewer: Viewer,
+    memory: Memory,
+    scout: Option<Scout>,
+    state: State,
+    speed: Speed,
+    beat: Option<Beat>,
+    errand: Option<Errand>,
+    /// The request that is being taken.
+    taken: Option<u32>,
+    pace: Pace,
+    rate: Rate,
+    /// Digest of the state, and its cycle.
+    digest: Option<(Cycle, String)>,
+    /// What came of comparing a recording with its digest.
+    verdict: Option<String>,
+}
+
+impl Player {
+    pub(super) fn new(
+        session: SessionId,
+        outbox: Arc<Outbox>,
+        interrupt: Interrupt,
+        stage: Stage,
+    ) -> Self {
+        let scenery = stage.run.scenery();
+        let mut player = Self {
+            session,
+            viewer: Viewer::new(session, outbox.clone(), &scenery),
+            outbox,
+            interrupt,
+            memory: Memory::of(stage.run.as_ref(), stage.meanings()),
+            scout: None,
+            state: State::Paused,
+            speed: Speed::Times(1.0),
+            beat: None,
+            errand: None,
+            taken: None,
+            pace: Pace::default(),
+            rate: Rate::default(),
+            digest: None,
+            verdict: None,
+            stage,
+            scenery,
+        };
+        player.begin();
+        player
+    }
+
+    /// Makes a run ready that is at its start.
+    fn begin(&mut self) {
+        self.stage.run.heed(self.interrupt.clone());
+        self.stage.run.watch();
+        self.scout =
+            self.stage.again().map(|run| Scout::new(run, self.stage.until, self.interrupt.clone()));
+        self.stand();
+    }
+
+    fn restart(&mut self, seed: Option<u64>, text: Option<String>) -> Result<Answer, Problem> {
+        self.stage.restart(seed, text)?;
+        self.scenery = self.stage.run.scenery();
+        self.viewer.restart(&self.scenery);
+        self.memory = Memory::of(self.stage.run.as_ref(), self.stage.meanings());
+        (self.digest, self.pace, self.rate) = (None, Pace::default(), Rate::default());
+        self.begin();
+        Ok(self.opened())
+    }
+
+    /// Returns what a page is told that has opened the session.
+    pub(super) fn opened(&mut self) -> Answer {
+        let is_recording = self.stage.recorded.is_some();
+        let scene = scene(self.stage.run.as_ref(), &self.scenery, is_recording);
+        Answer::Opened { session: self.session, scene, status: self.status(Instant::now()) }
+    }
+
+    fn cycle(&self) -> Cycle {
+        self.stage.run.cycle()
+    }
+
+    fn is_at_end(&self) -> bool {
+        self.cycle() >= self.stage.until || self.stage.run.is_over()
+    }
+
+    /// Answers a request, now or on arrival.
+    pub(super) fn take(&mut self, id: u32, call: Call) {
+        self.taken = Some(id);
+        if let Some(result) = self.answer(id, call) {
+            self.reply(id, result);
+        }
+        self.taken = None;
+    }
+
+    fn reply(&self, id: u32, result: Result<Answer, Problem>) {
+        let result = result.map_or_else(Outcome::Problem, Outcome::Answer);
+        self.outbox.reply(&Reply { id, result });
+    }
+
+    /// Returns the answer to a request; `None` if it is given later.
+    fn answer(&mut self, id: u32, call: Call) -> Option<Result<Answer, Problem>> {
+        Some(match call {
+            Call::Play { speed, .. } => self.play(speed),
+            Call::Pause { .. } => {
+                self.give_up("the run was paused");
+                self.stand();
+                Ok(Answer::Done)
+            }
+            Call::Step { cycles, .. } => {
+                self.go(id, self.cycle().saturating_add(u64::from(cycles)));
+                return None;
+            }
+            Call::Seek { cycle, .. } => {
+                self.go(id, cycle);
+                return None;
+            }
+            Call::Restart { seed, text, .. } => {
+                self.give_up("the run was started anew");
+                let result = self.restart(seed, text);
+                if result.is_err() && self.state == State::Seeking {
+                    self.stand();
+                }
+                result
+            }
+            other => self.told(other),
+        })
+    }
+
+    /// Answers what does not change where the run is.
+    fn told(&mut self, call: Call) -> Result<Answer, Problem> {
+        let run = self.stage.run.as_mut();
+        match call {
+            Call::Look { scans_of, .. } if scans_of.len() > MOST_SCANNING => {
+                let cause = format!("scans of at most {MOST_SCANNING} bodies are shown");
+                Err(Problem::new("look", cause, "name fewer"))
+            }
+            Call::Look { scans_of, .. } => {
+                self.viewer.look(scans_of);
+                Ok(Answer::Done)
+            }
+            Call::Credit { frames, .. } => {
+                self.viewer.grant(frames);
+                Ok(Answer::Done)
+            }
+            Call::Inspect { who, .. } => inspection(run, &who).map(Answer::Inspection),
+            Call::Metrics { from, .. } => Ok(self.memory.samples.answer(from)),
+            Call::Events { from, until, most, .. } => {
+                self.viewer.drain(run, &mut self.memory.log, Instant::now());
+                Ok(self.memory.log.answer(from, until, most.min(MOST_EVENTS)))
+            }
+            Call::Source { .. } => {
+                let source = &self.stage.source;
+                let (place, text) = (source.place.clone(), source.text.clone());
+                Ok(Answer::Source { place, text, read_only: self.stage.is_fixed() })
+            }
+            _ => Err(Problem::new("request", "it is not for a session", "report this as a bug")),
+        }
+    }
+
+    fn play(&mut self, speed: Speed) -> Result<Answer, Problem> {
+        if let Speed::Times(times) = speed
+            && !SPEEDS.contains(&times)
+        {
+            let cause = format!("{times} times is no speed");
+            return Err(Problem::new("play", cause, "give 0.1 to 100, or `fastest`"));
+        }
+        self.give_up("the run was played");
+        self.speed = speed;
+        self.beat = Beat::new(speed, self.scenery.cycle_s, Instant::now(), self.cycle());
+        match self.is_at_end() {
+            true => self.stand(),
+            false => self.state = State::Playing,
+        }
+        Ok(Answer::Done)
+    }
+
+    /// Stands still where the run is.
+    fn stand(&mut self) {
+        let is_at_end = self.is_at_end();
+        self.state = if is_at_end { State::Over } else { State::Paused };
+        self.errand = None;
+        self.rate = Rate::default();
+        self.viewer.refresh();
+        let cycle = self.cycle();
+        self.memory.note_stand(self.stage.run.as_ref());
+        if self.digest.as_ref().is_none_or(|(of, _)| *of != cycle) {
+            self.digest = Some((cycle, self.stage.run.digest().to_string()));
+        }
+        self.verdict = self.stage.verdict(self.stage.run.as_ref()).or(self.verdict.take());
+    }
+
+    /// Answers the request of a way that is not gone to its end.
+    pub(super) fn give_up(&mut self, cause: &str) {
+        if let Some(Errand { id, target }) = self.errand.take() {
+            let place = format!("cycle {target}");
+            self.reply(id, Err(Problem::new(place, cause, "ask again to go there")));
+        }
+    }
+
+    /// Sets out to a cycle, from the nearest place that is known.
+    fn go(&mut self, id: u32, cycle: Cycle) {
+        self.give_up("another way was asked for");
+        let target = cycle.min(self.stage.until);
+        (self.state, self.errand) = (State::Seeking, Some(Errand { id, target }));
+        let here = self.cycle();
+        let Some((at, checkpoint)) = self.memory.keyframes.before(target) else { return };
+        if target < here || at > here {
+            let run = self.stage.run.as_mut();
+            self.viewer.drain(run, &mut self.memory.log, Instant::now());
+            // A bug ends the session, with what it says.
+            run.restore(checkpoint).unwrap_or_else(|error| panic!("a keyframe: {error}"));
+            self.digest = None;
+            self.viewer.moved();
+        }
+    }
+
+    /// Does what is due, for some milliseconds at most. Returns how long nothing will be, unless there is a
+    /// request; `None` for ever.
+    pub(super) fn turn(&mut self) -> Option<Duration> {
+        let now = Instant::now();
+        match (self.state, self.errand) {
+            (State::Playing, _) => {
+                let cycle = self.cycle();
+                let beat = self.beat.as_mut();
+                let target = beat.map_or(self.stage.until, |beat| beat.target(now, cycle));
+                self.slice(target.min(self.stage.until));
+            }
+            (State::Seeking, Some(Errand { target, .. })) => self.slice(target),
+            _ => {}
+        }
+        self.arrive();
+        let now = Instant::now();
+        self.viewer.attend(self.stage.run.as_mut(), &mut self.memory.log, now);
+        let status = self.status(now);
+        self.viewer.tell(status.clone(), now);
+        let is_free = self.work_due(now).is_none_or(|due| due > now);
+        if is_free && self.scout() {
+            return Some(Duration::ZERO);
+        }
+        let due = [self.work_due(now), self.viewer.frame_due(), self.status_due(&status)];
+        let next = due.into_iter().flatten().min()?;
+        Some(next.saturating_duration_since(Instant::now()))
+    }
+
+    fn work_due(&self, now: Instant) -> Option<Instant> {
+        match (self.state, &self.beat) {
+            (State::Playing, Some(beat)) => Some(beat.next(self.cycle())),
+            (State::Playing | State::Seeking, _) => Some(now),
+            _ => None,
+        }
+    }
+
+    fn status_due(&self, status: &Status) -> Option<Instant> {
+        self.viewer.has_to_tell(status).then(|| self.viewer.status_due())
+    }
+
+    /// Stands still where the way or the run ends.
+    fn arrive(&mut self) {
+        let is_there = self.errand.is_some_and(|errand| self.cycle() >= errand.target);
+        let is_on_the_way = matches!(self.state, State::Playing | State::Seeking);
+        if is_on_the_way && (is_there || self.is_at_end()) {
+            let errand = self.errand;
+            self.stand();
+            if let Some(Errand { id, .. }) = errand {
+                self.reply(id, Ok(Answer::Done));
+            }
+        }
+    }
+
+    /// Goes on for some milliseconds, but not beyond a cycle.
+    fn slice(&mut self, target: Cycle) {
+        let asked = self.pace.cycles().min(target.saturating_sub(self.cycle()));
+        if asked == 0 || self.stage.run.is_over() {
+            return;
+        }
+        let started = Instant::now();
+        let done = self.stage.run.advance(asked);
+        let took = started.elapsed();
+        self.pace.note(done, took);
+        self.rate.note(Instant::now(), done);
+        self.viewer.moved();
+        self.digest = None;
+        self.memory.note(self.stage.run.as_ref(), took);
+    }
+
+    /// Goes ahead where there is nothing else to do; returns whether there was something ahead.
+    fn scout(&mut self) -> bool {
+        let Some(scout) = &mut self.scout else { return false };
+        if let Some(run) = scout.slice(&mut self.memory) {
+            self.verdict = self.stage.verdict(run).or(self.verdict.take());
+            self.scout = None;
+        }
+        true
+    }
+
+    fn status(&mut self, now: Instant) -> Status {
+        let cycle = self.cycle();
+        let is_still = matches!(self.state, State::Paused | State::Over);
+        let digest = self.digest.as_ref().filter(|(of, _)| is_still && *of == cycle);
+        let banner = self.stage.recorded.as_ref().map(|_| {
+            let later = "Computed again; the digest is compared at the end.";
+            self.verdict.clone().unwrap_or_else(|| later.into())
+        });
+        Status {
+            session: self.session,
+            state: self.state,
+            cycle: cycle as f64,
+            cycles_planned: self.stage.until as f64,
+            time_s: cycle as f64 * self.scenery.cycle_s,
+            speed: self.speed,
+            cycles_per_s: if is_still { 0.0 } else { self.rate.per_s(now) },
+            seed: self.stage.run.plan().seed.to_string(),
+            digest: digest.map(|(_, digest)| digest.clone()),
+            banner,
+        }
+    }
+
+    /// Tells that the session ends here; the run is not touched any more.
+    pub(super) fn fail(&mut self, problem: Problem) {
+        let errand = self.errand.map(|errand| errand.id);
+        self.give_up("the session has ended");
+        // Whoever asked for what met the bug waits for an answer, too.
+        if let Some(id) = self.taken.take().filter(|id| Some(*id) != errand) {
+            self.reply(id, Err(problem.clone()));
+        }
+        if let Some(told) = self.viewer.last_told() {
+            self.outbox
+                .status(self.session, &Notice::Status(Status { state: State::Failed, ..told }));
+        }
+        self.outbox.notice(&Notice::Ended { session: self.session, problem });
+    }
+}

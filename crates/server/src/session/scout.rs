@@ -1,0 +1,57 @@
+//! A second computation of a recorded run, ahead of the one that is watched, whenever there is nothing else to do:
+//! so a page knows all events of a recording, any cycle is near, and the digest is confirmed, before all was played.
+
+use super::memory::Memory;
+use super::pace::Pace;
+use sidestep::kernel::view::Look;
+use sidestep::kernel::{Cycle, Interrupt, Simulation};
+use std::time::{Duration, Instant};
+
+/// Events are taken over so often: a run keeps some thousands only.
+const EVENTS: Duration = Duration::from_millis(100);
+
+/// A run on its way to its end.
+pub(super) struct Scout {
+    run: Box<dyn Simulation>,
+    until: Cycle,
+    pace: Pace,
+    noted: Instant,
+}
+
+impl Scout {
+    /// Sends a run out that is at its start.
+    pub(super) fn new(mut run: Box<dyn Simulation>, until: Cycle, interrupt: Interrupt) -> Self {
+        run.heed(interrupt);
+        run.watch();
+        Self { run, until, pace: Pace::default(), noted: Instant::now() }
+    }
+
+    /// Goes on for some milliseconds. Returns the run once it is at its end.
+    pub(super) fn slice(&mut self, memory: &mut Memory) -> Option<&dyn Simulation> {
+        self.skip(memory);
+        let asked = self.pace.cycles().min(self.until.saturating_sub(self.run.cycle()));
+        let started = Instant::now();
+        let done = self.run.advance(asked);
+        let took = started.elapsed();
+        self.pace.note(done, took);
+        memory.note(self.run.as_ref(), took);
+        let is_at_end = self.run.cycle() >= self.until || self.run.is_over() || done == 0;
+        if is_at_end || self.noted.elapsed() >= EVENTS {
+            memory.log.note_ahead(&mut self.run.frame(Look::BODIES));
+            self.noted = Instant::now();
+        }
+        is_at_end.then_some(self.run.as_ref())
+    }
+
+    /// Leaves out what the watched run was the first to compute.
+    fn skip(&mut self, memory: &mut Memory) {
+        let known = memory.keyframes.before(memory.log.frontier());
+        if let Some((at, checkpoint)) = known
+            && at > self.run.cycle()
+        {
+            self.run.restore(checkpoint).unwrap_or_else(|error| panic!("a keyframe: {error}"));
+            // What it did before is known.
+            drop(self.run.frame(Look::BODIES));
+        }
+    }
+}

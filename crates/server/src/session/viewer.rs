@@ -1,0 +1,169 @@
+//! What a session shows: frames for which there is credit, and its state when it changes.
+
+use crate::FRAMES_PER_S;
+use crate::chronicle::Chronicle;
+use crate::encode::{Encoder, body, scan};
+use crate::outbox::Outbox;
+use crate::protocol::{FrameText, Notice, SessionId, Status, Who};
+use sidestep::kernel::Simulation;
+use sidestep::kernel::view::{Frame, Look, Scans, Scenery};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// The time between two frames.
+const FRAME: Duration = Duration::from_nanos(1_000_000_000 / FRAMES_PER_S as u64);
+/// The time between two states.
+const STATUS: Duration = Duration::from_millis(100);
+/// Without credit, events are taken over so often: a run keeps some thousands only.
+const EVENTS: Duration = Duration::from_millis(250);
+/// Credit beyond this is forgotten.
+const MOST_CREDIT: u32 = 1000;
+/// The number of bodies whose scans are shown.
+pub(super) const MOST_SCANNING: usize = 16;
+
+/// The view of one socket on one session.
+pub(super) struct Viewer {
+    session: SessionId,
+    outbox: Arc<Outbox>,
+    encoder: Encoder,
+    credit: u32,
+    left_out: u32,
+    /// The bodies whose scans frames hold.
+    scans_of: Vec<Who>,
+    /// Whether the last frame shows something else than there is now.
+    is_stale: bool,
+    /// Whether the run went on since a frame was last due.
+    has_moved: bool,
+    frame_due: Instant,
+    events_due: Instant,
+    status_due: Instant,
+    told: Option<Status>,
+}
+
+impl Viewer {
+    pub(super) fn new(session: SessionId, outbox: Arc<Outbox>, scenery: &Scenery) -> Self {
+        let now = Instant::now();
+        Self {
+            session,
+            outbox,
+            encoder: Encoder::new(session, scenery),
+            credit: 0,
+            left_out: 0,
+            scans_of: Vec::new(),
+            is_stale: true,
+            has_moved: false,
+            frame_due: now,
+            events_due: now,
+            status_due: now,
+            told: None,
+        }
+    }
+
+    /// Goes over to another run.
+    pub(super) fn restart(&mut self, scenery: &Scenery) {
+        // A frame of the run before that was not sent is of no more use.
+        if self.outbox.clear(self.session) {
+            self.credit += 1;
+        }
+        self.encoder.restart(scenery);
+        (self.is_stale, self.has_moved, self.told) = (true, false, None);
+    }
+
+    /// Notes that the run went on, or back.
+    pub(super) fn moved(&mut self) {
+        (self.is_stale, self.has_moved) = (true, true);
+    }
+
+    /// Asks for a frame, whatever the last one showed.
+    pub(super) fn refresh(&mut self) {
+        self.is_stale = true;
+    }
+
+    /// Takes credit for further frames.
+    pub(super) fn grant(&mut self, frames: u32) {
+        self.credit = self.credit.saturating_add(frames).min(MOST_CREDIT);
+    }
+
+    /// Shows scans of these bodies.
+    pub(super) fn look(&mut self, scans_of: Vec<Who>) {
+        (self.scans_of, self.is_stale) = (scans_of, true);
+    }
+
+    /// Sends a frame if one is due and there is credit.
+    pub(super) fn attend(&mut self, run: &mut dyn Simulation, log: &mut Chronicle, now: Instant) {
+        if !self.is_stale || now < self.frame_due {
+            return;
+        }
+        if self.credit == 0 {
+            if std::mem::take(&mut self.has_moved) {
+                self.left_out = self.left_out.saturating_add(1);
+                self.frame_due = (self.frame_due + FRAME).max(now);
+            }
+            if now >= self.events_due {
+                self.drain(run, log, now);
+            }
+            return;
+        }
+        self.frame_due = (self.frame_due + FRAME).max(now);
+        self.events_due = now + EVENTS;
+        let mut frame =
+            run.frame(Look { scans: Scans::Of(self.scans_of.iter().filter_map(body).collect()) });
+        log.note(&mut frame);
+        self.send(&frame, log);
+        (self.is_stale, self.has_moved) = (false, false);
+    }
+
+    fn send(&mut self, frame: &Frame, log: &mut Chronicle) {
+        let (events, events_left_out) = log.take_fresh();
+        let scans = frame.scans.iter().map(scan).collect();
+        let text = FrameText { scans, events, events_left_out };
+        let (cast, bytes) = self.encoder.encode(frame, &text, self.left_out);
+        let cast = cast.map(Notice::Cast);
+        match self.outbox.frame(self.session, cast.as_ref(), bytes) {
+            // It takes the place of one that has cost its credit.
+            true => self.left_out = self.left_out.saturating_add(1),
+            false => self.credit -= 1,
+        }
+    }
+
+    /// Takes over the events of a run of which nothing is shown.
+    pub(super) fn drain(&mut self, run: &mut dyn Simulation, log: &mut Chronicle, now: Instant) {
+        log.note(&mut run.frame(Look::BODIES));
+        self.events_due = now + EVENTS;
+    }
+
+    /// Tells the state, if it is another one and not too soon; a change of what the session does, or of where it
+    /// stands still, is told at once.
+    pub(super) fn tell(&mut self, status: Status, now: Instant) {
+        let is_same = self.told.as_ref() == Some(&status);
+        let is_urgent = self
+            .told
+            .as_ref()
+            .is_none_or(|told| told.state != status.state || told.digest != status.digest);
+        if is_same || (now < self.status_due && !is_urgent) {
+            return;
+        }
+        self.outbox.status(self.session, &Notice::Status(status.clone()));
+        (self.told, self.status_due) = (Some(status), now + STATUS);
+    }
+
+    /// Whether the state that was told last is an older one than this.
+    pub(super) fn has_to_tell(&self, status: &Status) -> bool {
+        self.told.as_ref() != Some(status)
+    }
+
+    /// Returns the state that was told last.
+    pub(super) fn last_told(&self) -> Option<Status> {
+        self.told.clone()
+    }
+
+    /// Returns when a state may be told again.
+    pub(super) fn status_due(&self) -> Instant {
+        self.status_due
+    }
+
+    /// Returns when a frame can be sent, if there is one to send.
+    pub(super) fn frame_due(&self) -> Option<Instant> {
+        (self.is_stale && self.credit > 0).then_some(self.frame_due)
+    }
+}

@@ -1,0 +1,96 @@
+//! What is noted of one airplane while its group decides and flies.
+
+use crate::agents::Decided;
+use crate::agents::contact::Contacts;
+use crate::agents::network::Traffic;
+use crate::events::Event;
+use crate::flight::{Action, Known};
+use crate::intruder::Intruder;
+use crate::shield::{Decision, Flyer, Plan, Side, Way};
+use sidestep_kernel::{EntityId, Slot};
+
+/// Notes for somebody who asks; no run makes any.
+#[derive(Debug, Default)]
+pub(crate) struct Notes {
+    /// The airplane.
+    pub(crate) slot: Slot,
+    /// The airplanes of its group that the method flies, as all see them.
+    pub(crate) group: Vec<Known>,
+    /// Those of the group that mind nobody.
+    pub(crate) intruders: Vec<Intruder>,
+    /// What it knew of others before.
+    pub(crate) contacts: Contacts,
+    /// What the optimizer decided for it.
+    pub(crate) decided: Option<Decided>,
+    /// Messages of the group's optimization.
+    pub(crate) talk: Traffic,
+    /// Its actions in the order in which it wants them; none by methods that give a heading.
+    pub(crate) wishes: Vec<Action>,
+    /// The different ways of those for one `dt`.
+    pub(crate) ways: Vec<Way>,
+    /// What the shield made of that.
+    pub(crate) decision: Option<Decision>,
+    /// Its stored orbit before.
+    pub(crate) flyer: Option<Flyer>,
+    /// Those because of whom it does not fly its first wish.
+    pub(crate) because: Vec<EntityId>,
+    /// Messages of the group's shield.
+    pub(crate) exchanged: Traffic,
+    /// The way that it flies.
+    pub(crate) flown: Option<Way>,
+    /// What happened to it.
+    pub(crate) events: Vec<Event>,
+}
+
+impl Notes {
+    /// Notes what a group knows before it decides.
+    pub(crate) fn begin(&mut self, group: &[Known], intruders: &[Intruder], contacts: &[Contacts]) {
+        if let Some(me) = self.place(group.iter().map(|known| known.slot)) {
+            self.contacts.clone_from(&contacts[me]);
+            (self.group, self.intruders) = (group.to_vec(), intruders.to_vec());
+        }
+    }
+
+    /// Returns its place in a group.
+    fn place(&self, mut group: impl Iterator<Item = Slot>) -> Option<usize> {
+        group.position(|slot| slot == self.slot)
+    }
+
+    /// Returns the part of it among those of its group.
+    pub(crate) fn own<'a, T>(&self, of_all: &'a [T]) -> Option<&'a T> {
+        of_all.get(self.place(self.group.iter().map(|known| known.slot))?)
+    }
+
+    /// Notes what the shield decided, and because of whom it refused the first wish.
+    pub(crate) fn shielded(
+        &mut self,
+        flyers: &[Flyer],
+        wishes: &[Vec<Way>],
+        decisions: &[Decision],
+        dtau_s: f64,
+    ) {
+        let Some(me) = self.place(flyers.iter().map(|flyer| flyer.id)) else { return };
+        self.flyer = Some(flyers[me].clone());
+        self.decision = Some(decisions[me]);
+        let Some(wish) = wishes[me].first().filter(|_| decisions[me].candidate != Some(0)) else {
+            return;
+        };
+        let steps = wish.omegas_rad_s.len();
+        let fallback = |k: usize| Plan::fallback(flyers[k].clone(), steps, dtau_s);
+        let plan = |k: usize, way: Option<usize>, side: Side| match way.map(|way| &wishes[k][way]) {
+            Some(way) => Plan::new(flyers[k].clone(), way, dtau_s, side),
+            None => fallback(k),
+        };
+        let wanted = Plan::new(flyers[me].clone(), wish, dtau_s, flyers[me].fallback);
+        let against = |other: &dyn Fn(usize) -> Plan| -> Vec<EntityId> {
+            let refuses = |k: &usize| *k != me && !wanted.is_compatible(&other(*k));
+            (0..flyers.len()).filter(refuses).map(|k| flyers[k].id).collect()
+        };
+        // It gave way to what another one flies, to what that one wanted before it gave way too, or to
+        // the orbit on which that one may always stay.
+        let flown = |k: usize| plan(k, decisions[k].candidate, decisions[k].fallback);
+        let first = |k: usize| plan(k, (!wishes[k].is_empty()).then_some(0), flyers[k].fallback);
+        let all = [against(&flown), against(&first), against(&fallback)];
+        self.because = all.into_iter().find(|some| !some.is_empty()).unwrap_or_default();
+    }
+}

@@ -1,0 +1,265 @@
+//! What a chain's initiator wants, who objects and why, what the ladder makes of that, and what comes of
+//! it for one connector: the cycle is tried on a copy of the state, for its group alone.
+
+mod motion;
+#[cfg(test)]
+mod tests;
+
+use super::driver::{Driver, Task};
+use super::notes::Notes;
+use super::perceive::Looking;
+use super::rods::geometry::{Point, distance, in_dimensions};
+use super::rods::veto::Veto;
+use super::scratch::Scratch;
+use super::state::{Body, ChainState};
+use super::view::who_of_obstacle;
+use super::world::ChainWorld;
+use super::{act, claim, join};
+use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::ports::ManualClock;
+use sidestep_kernel::view::{Inspection, Kind, MarkShape, Role, Section, Table, Value, Who};
+use sidestep_kernel::{Cycle, Slot, Turn};
+
+impl<const D: usize> ChainWorld<D> {
+    /// Returns what is to tell of a connector, or of its robot, in cycle `now`; `None` for one that is
+    /// not there.
+    pub(crate) fn inspect(
+        &self,
+        state: &ChainState<D>,
+        now: Cycle,
+        who: Who,
+    ) -> Option<Inspection> {
+        let (kind, slot, Some(part)) = who else { return None };
+        if slot as usize >= state.len() {
+            return None;
+        }
+        let before = state.body(slot as usize).clone();
+        let parts = match kind {
+            Kind::Connector => before.chain.points().len(),
+            Kind::Robot => before.robots.len(),
+            _ => 0,
+        };
+        if part as usize >= parts {
+            return None;
+        }
+        let mut scratch = Scratch::new(self);
+        scratch.notes = Some(Box::new(Notes { slot, ..Notes::default() }));
+        let mut told = Inspection::new(who, now, self.title(who));
+        let (after, group) = self.try_cycle(&state.copied(), now, slot, (&mut scratch, &mut told));
+        let notes = *scratch.notes.take()?;
+        let asked =
+            Asked { world: self, slot, kind, k: part as usize, before, after, notes, scratch };
+        asked.all(&mut told, &group);
+        Some(told)
+    }
+
+    /// Returns what people call a connector, or its robot.
+    fn title(&self, (kind, slot, part): Who) -> String {
+        let name = &self.chains[slot as usize].name;
+        let chain = if name.is_empty() { format!("chain {slot}") } else { name.clone() };
+        format!("{kind} {} of {chain}", part.unwrap_or_default())
+    }
+
+    /// Runs a cycle of the group of one chain, up to that chain's turn; returns the chain after that,
+    /// and the group.
+    fn try_cycle(
+        &self,
+        state: &ChainState<D>,
+        now: Cycle,
+        slot: Slot,
+        (scratch, told): (&mut Scratch<D>, &mut Inspection),
+    ) -> (Body<D>, Vec<Slot>) {
+        let clock = &ManualClock::default();
+        let turn = &mut Turn { world: self, state, now, clock, scratch };
+        let groups = Groups::new(state.len());
+        (0..state.len()).for_each(|slot| claim::claim_box(turn, slot));
+        (0..state.len()).for_each(|slot| join::join(turn, slot, &groups));
+        let mut group = Vec::new();
+        groups.members(groups.leader(slot), &mut group);
+        group.sort_unstable();
+        for &member in &group {
+            let mut looking = Looking { world: self, state, now, scratch: turn.scratch };
+            if member == slot {
+                navigates(&mut looking, slot, told);
+            }
+            let decision = looking.decide(member);
+            state.set_decision(member as usize, decision);
+        }
+        for &member in group.iter().take_while(|&&member| member <= slot) {
+            if member == slot {
+                turn.scratch.events.clear();
+            }
+            act::act_one(turn, &group, member);
+        }
+        (state.body(slot as usize).clone(), group)
+    }
+}
+
+/// Tells what a leader on wheels perceives, and the layer that acts.
+fn navigates<const D: usize>(looking: &mut Looking<'_, D>, slot: Slot, told: &mut Inspection) {
+    let Some(sight) = looking.sight(slot) else { return };
+    let leader = &sight.navigator.leader;
+    let decision = leader.decide(sight.leader.followed, &sight.percept);
+    let (walls, target) = (sight.percept.walls_m, sight.percept.target);
+    told.tell(
+        Section::new("Perceives")
+            .fact("wall on the left", Value::meters(walls.left))
+            .fact("wall on the right", Value::meters(walls.right))
+            .fact("range of the laser", Value::meters(leader.laser.range_m()))
+            .fact("target ahead", target.map(|target| Value::degrees(target.bearing_rad)))
+            .fact("way to it is free", target.map(|target| target.way_is_free)),
+    );
+    let speed = |m_s| Value::number(m_s, "m/s");
+    told.tell(
+        Section::new("Decides")
+            .fact("layer", format!("{}: {}", decision.layer as u8, decision.layer.name()))
+            .fact("left wheel", speed(decision.wheels.left_m_s))
+            .fact("right wheel", speed(decision.wheels.right_m_s))
+            .fact("follows the left wall", decision.followed.left)
+            .fact("follows the right wall", decision.followed.right),
+    );
+}
+
+/// A look at one connector, or its robot, before and after a cycle.
+struct Asked<'a, const D: usize> {
+    world: &'a ChainWorld<D>,
+    slot: Slot,
+    kind: Kind,
+    k: usize,
+    before: Body<D>,
+    after: Body<D>,
+    notes: Notes<D>,
+    scratch: Scratch<D>,
+}
+
+impl<const D: usize> Asked<'_, D> {
+    fn all(&self, told: &mut Inspection, group: &[Slot]) {
+        self.is_now(told);
+        self.is_in_group(told, group);
+        self.wants(told);
+        self.is_vetoed(told);
+        self.climbs(told);
+        self.moves(told);
+        self.follows(told);
+        self.comes_out(told);
+    }
+
+    /// Returns its present task; none after the last.
+    fn task(&self) -> Option<&Task<D>> {
+        self.world.chains[self.slot as usize].tasks.get(self.before.driving.task as usize)
+    }
+
+    fn connector(&self, k: usize) -> Who {
+        (Kind::Connector, self.slot, Some(k as u32))
+    }
+
+    /// Returns where the body is in a state of the chain.
+    fn place(&self, body: &Body<D>) -> [f64; 3] {
+        match self.kind {
+            Kind::Robot => in_dimensions(body.robots[self.k].pose.at),
+            _ => in_dimensions(body.chain.points()[self.k]),
+        }
+    }
+
+    fn is_now(&self, told: &mut Inspection) {
+        let connector = &self.before.chain.connectors()[self.k];
+        let task = self.task();
+        let leader =
+            task.filter(|task| !matches!(task.driver, Driver::Rest)).map(|task| task.agent);
+        let tasks = self.world.chains[self.slot as usize].tasks.len();
+        let number = (self.before.driving.task as usize + 1).min(tasks);
+        told.tell(
+            Section::new("Now")
+                .fact("place", self.place(&self.before))
+                .fact("leads", leader == Some(self.k))
+                .fact("initiator", leader.map(|k| self.connector(k)))
+                .fact("task", task.map_or("all are done", |task| task.driver.name()))
+                .fact("task number", format!("{number} of {tasks}"))
+                .fact("cycles without progress", Value::count(self.before.driving.idle))
+                .fact("has failed", connector.failed)
+                .fact("is scattered", self.before.scattered.is_some()),
+        );
+    }
+
+    fn is_in_group(&self, told: &mut Inspection, group: &[Slot]) {
+        let mut table = Table::new(["turn", "chain"]);
+        for (turn, &slot) in group.iter().enumerate().filter(|_| group.len() > 1) {
+            table.row([Value::count(turn + 1), Value::Who((Kind::Rods, slot, None))]);
+        }
+        let turn = group.iter().position(|&slot| slot == self.slot).map_or(0, |turn| turn + 1);
+        told.tell(
+            Section::new("Conflict group")
+                .fact("chains", Value::count(group.len()))
+                .fact("turn", Value::count(turn))
+                .table(table),
+        );
+    }
+
+    /// Tells the wish of the initiator.
+    fn wants(&self, told: &mut Inspection) {
+        let (Some(task), Some(wish)) = (self.task(), self.notes.wish) else { return };
+        let at = self.before.chain.points()[task.agent];
+        let target = match &task.driver {
+            Driver::Targets(targets) => targets.places.get(self.before.driving.next as usize),
+            _ => None,
+        };
+        told.tell(
+            Section::new("Wish")
+                .fact("of", self.connector(task.agent))
+                .fact("what", wish.words)
+                .fact("to", wish.to.map(in_dimensions::<D, 3>))
+                .fact("way", wish.to.map(|to| Value::meters(distance(at, to))))
+                .fact_if("target", target.map(|target| in_dimensions::<D, 3>(*target)))
+                .fact_if("way to the target", target.map(|t| Value::meters(distance(at, *t)))),
+        );
+        if let Some(to) = wish.to {
+            told.mark(Role::Wish, wish.words, line(&[at, to]));
+        }
+        if let Some(target) = target {
+            told.mark(Role::Target, "target", MarkShape::Point { at_m: in_dimensions(*target) });
+        }
+    }
+
+    /// Tells who objected, why, because of what, and how far the initiator could have gone.
+    fn is_vetoed(&self, told: &mut Inspection) {
+        let before = self.before.chain.points();
+        let far_m = |veto: &Veto<D>| distance(veto.reached, before[veto.from]);
+        let mut table = Table::new(["by", "reason", "because of", "could go"]);
+        for veto in self.vetoes() {
+            let because = veto.obstacle.map(who_of_obstacle);
+            let by = self.connector(veto.by).into();
+            table.row([by, veto.reason.name().into(), because.into(), Value::meters(far_m(veto))]);
+            let at_m = in_dimensions(before[veto.by]);
+            told.mark(Role::Refused, veto.reason.to_string(), MarkShape::Point { at_m });
+            let way = line(&[before[veto.from], veto.reached]);
+            told.mark(Role::Refused, "as far as it could go", way);
+        }
+        let Some(first) = self.vetoes().next() else { return };
+        told.tell(
+            Section::new("Veto")
+                .fact("by", self.connector(first.by))
+                .fact("reason", first.reason.name())
+                .fact("why", first.reason.to_string())
+                .fact("because of", first.obstacle.map(who_of_obstacle))
+                .fact("could go", Value::meters(far_m(first)))
+                .fact("as far as", in_dimensions::<D, 3>(first.reached))
+                .table(table),
+        );
+    }
+
+    /// Returns all objections, each once.
+    fn vetoes(&self) -> impl Iterator<Item = &Veto<D>> {
+        use super::motion::replan::Climbed;
+        let others = match &self.notes.climbed {
+            Some(Climbed::Stuck { vetoes }) => &vetoes[..],
+            _ => &[],
+        };
+        let own = &self.notes.vetoes;
+        own.iter().chain(others.iter().filter(|veto| !own.contains(veto)))
+    }
+}
+
+/// Returns some points as a line.
+fn line<const D: usize>(points: &[Point<D>]) -> MarkShape {
+    MarkShape::Line { points_m: points.iter().map(|at| in_dimensions(*at)).collect() }
+}

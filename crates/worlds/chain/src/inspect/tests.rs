@@ -1,0 +1,80 @@
+use crate::chain_run;
+use sidestep_kernel::Simulation;
+use sidestep_kernel::view::{Inspection, Kind, Role, Value, Who};
+use sidestep_scenario::Source;
+
+fn run(text: &str) -> Box<dyn Simulation> {
+    let text = format!("format = 1\nworld = \"chain\"\n{text}");
+    chain_run(&Source::new("s", text, ""), 1).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn told(run: &dyn Simulation, k: u32) -> Inspection {
+    run.inspect((Kind::Connector, 0, Some(k))).expect("it is there")
+}
+
+/// A chain that an operator drives against a disc: its head touches it at x = 0.6.
+const AGAINST_A_DISC: &str = "[chain]\ndt_s = 0.1\n[[obstacles]]\nat_m = [1.0, 0.0]\nradius_m = 0.3\n\
+    [[chains]]\nconnectors = 4\nat_m = [0.0, 0.0]\nrod_m = [0.4, 0.5]\nradius_m = 0.1\n\
+    [[chains.tasks]]\nkind = \"script\"\nscript = \"forward 5\"\nspeed_m_s = 0.7\npatience_s = 9.0\n";
+
+#[test]
+fn a_veto_names_the_obstacle_and_says_how_far_the_initiator_could_have_gone() {
+    let mut run = run(AGAINST_A_DISC);
+    let free = told(&*run, 0);
+    assert_eq!(free.section("Veto"), None);
+    assert_eq!(free.value("Wish", "what"), Some(&"go".into()));
+    assert_eq!(free.value("Ladder", "rung"), Some(&"as wanted".into()));
+    run.advance(20);
+    let told = told(&*run, 2);
+    let head: Who = (Kind::Connector, 0, Some(0));
+    assert_eq!(told.value("Veto", "by"), Some(&Value::Who(head)));
+    assert_eq!(told.value("Veto", "reason"), Some(&"target-blocked".into()));
+    let disc = (Kind::Obstacle, 0, None);
+    assert_eq!(told.value("Veto", "because of"), Some(&Value::from(Some(disc))));
+    let Some(Value::Place([x_m, ..])) = told.value("Veto", "as far as") else { panic!("nowhere") };
+    assert!((0.56..=0.6).contains(x_m), "the disc begins at 0.6 m, and it can go to {x_m} m");
+    let Some(Value::Number { value: far_m, unit: "m" }) = told.value("Veto", "could go") else {
+        panic!("no way")
+    };
+    assert!((0.0..0.07).contains(far_m), "less than a step, and not {far_m} m");
+    assert_eq!(told.value("Outcome", "next place"), told.value("Now", "place"));
+    assert_eq!(told.value("Wish", "of"), Some(&Value::Who(head)));
+    assert_eq!(told.marks_of(Role::Wish).count(), 1);
+    assert_eq!(told.value("Moves", "connectors"), Some(&Value::count(0)));
+}
+
+#[test]
+fn the_layer_of_a_leader_and_the_lateness_of_its_robots_are_told() {
+    let text = "[ground]\ncorridor = { width_m = 2.4, legs = [{ straight_m = 12 }] }\n[[chains]]\n\
+        connectors = 4\nat_m = [4.0, 0.0]\nheading_deg = 0\nrod_m = [0.6, 0.8]\n\
+        rod_radius_m = 0.05\nrobots = { radius_m = 0.2 }\n[[chains.tasks]]\nkind = \"navigate\"\n\
+        speed_m_s = 0.5\n";
+    let mut run = run(text);
+    run.advance(30);
+    let told = run.inspect((Kind::Robot, 0, Some(3))).expect("it is there");
+    let Some(Value::Text(layer)) = told.value("Decides", "layer") else { panic!("no layer") };
+    assert!(layer.starts_with(|digit| ('1'..='6').contains(&digit)), "{layer}");
+    let robots = told.section("Robots").and_then(|s| s.table.as_ref()).expect("four robots");
+    assert_eq!(robots.rows.len(), 4);
+    run.advance(1);
+    let then = run.inspect((Kind::Robot, 0, Some(3))).expect("it is there");
+    assert_eq!(then.value("Now", "place"), told.value("Outcome", "next place"));
+    let table = then.section("Robots").and_then(|s| s.table.as_ref()).expect("four robots");
+    let [was, is] = [(robots, "behind then"), (table, "behind now")]
+        .map(|(table, head)| table.column(head).expect("a column").cloned().collect::<Vec<_>>());
+    assert_eq!(was, is);
+}
+
+#[test]
+fn nobody_is_told_of_who_is_not_there() {
+    let run = run(AGAINST_A_DISC);
+    for who in [
+        (Kind::Connector, 0, Some(4)),
+        (Kind::Connector, 1, Some(0)),
+        (Kind::Connector, 0, None),
+        (Kind::Robot, 0, Some(0)),
+        (Kind::Rods, 0, Some(0)),
+    ] {
+        assert_eq!(run.inspect(who), None, "{who:?}");
+    }
+}

@@ -1,0 +1,30 @@
+//! What is noted of one chain while it acts.
+
+use crate::motion::replan::Climbed;
+use crate::rods::geometry::Point;
+use crate::rods::veto::Veto;
+use sidestep_kernel::Slot;
+
+/// Notes for somebody who asks; no run makes any.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Notes<const D: usize> {
+    /// The chain.
+    pub(crate) slot: Slot,
+    /// What its driver wants.
+    pub(crate) wish: Option<Wanted<D>>,
+    /// What its initiator did on the ladder.
+    pub(crate) climbed: Option<Climbed<D>>,
+    /// Objections, in their order.
+    pub(crate) vetoes: Vec<Veto<D>>,
+    /// Motions by which parts got out of the way.
+    pub(crate) escapes: usize,
+}
+
+/// A driver's wish.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wanted<const D: usize> {
+    /// In words.
+    pub(crate) words: &'static str,
+    /// Where the initiator wants to be.
+    pub(crate) to: Option<Point<D>>,
+}

@@ -1,0 +1,196 @@
+//! What a body perceives, decides and claims in a cycle, and what comes of it: the cycle is tried on a
+//! copy of the state, as far as this body's turn.
+
+mod outcome;
+mod senses;
+#[cfg(test)]
+mod tests;
+
+use super::effector::Action;
+use super::join::Place;
+use super::policy::ConflictPolicy;
+use super::rows::HEADING_NAMES;
+use super::scene::{Scene, with_scene};
+use super::state::RobotsState;
+use super::world::{RobotsWorld, Role};
+use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::space::BoxWord;
+use sidestep_kernel::view::{self, Inspection, MarkShape, Section, Table, Value, Who};
+use sidestep_kernel::{Cycle, EntityId, Phases, Slot};
+
+/// Members of a conflict group that are told, at most: those around the body.
+const MOST_MEMBERS: usize = 64;
+
+impl RobotsWorld {
+    /// Returns what is to tell of a body in cycle `now`; `None` for one that is not there.
+    pub(super) fn inspect(&self, state: &RobotsState, now: Cycle, who: Who) -> Option<Inspection> {
+        let (_, id, _) = who;
+        if id as usize >= self.bodies.len() || self.who(id) != who {
+            return None;
+        }
+        let copy = state.copied(self);
+        let slot = copy.slot_of_id[id as usize];
+        let kind = &self.kinds[usize::from(self.type_of(id).kind)];
+        let told = Inspection::new(who, now, format!("{kind} {id}"));
+        Some(with_scene!(self, &copy, now, |scene| Looking { scene, slot, id, told }.all()))
+    }
+
+    /// Returns a body's heading in words.
+    fn heading(facing: u8) -> &'static str {
+        HEADING_NAMES[usize::from(facing % 4)]
+    }
+}
+
+/// A look at one body, on a state that is its own.
+struct Looking<'a, T: BoxWord> {
+    scene: &'a Scene<'a, T>,
+    slot: Slot,
+    id: EntityId,
+    told: Inspection,
+}
+
+impl<'a, T: BoxWord> Looking<'a, T> {
+    fn all(mut self) -> Inspection {
+        let scratch = &mut self.scene.world.scratch();
+        self.is_now();
+        self.perceives(scratch);
+        let bodies = 0..self.scene.world.bodies.len() as Slot;
+        bodies.clone().for_each(|slot| self.scene.perceive(slot, scratch));
+        self.claims();
+        let groups = Groups::new(bodies.len());
+        bodies.for_each(|slot| self.scene.join(slot, &groups));
+        let mut members = Vec::new();
+        groups.members(groups.leader(self.slot), &mut members);
+        self.scene.order(&members, scratch);
+        let order = std::mem::take(&mut scratch.order);
+        self.is_in_conflict(&order);
+        for place in order.iter().take_while(|place| place.slot != self.slot) {
+            self.scene.act(place.slot, place.word, scratch);
+        }
+        let own = order.iter().find(|place| place.slot == self.slot);
+        self.acts(own.map_or(0, |place| place.word), scratch);
+        self.told
+    }
+
+    /// Tells what is known before the cycle.
+    fn is_now(&mut self) {
+        let (scene, cell) = (self.scene, self.scene.cell(self.slot));
+        let body = &scene.world.bodies[self.id as usize];
+        let section = Section::new("Now")
+            .fact("place", self.place())
+            .fact("heading", self.facing())
+            .fact("due", body.is_due(scene.now))
+            .fact("acts every", Value::number(f64::from(body.period), "cycles"));
+        let section = match &scene.type_of(cell).role {
+            Role::Robot(_) => section.fact("last contact", self.last_contact()),
+            _ => section,
+        };
+        self.told.tell(section);
+    }
+
+    /// Returns where the body is.
+    fn place(&self) -> view::Place {
+        self.scene.world.visible_body(self.id, self.scene.cell(self.slot)).pose.at_m
+    }
+
+    /// Returns its heading, or of a door whether it is open.
+    fn facing(&self) -> Value {
+        let cell = self.scene.cell(self.slot);
+        match &self.scene.type_of(cell).role {
+            Role::Door(_) => (if cell.facing.get() == 1 { "open" } else { "closed" }).into(),
+            _ => RobotsWorld::heading(cell.facing.get()).into(),
+        }
+    }
+
+    fn last_contact(&self) -> Value {
+        let word = self.scene.cell(self.slot).contact.get();
+        let contact = super::perceive::contact_of_word(word);
+        let kinds = &self.scene.world.kinds;
+        let words = |c: super::decide::Contact| {
+            format!("{} at its {}", kinds[usize::from(c.kind)], c.side.name())
+        };
+        contact.map(words).into()
+    }
+
+    /// Returns the action that it is about to do; none for doors, and for those that do nothing.
+    fn action(&self) -> Option<&'a Action> {
+        let cell = self.scene.cell(self.slot);
+        let is_idle = cell.intent.get().is_idle();
+        let action = self.scene.type_of(cell).actions.get(usize::from(cell.action.get()));
+        action.filter(|_| !is_idle)
+    }
+
+    /// Tells the boxes that it may come to cover.
+    fn claims(&mut self) {
+        let (scene, slot) = (self.scene, self.slot);
+        let intent = scene.cell(slot).intent.get();
+        let mut boxes = Vec::new();
+        if !intent.is_idle() {
+            scene.for_each_claimed(slot, |index, word| boxes.push((index, word)));
+        }
+        // A box may be on several ways.
+        boxes.sort_unstable_by_key(|(index, _)| *index);
+        boxes.dedup_by_key(|(index, _)| *index);
+        let is_taken = |(_, word): &&(usize, T)| !word.is_free() && word.slot() != slot;
+        let taken = boxes.iter().filter(is_taken).count();
+        self.told.tell(
+            Section::new("Claims")
+                .fact("boxes", Value::count(boxes.len()))
+                .fact("boxes that others cover", Value::count(taken)),
+        );
+        for (index, _) in boxes {
+            let corners_m = self.box_corners_m(index);
+            self.told.mark(view::Role::Claim, "claimed", MarkShape::Area { corners_m });
+        }
+    }
+
+    /// Returns the corners of a box, by its index in the padded grid.
+    fn box_corners_m(&self, index: usize) -> Vec<view::Place> {
+        let world = self.scene.world;
+        let col = index as u32 % world.stride - world.border;
+        let row = index as u32 / world.stride - world.border;
+        world.corners_m((col, row), (1, 1))
+    }
+
+    /// Tells the group that is in conflict, in its order of acting.
+    fn is_in_conflict(&mut self, order: &[Place]) {
+        let world = self.scene.world;
+        let own = order.iter().position(|place| place.slot == self.slot).unwrap_or(0);
+        let from = own.saturating_sub(MOST_MEMBERS / 2);
+        let mut table = Table::new(["turn", "body", "draw"]);
+        let members = order.iter().enumerate().skip(from).take(MOST_MEMBERS);
+        for (k, place) in members.filter(|_| order.len() > 1) {
+            let cell = self.scene.cell(place.slot);
+            let (who, draw) = (world.who(cell.id), f64::from(place.key.1) / 4_294_967_296.0);
+            let draw = match world.policy {
+                ConflictPolicy::Fixed => Value::None,
+                _ => Value::number(draw, ""),
+            };
+            table.row([Value::count(k + 1), who.into(), draw]);
+            let corners_m =
+                world.corners_m(world.map_position(cell.at()), world.type_of(cell.id).size);
+            let label = format!("{}. {}", k + 1, view::name_of(who));
+            self.told.mark(view::Role::Group, label, MarkShape::Area { corners_m });
+        }
+        self.told.tell(
+            Section::new("Conflict group")
+                .fact("bodies", Value::count(order.len()))
+                .fact("policy", world.policy.name())
+                .fact("turn", Value::count(own + 1))
+                .table(table),
+        );
+    }
+}
+
+impl RobotsWorld {
+    /// Returns the corners of a rectangle of boxes, by its lower-left one and its size.
+    fn corners_m(&self, (col, row): (u32, u32), (width, height): (u32, u32)) -> Vec<view::Place> {
+        let corner = |x: u32, y: u32| {
+            let side_m = self.map.box_size_m;
+            let [x_m, y_m] = self.map.plane.place([f64::from(x) * side_m, f64::from(y) * side_m]);
+            [x_m, y_m, 0.0]
+        };
+        let (east, north) = (col + width, row + height);
+        vec![corner(col, row), corner(east, row), corner(east, north), corner(col, north)]
+    }
+}

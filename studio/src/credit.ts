@@ -1,0 +1,37 @@
+/** Credit for frames: the server sends none without. */
+
+/** Frames that may be under way at once. */
+export const MOST_UNDER_WAY = 2;
+
+/** Counts frames that were granted and have come; grants again what was drawn or passed over. */
+export class Credit {
+  #granted = 0;
+  readonly #grant: (frames: number) => void;
+
+  constructor(grant: (frames: number) => void) {
+    this.#grant = grant;
+  }
+
+  /** Frames that the server may still send. */
+  get outstanding(): number {
+    return this.#granted;
+  }
+
+  /** A frame has come. */
+  arrived(): void {
+    this.#granted = Math.max(0, this.#granted - 1);
+  }
+
+  /** The newest frame was drawn (or the session begins): fills up, so that none that was passed over is lost. */
+  drawn(): void {
+    const frames = MOST_UNDER_WAY - this.#granted;
+    if (frames <= 0) return;
+    this.#granted += frames;
+    this.#grant(frames);
+  }
+
+  /** The session begins anew at the server, which knows of no credit. */
+  reset(): void {
+    this.#granted = 0;
+  }
+}

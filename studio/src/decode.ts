@@ -1,0 +1,125 @@
+/** Binary frames: bytes to typed arrays, without a copy. The layout stands at the head of the server's protocol. */
+
+import { VERSION, type FrameText } from "./protocol";
+
+/** "SSTF" in the order of bytes. */
+export const MAGIC = 0x46545353;
+/** Bytes before the columns. */
+export const HEADER_BYTES = 56;
+
+/** What moved, at one cycle. Columns are in the order of the cast. */
+export interface Frame {
+  session: number;
+  cast: number;
+  dimensions: 2 | 3;
+  cycle: number;
+  time_s: number;
+  bodies: number;
+  leftOut: number;
+  /** x y (z) of each body, in meters. */
+  places_m: Float32Array;
+  /** Heading in rad in the plane, a quaternion x y z w in space. */
+  turns: Float32Array;
+  /** First point of each line, and the number of all points. */
+  lineStarts: Uint32Array;
+  points_m: Float32Array;
+  conditions: Uint8Array;
+  text: FrameText;
+}
+
+/** A frame that cannot be read, with the reason. */
+export class FrameError extends Error {}
+
+const NO_TEXT: FrameText = { scans: [], events: [], events_left_out: 0 };
+
+interface Header {
+  session: number;
+  cast: number;
+  dimensions: 2 | 3;
+  cycle: number;
+  time_s: number;
+  bodies: number;
+  lines: number;
+  points: number;
+  textBytes: number;
+  leftOut: number;
+}
+
+function readHeader(bytes: ArrayBuffer): Header {
+  if (bytes.byteLength < HEADER_BYTES) {
+    throw new FrameError(`a frame of ${bytes.byteLength} bytes is shorter than its header`);
+  }
+  const view = new DataView(bytes);
+  if (view.getUint32(0, true) !== MAGIC) throw new FrameError("these bytes are not a frame");
+  const version = view.getUint16(4, true);
+  if (version !== VERSION) {
+    throw new FrameError(`frames have version ${version}, this page reads ${VERSION}: reload the page`);
+  }
+  const dimensions = view.getUint8(6);
+  if (dimensions !== 2 && dimensions !== 3) throw new FrameError(`a frame with ${dimensions} dimensions`);
+  return {
+    dimensions,
+    session: view.getUint32(8, true),
+    cast: view.getUint32(12, true),
+    cycle: view.getFloat64(16, true),
+    time_s: view.getFloat64(24, true),
+    bodies: view.getUint32(32, true),
+    lines: view.getUint32(36, true),
+    points: view.getUint32(40, true),
+    textBytes: view.getUint32(44, true),
+    leftOut: view.getUint32(48, true),
+  };
+}
+
+/** The number of bytes that a frame with these counts has. */
+function bytesOf(head: Header): number {
+  const d = head.dimensions;
+  const turn = d === 2 ? 1 : 4;
+  const words = head.bodies * (d + turn) + (head.lines + 1) + head.points * d;
+  return HEADER_BYTES + 4 * words + 4 * Math.ceil(head.bodies / 4) + head.textBytes;
+}
+
+function checkLines(starts: Uint32Array, points: number): void {
+  for (let i = 1; i < starts.length; i++) {
+    if (starts[i]! < starts[i - 1]!) throw new FrameError("a frame whose lines run backwards");
+  }
+  if (starts[starts.length - 1] !== points) throw new FrameError("a frame whose lines do not hold its points");
+}
+
+/** Reads a frame; its arrays look at `bytes`. */
+export function decodeFrame(bytes: ArrayBuffer): Frame {
+  const head = readHeader(bytes);
+  const wanted = bytesOf(head);
+  if (bytes.byteLength !== wanted) {
+    throw new FrameError(`a frame of ${bytes.byteLength} bytes where its header promises ${wanted}`);
+  }
+  const d = head.dimensions;
+  let at = HEADER_BYTES;
+  const floats = (n: number): Float32Array => {
+    const column = new Float32Array(bytes, at, n);
+    at += 4 * n;
+    return column;
+  };
+  const places_m = floats(d * head.bodies);
+  const turns = floats((d === 2 ? 1 : 4) * head.bodies);
+  const lineStarts = new Uint32Array(bytes, at, head.lines + 1);
+  at += 4 * (head.lines + 1);
+  checkLines(lineStarts, head.points);
+  const points_m = floats(d * head.points);
+  const conditions = new Uint8Array(bytes, at, head.bodies);
+  at += 4 * Math.ceil(head.bodies / 4);
+  const text = head.textBytes === 0 ? NO_TEXT : readText(new Uint8Array(bytes, at, head.textBytes));
+  const { session, cast, cycle, time_s, bodies, leftOut } = head;
+  return {
+    session, cast, dimensions: d, cycle, time_s, bodies, leftOut,
+    places_m, turns, lineStarts, points_m, conditions, text,
+  };
+}
+
+function readText(bytes: Uint8Array): FrameText {
+  try {
+    return JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(bytes)) as FrameText;
+  } catch {
+    throw new FrameError("a frame whose text is not JSON");
+  }
+}

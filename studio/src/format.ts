@@ -1,0 +1,102 @@
+/** Numbers and names as people read them. */
+
+import type { Place, Value, Who } from "./protocol";
+
+/** Narrow space between a number and its unit. */
+const NARROW = "\u202f";
+
+/** A number with at most four significant digits, and its unit. */
+export function withUnit(value: number, unit = ""): string {
+  return unit === "" ? number(value) : `${number(value)}${NARROW}${unit}`;
+}
+
+/** A number with at most four significant digits; whole numbers keep all of theirs, in groups of three. */
+export function number(value: number): string {
+  if (Number.isNaN(value)) return "–";
+  if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
+  const size = Math.abs(value);
+  if (Number.isInteger(value) && size < 1e15) return sign(grouped(value.toFixed(0)));
+  if (size !== 0 && (size < 1e-3 || size >= 1e6)) return sign(scientific(value));
+  return sign(grouped(size >= 1000 ? value.toFixed(0) : trimmed(value.toPrecision(4))));
+}
+
+function trimmed(text: string): string {
+  return text.includes(".") ? text.replace(/\.?0+$/, "") : text;
+}
+
+function grouped(text: string): string {
+  const [whole = "", rest] = text.split(".");
+  const groups = whole.replace(/(?<=\d)(?=(\d{3})+$)/g, "\u202f");
+  const long = whole.replace("-", "").length > 4 ? groups : whole;
+  return rest === undefined ? long : `${long}.${rest}`;
+}
+
+function scientific(value: number): string {
+  const [mantissa = "", exponent = ""] = value.toExponential(2).split("e");
+  return `${trimmed(mantissa)}e${exponent.replace("+", "")}`;
+}
+
+/** A number for the short labels of an axis. */
+export function short(value: number): string {
+  const size = Math.abs(value);
+  if (size >= 1e9) return number(value);
+  if (size >= 1e6) return `${number(value / 1e6)}${NARROW}M`;
+  return size >= 1e5 ? `${number(value / 1e3)}${NARROW}k` : number(value);
+}
+
+/** A true minus sign. */
+function sign(text: string): string {
+  return text.replace("-", "−").replace("e-", "e−");
+}
+
+/** A share of one, in percent. */
+export function share(value: number): string {
+  const percent = 100 * value;
+  const digits = percent !== 0 && Math.abs(percent) < 10 ? 1 : 0;
+  return `${sign(trimmed(percent.toFixed(digits)))}${NARROW}%`;
+}
+
+/** Simulated time: seconds below two minutes, then minutes and hours. */
+export function time(time_s: number): string {
+  if (time_s < 120) return withUnit(Math.round(time_s * 100) / 100, "s");
+  const two = (n: number): string => String(Math.floor(n)).padStart(2, "0");
+  const clock = `${two((time_s / 60) % 60)}:${two(time_s % 60)}`;
+  return time_s < 3600 ? `${clock}${NARROW}min` : `${Math.floor(time_s / 3600)}:${clock}${NARROW}h`;
+}
+
+/** A place, with as many coordinates as the world has. */
+export function place(at_m: Place, dimensions: number): string {
+  return `(${at_m.slice(0, dimensions).map(number).join(", ")})${NARROW}m`;
+}
+
+/** A body that has no name of its own. */
+export function whoWords(who: Who): string {
+  return who.part === null ? `${who.kind} ${who.number}` : `${who.kind} ${who.number}/${who.part}`;
+}
+
+/** A key that is the same for the same body. */
+export function whoKey(who: Who): string {
+  return `${who.kind}/${who.number}/${who.part ?? ""}`;
+}
+
+/** A value of an inspection, but for bodies, which become links. */
+export function valueWords(value: Value, dimensions: number): string {
+  if (value === "none") return "–";
+  if ("number" in value) return withUnit(value.number.value, value.number.unit);
+  if ("share" in value) return share(value.share);
+  if ("text" in value) return value.text;
+  if ("who" in value) return whoWords(value.who);
+  if ("place" in value) return place(value.place, dimensions);
+  return value.yes ? "yes" : "no";
+}
+
+/** Cycles a second at least, to begin with: fewer look like none. */
+const LEAST_CYCLES_PER_S = 8;
+
+/** The speed that a run of cycles of this length begins with. */
+export function firstSpeed(cycle_s: number): number {
+  return [1, 2, 5, 10, 20, 50].find((times) => times >= LEAST_CYCLES_PER_S * cycle_s) ?? 100;
+}
+
+/** Speeds that the keys go through, in simulated seconds per second. */
+export const SPEEDS: readonly (number | "fastest")[] = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, "fastest"];

@@ -1,0 +1,64 @@
+/** What the actions of keys do. */
+
+import type { Action } from "./keys";
+import { page } from "./state/page.svelte";
+import type { Session, TrailChoice } from "./state/session.svelte";
+import { stages } from "./state/stages";
+import type { Studio } from "./state/studio.svelte";
+
+const PAN_PX = 60;
+const ZOOM = 1.25;
+const TRAILS: readonly TrailChoice[] = ["none", "selected", "all"];
+
+/** Performs an action. Returns whether there was something to do it to. */
+export function perform(action: Action, key: string, studio: Studio): boolean {
+  if (action === "help") page.showsHelp = true;
+  else if (!studio.active) return false;
+  else if (action === "session") return goTo(Number(key) - 1, studio);
+  else if (!transport(action, studio)) view(action, studio.active);
+  return true;
+}
+
+function goTo(index: number, studio: Studio): boolean {
+  const session = studio.sessions[index];
+  if (session) studio.activeKey = session.key;
+  return session !== undefined;
+}
+
+function transport(action: Action, studio: Studio): boolean {
+  const active = studio.active!;
+  switch (action) {
+    case "play": active.isPlaying ? studio.pause() : studio.play(); return true;
+    case "next": studio.step(1); return true;
+    case "back": studio.step(-1); return true;
+    case "next-ten": studio.step(10); return true;
+    case "back-ten": studio.step(-10); return true;
+    case "slower": for (const one of studio.led) one.changeSpeed(-1); return true;
+    case "faster": for (const one of studio.led) one.changeSpeed(1); return true;
+    case "next-event": active.jump(1); return true;
+    case "previous-event": active.jump(-1); return true;
+    default: return false;
+  }
+}
+
+function view(action: Action, session: Session): void {
+  const stage = stages.get(session.key);
+  const moves: Partial<Record<Action, [number, number]>> = {
+    left: [PAN_PX, 0], right: [-PAN_PX, 0], up: [0, PAN_PX], down: [0, -PAN_PX],
+  };
+  const move = moves[action];
+  if (move) stage?.eye.rotate(...move);
+  if (action === "nearer" || action === "farther") stage?.zoom(action === "nearer" ? ZOOM : 1 / ZOOM);
+  if (action === "fit") stage?.fit();
+  if (action === "trails") session.trails = TRAILS[(TRAILS.indexOf(session.trails) + 1) % TRAILS.length]!;
+  if (action === "deselect") session.select(null);
+  if (action === "filter") {
+    page.tab = "agents";
+    page.wantsFilter++;
+  }
+  if (action === "center" && session.selected) {
+    const index = session.bodies?.find(session.selected);
+    if (index !== undefined) stage?.center(index);
+  }
+  stage?.changed();
+}

@@ -1,0 +1,860 @@
+// Written from crates/server/src/protocol by
+// `SIDESTEP_WRITE=protocol cargo test --release -p sidestep-server protocol`. Do not edit.
+
+/** Version of requests, replies, notices and frames together. */
+export const VERSION = 1;
+
+/**
+ * A request; its reply has the same number.
+ */
+export type Request = {
+/**
+ * Chosen by the page, from 1 on: a request that cannot be read is answered with number 0.
+ */
+id: number,
+/**
+ * What is asked.
+ */
+call: Call, };
+
+/**
+ * What a page can ask.
+ */
+export type Call = { "do": "files",
+/**
+ * Its path, as a listing gave it.
+ */
+folder: string | null, } | { "do": "open",
+/**
+ * What is opened.
+ */
+what: Subject,
+/**
+ * Another seed than the scenario's.
+ */
+seed: number | null, } | { "do": "close",
+/**
+ * Which one.
+ */
+session: number, } | { "do": "play",
+/**
+ * Which one.
+ */
+session: number,
+/**
+ * How fast.
+ */
+speed: Speed, } | { "do": "pause",
+/**
+ * Which one.
+ */
+session: number, } | { "do": "step",
+/**
+ * Which session.
+ */
+session: number,
+/**
+ * Number of cycles.
+ */
+cycles: number, } | { "do": "seek",
+/**
+ * Which session.
+ */
+session: number,
+/**
+ * The cycle; a run that is over before it stays at its end.
+ */
+cycle: number, } | { "do": "restart",
+/**
+ * Which session.
+ */
+session: number,
+/**
+ * Another seed.
+ */
+seed: number | null,
+/**
+ * Another text for the scenario, which is not saved.
+ */
+text: string | null, } | { "do": "look",
+/**
+ * Which session.
+ */
+session: number,
+/**
+ * The bodies.
+ */
+scans_of: Array<Who>, } | { "do": "credit",
+/**
+ * Which session.
+ */
+session: number,
+/**
+ * Number of frames.
+ */
+frames: number, } | { "do": "inspect",
+/**
+ * Which session.
+ */
+session: number,
+/**
+ * Which body.
+ */
+who: Who, } | { "do": "metrics",
+/**
+ * Which session.
+ */
+session: number,
+/**
+ * The number of the first sample wanted.
+ */
+from: number, } | { "do": "events",
+/**
+ * Which session.
+ */
+session: number,
+/**
+ * The first cycle.
+ */
+from: number,
+/**
+ * The cycle after the last one.
+ */
+until: number,
+/**
+ * The largest number of events.
+ */
+most: number, } | { "do": "source",
+/**
+ * Which session.
+ */
+session: number, } | { "do": "check",
+/**
+ * Which session.
+ */
+session: number,
+/**
+ * The text.
+ */
+text: string, };
+
+/**
+ * What can be opened.
+ */
+export type Subject = { "kind": "scenario",
+/**
+ * Its path, as a listing gave it.
+ */
+path: string, } | { "kind": "new",
+/**
+ * The world's name.
+ */
+world: string, } | { "kind": "recording",
+/**
+ * Its path, as a listing gave it.
+ */
+path: string, };
+
+/**
+ * How fast a run is played.
+ */
+export type Speed = { "times": number } | "fastest";
+
+/**
+ * Which body: kind, number, and part of things that have parts.
+ */
+export type Who = {
+/**
+ * Its kind, e.g. `robot`.
+ */
+kind: string,
+/**
+ * Its number among those of its kind.
+ */
+number: number,
+/**
+ * Its part, where the thing has parts.
+ */
+part: number | null, };
+
+/**
+ * The reply to a request.
+ */
+export type Reply = {
+/**
+ * The request's number; 0 for a request that could not be read.
+ */
+id: number, } & ({ "answer": Answer } | { "problem": Problem });
+
+/**
+ * What came of a request.
+ */
+export type Outcome = { "answer": Answer } | { "problem": Problem };
+
+/**
+ * The answer to a request.
+ */
+export type Answer = { "is": "done" } | { "is": "files",
+/**
+ * What can be opened in it, by name.
+ */
+entries: Array<FileEntry>, } | { "is": "opened",
+/**
+ * Its number.
+ */
+session: number,
+/**
+ * What stays as it is.
+ */
+scene: Scene,
+/**
+ * Its state.
+ */
+status: Status, } | { "is": "inspection" } & Inspection | { "is": "metrics",
+/**
+ * The metrics.
+ */
+names: Array<MetricName>,
+/**
+ * Number of the first sample here: the one that was asked for, or the number of all samples.
+ */
+first: number,
+/**
+ * How often the samples were thinned by half, and numbered anew, since the session began: ask from 0
+ * whenever it has changed.
+ */
+thinned: number,
+/**
+ * The cycle of each sample.
+ */
+cycles: Array<number>,
+/**
+ * For each metric, its value in each sample.
+ */
+values: Array<Array<number | null>>, } | { "is": "events",
+/**
+ * The events.
+ */
+entries: Array<Event>,
+/**
+ * Number of events of these cycles that are not here: beyond what was asked for, or never kept.
+ */
+left_out: number,
+/**
+ * All events before this cycle are known: of a run those so far, of a recording soon all.
+ */
+known_until: number, } | { "is": "source",
+/**
+ * Its name in problems.
+ */
+place: string,
+/**
+ * The text.
+ */
+text: string,
+/**
+ * Whether it cannot be replaced by another text.
+ */
+read_only: boolean, } | { "is": "problems",
+/**
+ * Nothing for a valid text without surprises.
+ */
+problems: Array<Problem>, };
+
+/**
+ * An error as people read it: where, what, remedy.
+ */
+export type Problem = {
+/**
+ * The file, option or request that is wrong.
+ */
+place: string,
+/**
+ * Its line, from 1.
+ */
+line: number | null,
+/**
+ * Its column, from 1.
+ */
+column: number | null,
+/**
+ * What is wrong.
+ */
+cause: string,
+/**
+ * What would be right.
+ */
+remedy: string,
+/**
+ * Whether the text is valid all the same.
+ */
+is_warning: boolean, };
+
+/**
+ * Something in a folder.
+ */
+export type FileEntry = {
+/**
+ * Its path for other requests.
+ */
+path: string,
+/**
+ * Its name in its folder.
+ */
+name: string,
+/**
+ * What it is.
+ */
+kind: FileKind,
+/**
+ * A few words on its content; may be empty.
+ */
+about: string, };
+
+/**
+ * What a file or a folder is.
+ */
+export type FileKind = "folder" | "scenario" | "run" | "recording" | "sweep" | "foreign";
+
+/**
+ * A metric.
+ */
+export type MetricName = {
+/**
+ * Its name in results.
+ */
+key: string,
+/**
+ * A few words for it.
+ */
+words: string,
+/**
+ * Its unit; may be empty.
+ */
+unit: string, };
+
+/**
+ * What the server says unasked.
+ */
+export type Notice = { "notice": "hello",
+/**
+ * See [`VERSION`](super::VERSION).
+ */
+version: number,
+/**
+ * The program and its build.
+ */
+program: string,
+/**
+ * The names of all worlds.
+ */
+worlds: Array<string>,
+/**
+ * Whether texts of the page are refused.
+ */
+read_only: boolean,
+/**
+ * What the command line asked to open.
+ */
+open: Array<Named>, } | { "notice": "cast" } & Cast | { "notice": "status" } & Status | { "notice": "ended",
+/**
+ * Which one.
+ */
+session: number,
+/**
+ * Why.
+ */
+problem: Problem, };
+
+/**
+ * What the command line named: a kind as in [`Subject`](super::Subject), with its path.
+ */
+export type Named = {
+/**
+ * `scenario` or `recording`.
+ */
+kind: string,
+/**
+ * Its path.
+ */
+path: string, };
+
+/**
+ * The state of a session.
+ */
+export type Status = {
+/**
+ * Which session.
+ */
+session: number,
+/**
+ * What it does.
+ */
+state: State,
+/**
+ * Cycles done.
+ */
+cycle: number,
+/**
+ * Number of cycles of the whole run; of a recording, those that were recorded.
+ */
+cycles_planned: number,
+/**
+ * Simulated seconds since the start.
+ */
+time_s: number,
+/**
+ * How fast it plays, or played last.
+ */
+speed: Speed,
+/**
+ * Cycles per second over the last second.
+ */
+cycles_per_s: number,
+/**
+ * The seed, in decimal digits, as it may be larger than a number of JavaScript can be.
+ */
+seed: string,
+/**
+ * Digest of the state, while the run stands still.
+ */
+digest: string | null,
+/**
+ * Of a recording: whether the digest was confirmed, or will be.
+ */
+banner: string | null, };
+
+/**
+ * What a session does.
+ */
+export type State = "playing" | "paused" | "seeking" | "over" | "failed";
+
+/**
+ * What stays as it is.
+ */
+export type Scene = {
+/**
+ * The scenario's name; may be empty.
+ */
+name: string,
+/**
+ * The world's name.
+ */
+world: string,
+/**
+ * The noun for an agent, e.g. `robot`.
+ */
+agent: string,
+/**
+ * 2 where everything lies in a plane, else 3.
+ */
+dimensions: number,
+/**
+ * Simulated seconds per cycle.
+ */
+cycle_s: number,
+/**
+ * The floor, where it is known box by box.
+ */
+floor: Floor | null,
+/**
+ * Walls, obstacles that stand still, starts and goals.
+ */
+bodies: Array<StillBody>,
+/**
+ * Whether a recorded run is computed again.
+ */
+is_recording: boolean, };
+
+/**
+ * A floor of square boxes, along the axes of its own plane.
+ */
+export type Floor = {
+/**
+ * Boxes along the first axis.
+ */
+width: number,
+/**
+ * Boxes along the second axis.
+ */
+height: number,
+/**
+ * Side of a box, in meters.
+ */
+box_m: number,
+/**
+ * The corner of the first box.
+ */
+origin_m: [number, number],
+/**
+ * The turn about that corner.
+ */
+yaw_rad: number,
+/**
+ * Runs of equal boxes, row by row from the first: `[code, count, code, count, ...]`; 0 free, 1 wall, 2 unknown.
+ */
+runs: Array<number>, };
+
+/**
+ * A body that stands still.
+ */
+export type StillBody = {
+/**
+ * Which body.
+ */
+who: Who,
+/**
+ * Its own name, if it has one.
+ */
+name: string | null,
+/**
+ * Its place, in meters.
+ */
+at_m: [number, number, number],
+/**
+ * Its orientation: a unit quaternion x, y, z, w.
+ */
+turn: [number, number, number, number],
+/**
+ * Its shape.
+ */
+shape: Shape,
+/**
+ * Its look.
+ */
+look: Look, };
+
+/**
+ * The shape of a body, around its pose.
+ */
+export type Shape = { "type": "cuboid",
+/**
+ * Its extent along its axes, in meters.
+ */
+size_m: [number, number, number], } | { "type": "cylinder",
+/**
+ * Its radius, in meters.
+ */
+radius_m: number,
+/**
+ * Its extent along its third axis, in meters.
+ */
+height_m: number, } | { "type": "sphere",
+/**
+ * Its radius, in meters.
+ */
+radius_m: number, } | { "type": "line",
+/**
+ * Its points, in meters; of bodies that move, none, as they are in the frames.
+ */
+points_m: Array<[number, number, number]>,
+/**
+ * Its thickness in meters; 0 for the thinnest line that can be drawn.
+ */
+thickness_m: number, } | { "type": "dart",
+/**
+ * From tail to tip, in meters.
+ */
+length_m: number,
+/**
+ * Width, in meters.
+ */
+width_m: number, };
+
+/**
+ * The look of a body, apart from its shape. Color per condition comes from the kernel's one table of appearance.
+ */
+export type Look = {
+/**
+ * Red, green and blue.
+ */
+color: [number, number, number],
+/**
+ * From 0 (fully transparent) to 1 (opaque).
+ */
+opacity: number,
+/**
+ * Seen from above, higher layers cover lower ones.
+ */
+layer: number, };
+
+/**
+ * Bodies that move, in columns: body i is `kinds[kind[i]]`, `number[i]`, `part[i]` (-1: none), `shapes[shape[i]]`,
+ * `looks[look[i]]`.
+ */
+export type Cast = {
+/**
+ * Which session.
+ */
+session: number,
+/**
+ * Its number, which frames name.
+ */
+cast: number,
+/**
+ * The names of kinds.
+ */
+kinds: Array<string>,
+/**
+ * The kind of each body.
+ */
+kind: Array<number>,
+/**
+ * The number of each body among those of its kind.
+ */
+number: Array<number>,
+/**
+ * The part that each body is.
+ */
+part: Array<number>,
+/**
+ * Shapes; of a line without its points, which are in the frames.
+ */
+shapes: Array<Shape>,
+/**
+ * The shape of each body.
+ */
+shape: Array<number>,
+/**
+ * Looks, each for the five conditions.
+ */
+looks: Array<[Look, Look, Look, Look, Look]>,
+/**
+ * The look of each body.
+ */
+look: Array<number>,
+/**
+ * Names of those that have their own: index of body, name.
+ */
+names: Array<[number, string]>,
+/**
+ * Which bodies are agents: what can be inspected.
+ */
+is_agent: Array<boolean>, };
+
+/**
+ * The text at the end of a frame.
+ */
+export type FrameText = {
+/**
+ * The scans of the bodies that were asked for.
+ */
+scans: Array<Scan>,
+/**
+ * The last events since the frame before.
+ */
+events: Array<Event>,
+/**
+ * Number of events since the frame before that are not here.
+ */
+events_left_out: number, };
+
+/**
+ * Ranges of one sensor.
+ */
+export type Scan = {
+/**
+ * The body with the sensor.
+ */
+of: Who,
+/**
+ * The sensor's name.
+ */
+sensor: string,
+/**
+ * The sensor's place, in meters.
+ */
+at_m: [number, number, number],
+/**
+ * The direction of its bearing 0: a unit quaternion x, y, z, w.
+ */
+turn: [number, number, number, number],
+/**
+ * Bearing of each beam, in radians.
+ */
+bearings_rad: Array<number>,
+/**
+ * Range of each beam in meters, as reported; null: nothing in range.
+ */
+ranges_m: Array<number | null>,
+/**
+ * The same as it is; empty where the world does not tell it.
+ */
+true_m: Array<number | null>,
+/**
+ * The maximum range, in meters.
+ */
+range_m: number, };
+
+/**
+ * An event.
+ */
+export type Event = {
+/**
+ * The cycle in which it happened.
+ */
+cycle: number,
+/**
+ * `info`, `warning` or `error`.
+ */
+level: string,
+/**
+ * From the fixed vocabulary of events, e.g. `contact`, `veto`, `trip`; empty where the world does not tell it.
+ */
+kind: string,
+/**
+ * Whom it is about.
+ */
+who: Who | null,
+/**
+ * With whom, or with what.
+ */
+with: Who | null,
+/**
+ * Its place, in meters.
+ */
+at_m: [number, number, number] | null,
+/**
+ * Its value, if it has one.
+ */
+value: number | null,
+/**
+ * The value's unit; may be empty.
+ */
+unit: string,
+/**
+ * The event in words.
+ */
+words: string, };
+
+/**
+ * What a body perceives, decides and does.
+ */
+export type Inspection = {
+/**
+ * Which body.
+ */
+who: Who,
+/**
+ * Cycles done.
+ */
+cycle: number,
+/**
+ * The body's name.
+ */
+title: string,
+/**
+ * Facts, by subject.
+ */
+sections: Array<Section>,
+/**
+ * What can be drawn of it.
+ */
+marks: Array<Mark>, };
+
+/**
+ * Facts on one subject.
+ */
+export type Section = {
+/**
+ * The subject.
+ */
+title: string,
+/**
+ * The facts.
+ */
+facts: Array<Fact>,
+/**
+ * A table, where facts are many of a kind.
+ */
+table: Table | null, };
+
+/**
+ * A fact.
+ */
+export type Fact = {
+/**
+ * Its name, in words.
+ */
+label: string,
+/**
+ * What it is.
+ */
+value: Value, };
+
+/**
+ * The value of a fact.
+ */
+export type Value = { "number": {
+/**
+ * The number.
+ */
+value: number,
+/**
+ * Its unit; may be empty.
+ */
+unit: string, } } | { "share": number } | { "text": string } | { "who": Who } | { "place": [number, number, number] } | { "yes": boolean } | "none";
+
+/**
+ * Facts in rows.
+ */
+export type Table = {
+/**
+ * The heads of the columns.
+ */
+columns: Array<string>,
+/**
+ * The rows, each with a value for each column.
+ */
+rows: Array<Array<Value>>, };
+
+/**
+ * Something to draw over the scene while the body is selected.
+ */
+export type Mark = {
+/**
+ * What it stands for.
+ */
+role: Role,
+/**
+ * The same in words.
+ */
+label: string,
+/**
+ * From 0 to 1: how likely, how strong; 1 where that means nothing.
+ */
+weight: number,
+/**
+ * Its shape.
+ */
+shape: MarkShape, };
+
+/**
+ * What a mark stands for.
+ */
+export type Role = "true" | "reported" | "wish" | "done" | "refused" | "claim" | "group" | "predicted" | "chosen" | "known" | "orbit" | "target";
+
+/**
+ * The shape of a mark.
+ */
+export type MarkShape = { "type": "line",
+/**
+ * Its points, in meters.
+ */
+points_m: Array<[number, number, number]>, } | { "type": "area",
+/**
+ * Its corners, in meters.
+ */
+corners_m: Array<[number, number, number]>, } | { "type": "point",
+/**
+ * Its place, in meters.
+ */
+at_m: [number, number, number], } | { "type": "circle",
+/**
+ * Its center, in meters.
+ */
+at_m: [number, number, number],
+/**
+ * Its radius, in meters.
+ */
+radius_m: number, };

@@ -1,0 +1,182 @@
+/** Two cameras with one face: straight down on the plane, and around a point in space. */
+
+import { Matrix4, OrthographicCamera, PerspectiveCamera, Vector3, type Camera } from "three";
+import type { Place } from "../protocol";
+
+/** A box that holds a scene, in meters. */
+export interface Extent {
+  lo: Place;
+  hi: Place;
+}
+
+export interface Eye {
+  readonly camera: Camera;
+  resize(width_px: number, height_px: number): void;
+  fit(extent: Extent): void;
+  pan(dx_px: number, dy_px: number): void;
+  /** Brings nearer by a factor, keeping what is at this point of the canvas. */
+  zoom(factor: number, x_px: number, y_px: number): void;
+  rotate(dx_px: number, dy_px: number): void;
+  /** Moves so that a place is in the middle. */
+  center(at: Place): void;
+  /** Meters of a pixel at the point that is looked at. */
+  readonly mPerPx: number;
+  /** Where a place appears: x and y in pixels, and whether in front. */
+  project(x: number, y: number, z: number): [number, number, boolean];
+}
+
+export class PlaneEye implements Eye {
+  readonly camera = new OrthographicCamera(-1, 1, 1, -1, 0, 2000);
+  mPerPx = 0.05;
+  x = 0;
+  y = 0;
+  #width = 1;
+  #height = 1;
+
+  constructor() {
+    this.camera.position.z = 1000;
+  }
+
+  resize(width_px: number, height_px: number): void {
+    this.#width = Math.max(1, width_px);
+    this.#height = Math.max(1, height_px);
+    this.#update();
+  }
+
+  fit({ lo, hi }: Extent): void {
+    this.x = (lo[0] + hi[0]) / 2;
+    this.y = (lo[1] + hi[1]) / 2;
+    const wide = (hi[0] - lo[0]) / Math.max(40, this.#width - 90);
+    const high = (hi[1] - lo[1]) / Math.max(40, this.#height - 70);
+    this.mPerPx = Math.max(wide, high, 1e-5);
+    this.#update();
+  }
+
+  pan(dx_px: number, dy_px: number): void {
+    this.x -= dx_px * this.mPerPx;
+    this.y += dy_px * this.mPerPx;
+    this.#update();
+  }
+
+  zoom(factor: number, x_px: number, y_px: number): void {
+    const [x, y] = this.at(x_px, y_px);
+    this.mPerPx = Math.min(1e4, Math.max(1e-5, this.mPerPx / factor));
+    const [x1, y1] = this.at(x_px, y_px);
+    this.x += x - x1;
+    this.y += y - y1;
+    this.#update();
+  }
+
+  rotate(dx_px: number, dy_px: number): void {
+    this.pan(dx_px, dy_px);
+  }
+
+  center([x, y]: Place): void {
+    this.x = x;
+    this.y = y;
+    this.#update();
+  }
+
+  /** The place at a point of the canvas. */
+  at(x_px: number, y_px: number): [number, number] {
+    return [
+      this.x + (x_px - this.#width / 2) * this.mPerPx,
+      this.y - (y_px - this.#height / 2) * this.mPerPx,
+    ];
+  }
+
+  project(x: number, y: number): [number, number, boolean] {
+    const px = this.#width / 2 + (x - this.x) / this.mPerPx;
+    return [px, this.#height / 2 - (y - this.y) / this.mPerPx, true];
+  }
+
+  #update(): void {
+    const [halfW, halfH] = [(this.#width / 2) * this.mPerPx, (this.#height / 2) * this.mPerPx];
+    const camera = this.camera;
+    [camera.left, camera.right, camera.top, camera.bottom] = [-halfW, halfW, halfH, -halfH];
+    camera.position.set(this.x, this.y, 1000);
+    camera.updateProjectionMatrix();
+    camera.updateMatrixWorld();
+  }
+}
+
+const FIELD_OF_VIEW_DEG = 40;
+
+export class SpaceEye implements Eye {
+  readonly camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.1, 1000);
+  readonly target = new Vector3();
+  #distance = 10;
+  #azimuth = -0.9;
+  #elevation = 0.5;
+  #width = 1;
+  #height = 1;
+  readonly #toClip = new Matrix4();
+  readonly #point = new Vector3();
+
+  constructor() {
+    this.camera.up.set(0, 0, 1);
+  }
+
+  get mPerPx(): number {
+    return (2 * this.#distance * Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360)) / this.#height;
+  }
+
+  resize(width_px: number, height_px: number): void {
+    this.#width = Math.max(1, width_px);
+    this.#height = Math.max(1, height_px);
+    this.camera.aspect = this.#width / this.#height;
+    this.#update();
+  }
+
+  fit({ lo, hi }: Extent): void {
+    this.target.set((lo[0] + hi[0]) / 2, (lo[1] + hi[1]) / 2, (lo[2] + hi[2]) / 2);
+    const radius = 0.5 * Math.hypot(hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]);
+    const narrow = Math.min(1, this.camera.aspect);
+    this.#distance = Math.max(1e-4, (1.02 * radius) / Math.sin((FIELD_OF_VIEW_DEG * Math.PI) / 360) / narrow);
+    this.#update();
+  }
+
+  pan(dx_px: number, dy_px: number): void {
+    const side = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0);
+    const up = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 1);
+    this.target.addScaledVector(side, -dx_px * this.mPerPx).addScaledVector(up, dy_px * this.mPerPx);
+    this.#update();
+  }
+
+  zoom(factor: number): void {
+    this.#distance = Math.min(1e7, Math.max(1e-4, this.#distance / factor));
+    this.#update();
+  }
+
+  rotate(dx_px: number, dy_px: number): void {
+    this.#azimuth -= dx_px * 0.008;
+    this.#elevation = Math.min(1.55, Math.max(-1.55, this.#elevation + dy_px * 0.008));
+    this.#update();
+  }
+
+  center(at: Place): void {
+    this.target.set(...at);
+    this.#update();
+  }
+
+  project(x: number, y: number, z: number): [number, number, boolean] {
+    const p = this.#point.set(x, y, z).applyMatrix4(this.#toClip);
+    return [(0.5 + 0.5 * p.x) * this.#width, (0.5 - 0.5 * p.y) * this.#height, p.z > -1 && p.z < 1];
+  }
+
+  #update(): void {
+    const camera = this.camera;
+    const flat = Math.cos(this.#elevation) * this.#distance;
+    camera.position.set(
+      this.target.x + flat * Math.cos(this.#azimuth),
+      this.target.y + flat * Math.sin(this.#azimuth),
+      this.target.z + Math.sin(this.#elevation) * this.#distance,
+    );
+    camera.near = this.#distance / 100;
+    camera.far = this.#distance * 100;
+    camera.lookAt(this.target);
+    camera.updateProjectionMatrix();
+    camera.updateMatrixWorld();
+    this.#toClip.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);
+  }
+}

@@ -1,0 +1,137 @@
+/** Bodies of space, from a frame into solids. */
+
+import { Group } from "three";
+import type { Frame } from "../decode";
+import type { Scene, Shape } from "../protocol";
+import type { Bodies } from "../state/cast";
+import { packed, type Palette } from "./palette";
+import { Solids, turnTo, type SolidKind } from "./solids";
+import type { Painter } from "./stage";
+
+const KINDS: readonly SolidKind[] = ["ball", "box", "cylinder", "dart"];
+
+/** The thinnest rod that is drawn, beside the length of its piece. */
+const LEAST_OF_LENGTH = 0.02;
+
+/** The least radius of moving balls. */
+const LEAST_PX = 1.6;
+
+/** Opaque and transparent solids of each kind. */
+class Pair {
+  readonly #solids: Record<SolidKind, [Solids, Solids]>;
+
+  constructor(group: Group) {
+    const both = (kind: SolidKind): [Solids, Solids] => [new Solids(kind, false), new Solids(kind, true)];
+    this.#solids = { ball: both("ball"), box: both("box"), cylinder: both("cylinder"), dart: both("dart") };
+    for (const solids of this.#all()) group.add(solids.instances.mesh);
+  }
+
+  #all(): Solids[] {
+    return KINDS.flatMap((kind) => this.#solids[kind]);
+  }
+
+  least(ofDistance: number): void {
+    for (const solids of this.#solids.ball) solids.least(ofDistance);
+  }
+
+  begin(): void {
+    for (const solids of this.#all()) solids.begin();
+  }
+
+  end(): void {
+    for (const solids of this.#all()) solids.end();
+  }
+
+  of(kind: SolidKind, tint: number): Solids {
+    return this.#solids[kind][tint >>> 24 < 253 ? 1 : 0];
+  }
+
+  body(shape: Shape, at: ArrayLike<number>, turn: ArrayLike<number>, tint: number): void {
+    if (shape.type === "sphere") return this.of("ball", tint).ball(at[0]!, at[1]!, at[2]!, shape.radius_m, tint);
+    if (shape.type === "cuboid") return this.of("box", tint).mesh(at, turn, shape.size_m, tint);
+    if (shape.type === "cylinder") {
+      const wide = 2 * shape.radius_m;
+      return this.of("cylinder", tint).mesh(at, turn, [wide, wide, shape.height_m], tint);
+    }
+    if (shape.type === "dart") {
+      const size = [shape.length_m, shape.width_m, 0.3 * shape.width_m] as const;
+      this.of("dart", tint).mesh(at, turn, size, tint);
+    }
+  }
+
+  rod(a: ArrayLike<number>, b: ArrayLike<number>, thickness_m: number, tint: number): void {
+    const [dx, dy, dz] = [b[0]! - a[0]!, b[1]! - a[1]!, b[2]! - a[2]!];
+    const length = Math.hypot(dx, dy, dz);
+    const wide = Math.max(thickness_m, LEAST_OF_LENGTH * length);
+    const middle = [0, 1, 2].map((k) => 0.5 * (a[k]! + b[k]!));
+    this.of("cylinder", tint).mesh(middle, turnTo(dx, dy, dz), [wide, wide, length], tint);
+  }
+}
+
+export class SpacePainter implements Painter {
+  readonly group = new Group();
+  readonly #still = new Pair(this.group);
+  readonly #moving = new Pair(this.group);
+  readonly #scene: Scene;
+  #bodies: Bodies | null = null;
+  #tints = new Uint32Array(0);
+
+  constructor(scene: Scene) {
+    this.#scene = scene;
+  }
+
+  paint(palette: Palette): void {
+    this.#still.begin();
+    for (const { shape, at_m, turn, look } of this.#scene.bodies) {
+      const tint = packed(look, palette);
+      if (shape.type !== "line") this.#still.body(shape, at_m, turn, tint);
+      else shape.points_m.slice(1).forEach((b, i) => this.#still.rod(shape.points_m[i]!, b, shape.thickness_m, tint));
+    }
+    this.#still.end();
+    this.#colors(palette);
+  }
+
+  cast(bodies: Bodies, palette: Palette): void {
+    this.#bodies = bodies;
+    this.#colors(palette);
+  }
+
+  #colors(palette: Palette): void {
+    const looks = this.#bodies?.cast.looks ?? [];
+    this.#tints = Uint32Array.from(looks.flatMap((group) => group.map((look) => packed(look, palette))));
+  }
+
+  frame(frame: Frame): void {
+    const bodies = this.#bodies;
+    if (!bodies) return;
+    const { cast } = bodies;
+    const { places_m, turns, points_m, lineStarts } = frame;
+    this.#moving.begin();
+    let line = 0;
+    for (let i = 0; i < frame.bodies; i++) {
+      const shape = cast.shapes[cast.shape[i]!]!;
+      const tint = this.#tints[5 * cast.look[i]! + frame.conditions[i]!]!;
+      if (shape.type === "line") {
+        for (let p = lineStarts[line]! + 1; p < lineStarts[line + 1]!; p++) {
+          const a = points_m.subarray(3 * p - 3, 3 * p);
+          this.#moving.rod(a, points_m.subarray(3 * p, 3 * p + 3), shape.thickness_m, tint);
+        }
+        line++;
+      } else {
+        this.#moving.body(shape, places_m.subarray(3 * i, 3 * i + 3), turns.subarray(4 * i, 4 * i + 4), tint);
+      }
+    }
+    this.#moving.end();
+  }
+
+  scale(_pxPerM: number, _palette: Palette, height_px: number): void {
+    // Half a field of view of 20 degrees reaches over half the height.
+    this.#moving.least((LEAST_PX * 2 * Math.tan(Math.PI / 9)) / Math.max(1, height_px));
+  }
+
+  dispose(): void {
+    this.group.traverse((object) => {
+      if ("geometry" in object) (object.geometry as { dispose(): void }).dispose();
+    });
+  }
+}

@@ -1,0 +1,292 @@
+/** The canvas of one session: draws when a frame, the camera or a choice changes, and not otherwise. */
+
+import { Color, Group, Scene as Graph, SRGBColorSpace, WebGLRenderer, type Mesh } from "three";
+import type { Frame } from "../decode";
+import type { Inspection, Place, Role, Scene, Who } from "../protocol";
+import type { Bodies } from "../state/cast";
+import type { TrailChoice } from "../state/session.svelte";
+import { PlaneEye, SpaceEye, type Extent, type Eye } from "./camera";
+import { extentOf, flatRadiusOf } from "./extent";
+import { FloorLayer } from "./floor";
+import { drawGrid } from "./grid";
+import { drawMarks, drawScans, fillAreas } from "./marks";
+import { Overlay, type Label } from "./overlay";
+import { paletteOf, visible, word, type Palette } from "./palette";
+import { pick } from "./pick";
+import { PlanePainter } from "./plane";
+import { SpacePainter } from "./space";
+import { Strokes } from "./strokes";
+import { Trails } from "./trails";
+
+/** Draws the bodies of one kind of world. */
+export interface Painter {
+  readonly group: Group;
+  paint(palette: Palette): void;
+  cast(bodies: Bodies, palette: Palette): void;
+  frame(frame: Frame): void;
+  scale(pxPerM: number, palette: Palette, height_px: number): void;
+  dispose(): void;
+}
+
+/** What the page chose to see. */
+export interface Choices {
+  selected: Who | null;
+  inspection: Inspection | null;
+  trails: TrailChoice;
+  widthIsTrue: boolean;
+}
+
+/** Bodies with names of their own are labeled if there are not more. */
+const MOST_NAMES = 40;
+
+/** A renderer with no more than it needs: what is opaque and flat is cheap to put on the screen. */
+function rendererOf(canvas: HTMLCanvasElement, isSpace: boolean): WebGLRenderer {
+  const wanted = { alpha: false, antialias: isSpace, depth: isSpace, stencil: false, powerPreference: "high-performance" } as const;
+  const context = canvas.getContext("webgl2", wanted) as WebGL2RenderingContext | null;
+  if (!context) throw new Error("no WebGL 2");
+  return new WebGLRenderer({ canvas, context, ...wanted });
+}
+
+export class Stage {
+  readonly eye: Eye;
+  /** Called after each picture, with the roles of marks that it shows. */
+  onDrawn: (roles: ReadonlySet<Role>) => void = () => undefined;
+  /** Pictures drawn so far. */
+  pictures = 0;
+  readonly #renderer: WebGLRenderer;
+  readonly #overlay: Overlay;
+  readonly #graph = new Graph();
+  readonly #areas = new Group();
+  readonly #painter: Painter;
+  readonly #floor: FloorLayer | null;
+  readonly #grid = new Strokes(1);
+  readonly #ways = new Strokes(4);
+  readonly #marks = new Strokes(8);
+  readonly #scene: Scene;
+  #palette: Palette;
+  #bodies: Bodies | null = null;
+  #frame: Frame | null = null;
+  #trails: Trails | null = null;
+  #choices: Choices = { selected: null, inspection: null, trails: "none", widthIsTrue: false };
+  #hovered: number | undefined;
+  #extent: Extent;
+  #size: [number, number] = [1, 1];
+  #isFitted = false;
+  #request = 0;
+  #bodiesChanged = true;
+  #marksChanged = true;
+  #viewChanged = true;
+  #roles: ReadonlySet<Role> = new Set();
+
+  constructor(canvas: HTMLCanvasElement, overlay: HTMLCanvasElement, scene: Scene, isDark: boolean, eye?: Eye) {
+    this.#renderer = rendererOf(canvas, scene.dimensions === 3);
+    this.#renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
+    this.#overlay = new Overlay(overlay);
+    this.#scene = scene;
+    this.#palette = paletteOf(isDark);
+    const isPlane = scene.dimensions === 2;
+    this.#isFitted = eye !== undefined && eye instanceof PlaneEye === isPlane;
+    this.eye = this.#isFitted ? eye! : isPlane ? new PlaneEye() : new SpaceEye();
+    this.#painter = scene.dimensions === 2 ? new PlanePainter(scene) : new SpacePainter(scene);
+    this.#floor = scene.floor ? new FloorLayer(scene.floor) : null;
+    if (this.#floor) this.#graph.add(this.#floor.mesh);
+    for (const strokes of [this.#grid, this.#ways, this.#marks]) this.#graph.add(strokes.quads.mesh);
+    this.#graph.add(this.#painter.group, this.#areas);
+    this.#extent = extentOf(scene, null, null);
+    this.theme(isDark);
+  }
+
+  theme(isDark: boolean): void {
+    this.#palette = paletteOf(isDark);
+    this.#floor?.paint(this.#palette);
+    this.#painter.paint(this.#palette);
+    const back = this.#floor ? this.#palette.background : this.#palette.free;
+    this.#renderer.setClearColor(new Color().setRGB(back[0] / 255, back[1] / 255, back[2] / 255, SRGBColorSpace));
+    this.#bodiesChanged = this.#marksChanged = true;
+    this.changed();
+  }
+
+  resize(width_px: number, height_px: number): void {
+    if (width_px < 2 || height_px < 2) return;
+    this.#size = [width_px, height_px];
+    this.#renderer.setSize(width_px, height_px, false);
+    this.#overlay.resize(width_px, height_px, Math.min(2, window.devicePixelRatio));
+    this.eye.resize(width_px, height_px);
+    if (!this.#isFitted) this.eye.fit(this.#extent);
+    this.changed();
+  }
+
+  cast(bodies: Bodies): void {
+    this.#bodies = bodies;
+    this.#trails = new Trails(bodies.count, this.#scene.dimensions === 2 ? 2 : 3);
+    this.#painter.cast(bodies, this.#palette);
+    this.#frame = null;
+  }
+
+  frame(frame: Frame): void {
+    if (frame === this.#frame || !this.#bodies) return;
+    const isFirst = this.#frame === null;
+    this.#frame = frame;
+    this.#trails?.push(frame.cycle, frame.places_m);
+    if (isFirst) this.#extent = extentOf(this.#scene, this.#bodies, frame);
+    if (isFirst && !this.#isFitted) this.fit();
+    this.#bodiesChanged = this.#marksChanged = true;
+    this.changed();
+  }
+
+  choose(choices: Choices): void {
+    this.#choices = choices;
+    this.#marksChanged = true;
+    this.changed();
+  }
+
+  /** Shows everything. */
+  fit(): void {
+    if (this.#frame) this.#extent = extentOf(this.#scene, this.#bodies, this.#frame);
+    this.eye.fit(this.#extent);
+    this.#isFitted = this.#frame !== null && this.#size[0] > 1;
+    this.changed();
+  }
+
+  /** Brings the middle of the view nearer by a factor. */
+  zoom(factor: number): void {
+    this.eye.zoom(factor, this.#size[0] / 2, this.#size[1] / 2);
+    this.changed();
+  }
+
+  /** Brings a body to the middle. */
+  center(index: number): void {
+    const at = this.placeOf(index);
+    if (!at) return;
+    this.eye.center(at);
+    this.changed();
+  }
+
+  /** Brings a body into sight, if it is not. */
+  show(index: number): void {
+    const at = this.placeOf(index);
+    if (!at) return;
+    const [x, y, inFront] = this.eye.project(...at);
+    const isSeen = inFront && x > 0 && y > 0 && x < this.#size[0] && y < this.#size[1];
+    if (!isSeen) this.center(index);
+  }
+
+  /** The camera has moved. */
+  changed(): void {
+    this.#viewChanged = true;
+    if (this.#request === 0) this.#request = requestAnimationFrame(() => this.#draw());
+  }
+
+  agentAt(x_px: number, y_px: number): number | undefined {
+    if (!this.#frame || !this.#bodies) return undefined;
+    return pick(x_px, y_px, this.eye, this.#frame, this.#bodies);
+  }
+
+  hover(index: number | undefined): void {
+    if (index === this.#hovered) return;
+    this.#hovered = index;
+    this.changed();
+  }
+
+  /** Where a body appears, for tests and for keeping it in sight. */
+  placeOf(index: number): Place | null {
+    const frame = this.#frame;
+    if (!frame) return null;
+    const d = frame.dimensions;
+    return [frame.places_m[d * index]!, frame.places_m[d * index + 1]!, d === 3 ? frame.places_m[d * index + 2]! : 0];
+  }
+
+  dispose(): void {
+    cancelAnimationFrame(this.#request);
+    this.#floor?.dispose();
+    this.#painter.dispose();
+    for (const strokes of [this.#grid, this.#ways, this.#marks]) strokes.quads.dispose();
+    this.#dropAreas();
+    this.#renderer.dispose();
+    this.#renderer.forceContextLoss();
+  }
+
+  #draw(): void {
+    this.#request = 0;
+    const pxPerM = 1 / this.eye.mPerPx;
+    if (this.#bodiesChanged && this.#frame) this.#painter.frame(this.#frame);
+    if (this.#marksChanged) this.#drawMarks();
+    if (this.#viewChanged) {
+      this.#painter.scale(pxPerM, this.#palette, this.#size[1]);
+      for (const strokes of [this.#grid, this.#ways, this.#marks]) strokes.scale(pxPerM, ...this.#size);
+      if (!this.#floor) drawGrid(this.#grid, this.eye, this.#extent, this.#size, this.#palette);
+    }
+    this.#bodiesChanged = this.#marksChanged = this.#viewChanged = false;
+    this.#renderer.render(this.#graph, this.eye.camera);
+    this.#overlay.draw(this.eye, this.#extent, this.#labels(), this.#palette);
+    this.pictures++;
+    this.onDrawn(this.#roles);
+  }
+
+  #drawMarks(): void {
+    const { inspection, selected } = this.#choices;
+    this.#drawTrails();
+    this.#dropAreas();
+    this.#marks.begin();
+    const marks = selected && inspection ? inspection.marks : [];
+    for (const mesh of fillAreas(marks, this.#palette)) this.#areas.add(mesh);
+    const roles = drawMarks(marks, this.#marks, this.#palette);
+    const scans = selected && this.#frame ? this.#frame.text.scans : [];
+    for (const role of drawScans(scans, this.#marks, this.#palette)) roles.add(role);
+    this.#marks.end();
+    this.#roles = roles;
+  }
+
+  #dropAreas(): void {
+    for (const mesh of this.#areas.children as Mesh[]) {
+      mesh.geometry.dispose();
+      (mesh.material as { dispose(): void }).dispose();
+    }
+    this.#areas.clear();
+  }
+
+  #drawTrails(): void {
+    const [bodies, trails] = [this.#bodies, this.#trails];
+    this.#ways.begin();
+    if (bodies && trails) for (const index of this.#trailed(bodies)) this.#drawTrail(bodies, trails, index);
+    this.#ways.end();
+  }
+
+  #trailed(bodies: Bodies): Iterable<number> {
+    if (this.#choices.trails === "all") return bodies.agents;
+    const index = this.#choices.selected ? bodies.find(this.#choices.selected) : undefined;
+    return this.#choices.trails === "selected" && index !== undefined ? [index] : [];
+  }
+
+  /** A trail fades towards its old end. */
+  #drawTrail(bodies: Bodies, trails: Trails, index: number): void {
+    const { cast } = bodies;
+    const way = trails.of(index);
+    const color = visible(cast.looks[cast.look[index]!]![0].color, this.#palette);
+    const width_m = this.#choices.widthIsTrue ? 2 * flatRadiusOf(cast.shapes[cast.shape[index]!]!) : 0;
+    const most = this.#choices.widthIsTrue ? 0.35 : 0.85;
+    for (let i = 1; i < way.length; i++) {
+      this.#ways.piece(way[i - 1]!, way[i]!, 1.5, width_m, word(color, most * (0.12 + (0.88 * i) / way.length)));
+    }
+  }
+
+  #labels(): Label[] {
+    const [bodies, frame] = [this.#bodies, this.#frame];
+    if (!bodies || !frame) return [];
+    const selected = this.#choices.selected ? bodies.find(this.#choices.selected) : undefined;
+    const wanted = new Map<number, Label["ring"]>();
+    const { named } = bodies;
+    if (named.length <= MOST_NAMES) for (const [index] of named) wanted.set(index, null);
+    if (this.#hovered !== undefined) wanted.set(this.#hovered, "hovered");
+    if (selected !== undefined) wanted.set(selected, "selected");
+    return [...wanted].flatMap(([index, ring]) => this.#label(bodies, index, ring));
+  }
+
+  #label(bodies: Bodies, index: number, ring: Label["ring"]): Label[] {
+    const at = this.placeOf(index);
+    if (!at) return [];
+    const [x_px, y_px, inFront] = this.eye.project(...at);
+    const radius_px = flatRadiusOf(bodies.cast.shapes[bodies.cast.shape[index]!]!) / this.eye.mPerPx;
+    return inFront ? [{ x_px, y_px, radius_px, words: ring ? bodies.name(index) : bodies.whole(index), ring }] : [];
+  }
+}

@@ -1,0 +1,88 @@
+/** Where bodies have been: a ring of places for each, kept by the page. */
+
+/** Places that are kept of all bodies together, and of one. */
+const MOST_PLACES = 240_000;
+const MOST_OF_ONE = 600;
+/** A jump of more cycles than this is no way that was seen. */
+const GAP_CYCLES = 200;
+
+export class Trails {
+  readonly dimensions: 2 | 3;
+  readonly bodies: number;
+  /** Places that fit into each ring. */
+  readonly length: number;
+  readonly #places: Float32Array;
+  readonly #cycles: Float64Array;
+  readonly #begins: Int32Array;
+  readonly #counts: Int32Array;
+  #last = -Infinity;
+
+  constructor(bodies: number, dimensions: 2 | 3) {
+    this.bodies = bodies;
+    this.dimensions = dimensions;
+    this.length = Math.max(8, Math.min(MOST_OF_ONE, Math.floor(MOST_PLACES / Math.max(1, bodies))));
+    this.#places = new Float32Array(bodies * this.length * dimensions);
+    this.#cycles = new Float64Array(bodies * this.length);
+    this.#begins = new Int32Array(bodies);
+    this.#counts = new Int32Array(bodies);
+  }
+
+  /** Takes the places of a frame. Going back shortens trails, a jump forward begins new ones. */
+  push(cycle: number, places: Float32Array): void {
+    if (cycle < this.#last) this.#cut(cycle);
+    else if (cycle > this.#last + GAP_CYCLES) this.clear();
+    this.#last = cycle;
+    for (let body = 0; body < this.bodies; body++) this.#push(body, cycle, places);
+  }
+
+  clear(): void {
+    this.#begins.fill(0);
+    this.#counts.fill(0);
+  }
+
+  #push(body: number, cycle: number, places: Float32Array): void {
+    const d = this.dimensions;
+    const count = this.#counts[body]!;
+    const first = body * this.length;
+    const newest = first + ((this.#begins[body]! + count - 1 + this.length) % this.length);
+    const from = body * d;
+    if (count > 0 && this.#isAt(newest, from, places)) return;
+    let slot: number;
+    if (count < this.length) {
+      slot = first + ((this.#begins[body]! + count) % this.length);
+      this.#counts[body] = count + 1;
+    } else {
+      slot = first + this.#begins[body]!;
+      this.#begins[body] = (this.#begins[body]! + 1) % this.length;
+    }
+    for (let k = 0; k < d; k++) this.#places[slot * d + k] = places[from + k]!;
+    this.#cycles[slot] = cycle;
+  }
+
+  #isAt(slot: number, from: number, places: Float32Array): boolean {
+    const d = this.dimensions;
+    for (let k = 0; k < d; k++) if (this.#places[slot * d + k] !== places[from + k]) return false;
+    return true;
+  }
+
+  #cut(cycle: number): void {
+    for (let body = 0; body < this.bodies; body++) {
+      const first = body * this.length;
+      let count = this.#counts[body]!;
+      while (count > 0 && this.#cycles[first + ((this.#begins[body]! + count - 1) % this.length)]! > cycle) count--;
+      this.#counts[body] = count;
+    }
+  }
+
+  /** The places of a body, from the oldest to the newest, as columns of x y (z). */
+  of(body: number): number[][] {
+    const d = this.dimensions;
+    const first = body * this.length;
+    const way: number[][] = [];
+    for (let i = 0; i < this.#counts[body]!; i++) {
+      const slot = first + ((this.#begins[body]! + i) % this.length);
+      way.push(Array.from(this.#places.subarray(slot * d, slot * d + d)));
+    }
+    return way;
+  }
+}

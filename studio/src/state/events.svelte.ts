@@ -1,0 +1,95 @@
+/** Events of a session: fetched as the run goes on, kept when it goes back, since a run repeats itself. */
+
+import type { Answer, Event } from "../protocol";
+import { whoKey } from "../format";
+
+/** Events that the page keeps at most. */
+const MOST_KEPT = 20_000;
+/** Events that one question asks for at most. */
+const MOST_ASKED = 2000;
+
+function keyOf(event: Event): string {
+  const who = event.who ? whoKey(event.who) : "";
+  const other = event.with ? whoKey(event.with) : "";
+  return `${event.cycle}|${event.kind}|${who}|${other}|${event.words}`;
+}
+
+export class Events {
+  /** In the order of cycles. */
+  list = $state.raw<Event[]>([]);
+  /** Kinds that have occurred, with how often. */
+  kinds = $state.raw<Map<string, number>>(new Map());
+  leftOut = $state(0);
+  /** All events before this cycle were asked for. */
+  #asked = 0;
+  #isAsking = false;
+  #age = 0;
+
+  clear(): void {
+    this.list = [];
+    this.kinds = new Map();
+    this.leftOut = 0;
+    this.#asked = 0;
+    this.#age++;
+    this.#isAsking = false;
+  }
+
+  /** Fetches what has happened before this cycle; one question at a time. */
+  async fetch(until: number, ask: (from: number, until: number, most: number) => Promise<Answer>): Promise<void> {
+    if (this.#isAsking || until <= this.#asked) return;
+    const age = this.#age;
+    this.#isAsking = true;
+    try {
+      await this.#fetchAll(age, until, ask);
+    } finally {
+      if (age === this.#age) this.#isAsking = false;
+    }
+  }
+
+  /** The server answers with the oldest: goes on from the last of them until none is left. */
+  async #fetchAll(age: number, until: number, ask: (from: number, until: number, most: number) => Promise<Answer>): Promise<void> {
+    let most = MOST_ASKED;
+    while (true) {
+      const from = this.#asked;
+      const answer = await ask(from, until, most);
+      if (age !== this.#age || answer.is !== "events") return;
+      this.add(answer.entries);
+      const last = answer.entries.at(-1);
+      if (!last || answer.entries.length < most || answer.left_out === 0) {
+        // What is left out now is not at the server either: it was never kept.
+        this.leftOut += answer.left_out;
+        this.#asked = Math.max(from, Math.min(until, answer.known_until));
+        return;
+      }
+      // The last cycle may be cut; one that fills the whole answer needs a larger one.
+      if (last.cycle > from) this.#asked = last.cycle;
+      else most *= 2;
+    }
+  }
+
+  /** Adds events that are not known yet. */
+  add(entries: Event[]): void {
+    if (entries.length === 0) return;
+    const from = Math.min(...entries.map((event) => event.cycle));
+    const known = new Set<string>();
+    // Where the world tells no kind, its level says at least how bad it is.
+    entries = entries.map((event) => (event.kind === "" ? { ...event, kind: event.level } : event));
+    for (let i = this.list.length - 1; i >= 0 && this.list[i]!.cycle >= from; i--) known.add(keyOf(this.list[i]!));
+    const fresh = entries.filter((event) => {
+      const key = keyOf(event);
+      return !known.has(key) && !!known.add(key);
+    });
+    if (fresh.length === 0) return;
+    const all = [...this.list, ...fresh].sort((a, b) => a.cycle - b.cycle);
+    this.list = all.slice(-MOST_KEPT);
+    const kinds = new Map<string, number>();
+    for (const event of this.list) kinds.set(event.kind, (kinds.get(event.kind) ?? 0) + 1);
+    this.kinds = kinds;
+  }
+
+  /** The first event after a cycle, or the last before it, of those that pass. */
+  neighbor(cycle: number, direction: 1 | -1, passes: (event: Event) => boolean): Event | undefined {
+    const found = (event: Event): boolean => passes(event) && direction * (event.cycle - cycle) > 0;
+    return direction > 0 ? this.list.find(found) : this.list.findLast(found);
+  }
+}

@@ -1,0 +1,338 @@
+/** One open run: what the server says of it, and what the page chose in it. */
+
+import { Credit } from "../credit";
+import { decodeFrame, FrameError, type Frame } from "../decode";
+import { Refused, problemOf } from "../connection";
+import { firstSpeed, SPEEDS, whoKey } from "../format";
+import type { Answer, Call, Cast, Event, Inspection, Problem, Scene, Speed, Status, Subject, Who } from "../protocol";
+import { Bodies } from "./cast";
+import { Events } from "./events.svelte";
+import { Metrics } from "./metrics.svelte";
+
+type DistributiveOmit<T, K extends PropertyKey> = T extends unknown ? Omit<T, K> : never;
+/** A call to a session, which adds its own number. */
+type OwnCall = DistributiveOmit<Extract<Call, { session: number }>, "session">;
+
+/** How the session talks to its surroundings. */
+export interface Line {
+  ask(call: Call): Promise<Answer>;
+  problem(problem: Problem): void;
+}
+
+export type TrailChoice = "none" | "selected" | "all";
+
+/** Least time between two questions about the selected body while the run goes on. */
+const INSPECT_EVERY_MS = 200;
+
+const NO_SESSION = problemOf("session", "it is not open at the server", "wait until the page is connected again");
+
+/** Wait before credit is granted again for frames that could not be shown. */
+const REGRANT_AFTER_MS = 1000;
+
+let keys = 0;
+
+export class Session {
+  /** The page's own number, which stays when the server gives another. */
+  readonly key = ++keys;
+  readonly subject: Subject;
+  readonly events = new Events();
+  readonly metrics = new Metrics();
+  id = $state(0);
+  scene = $state.raw<Scene>() as Scene;
+  status = $state.raw<Status>() as Status;
+  bodies = $state.raw<Bodies | null>(null);
+  /** How fast it plays, when it plays. */
+  speed = $state.raw<Speed>({ times: 1 });
+  /** Cycle, time and count of left-out frames of what is shown. */
+  shown = $state.raw({ cycle: 0, time_s: 0, leftOut: 0 });
+  selected = $state.raw<Who | null>(null);
+  inspection = $state.raw<Inspection | null>(null);
+  inspectProblem = $state.raw<Problem | null>(null);
+  ended = $state.raw<Problem | null>(null);
+  trails = $state<TrailChoice>("selected");
+  widthIsTrue = $state(false);
+  eventKinds = $state.raw<ReadonlySet<string>>(new Set());
+  /** The text that this run was started with instead of the file's. */
+  text = $state.raw<string | null>(null);
+  /** What the text view holds, while it differs from the file. */
+  draft: string | null = null;
+  /** Cycle under the pointer in the timeline or a chart. */
+  cursor = $state<number | null>(null);
+  /** Counts starts, so that views begin anew. */
+  starts = $state(0);
+  /** The newest frame; `frames` tells views that it changed. */
+  frame: Frame | null = null;
+  readonly credit: Credit;
+  readonly #line: Line;
+  readonly #early = new Map<number, Frame>();
+  readonly #onFrame = new Set<() => void>();
+  #inspectTimer: ReturnType<typeof setTimeout> | null = null;
+  #inspectedAt_ms = 0;
+  #isInspecting = false;
+  #seekTo: number | null = null;
+  #isSeeking = false;
+  #regrantTimer: ReturnType<typeof setTimeout> | null = null;
+
+  constructor(subject: Subject, line: Line) {
+    this.subject = subject;
+    this.#line = line;
+    this.credit = new Credit((frames) => this.quietly({ do: "credit", frames }));
+  }
+
+  /** The server has opened it (again). */
+  opened(answer: Extract<Answer, { is: "opened" }>): void {
+    this.id = answer.session;
+    if (this.starts === 0) this.speed = { times: firstSpeed(answer.scene.cycle_s) };
+    this.#begun(answer);
+    this.credit.reset();
+    this.credit.drawn();
+    this.#look();
+  }
+
+  #begun(answer: Extract<Answer, { is: "opened" }>): void {
+    this.scene = answer.scene;
+    this.status = answer.status;
+    this.ended = null;
+    this.events.clear();
+    this.metrics.clear();
+    this.inspection = null;
+    this.starts++;
+  }
+
+  /** The seed, where a number of the page can hold it; a recording has none but its own. */
+  get seed(): number | null {
+    if (this.subject.kind === "recording") return null;
+    const seed = Number(this.status.seed);
+    return this.status.seed !== "" && Number.isSafeInteger(seed) ? seed : null;
+  }
+
+  get isPlaying(): boolean {
+    return this.status.state === "playing";
+  }
+
+  /** The last cycle of the timeline; grows where no end is planned. */
+  get lastCycle(): number {
+    const planned = this.status.cycles_planned;
+    return Number.isFinite(planned) && planned !== null && planned > 0 ? planned : Math.max(100, this.status.cycle);
+  }
+
+  subscribe(onFrame: () => void): () => void {
+    this.#onFrame.add(onFrame);
+    return () => this.#onFrame.delete(onFrame);
+  }
+
+  takeCast(cast: Cast): void {
+    this.bodies = new Bodies(cast);
+    const early = this.#early.get(cast.cast);
+    this.#early.clear();
+    if (early) this.#show(early);
+  }
+
+  takeFrame(bytes: ArrayBuffer): void {
+    this.credit.arrived();
+    try {
+      const frame = decodeFrame(bytes);
+      if (frame.cast === this.bodies?.cast.cast) this.#show(frame);
+      else this.#early.set(frame.cast, frame);
+    } catch (error) {
+      if (!(error instanceof FrameError)) throw error;
+      this.#line.problem(problemOf("frame", error.message, "reload the page; if it stays so, report it"));
+      this.#regrantSoon();
+    }
+  }
+
+  /** Nothing is drawn of a frame that cannot be shown, which would end the credit, and the picture stood still. */
+  #regrantSoon(): void {
+    this.#regrantTimer ??= setTimeout(() => {
+      this.#regrantTimer = null;
+      if (this.id !== 0 && !this.ended) this.credit.drawn();
+    }, REGRANT_AFTER_MS);
+  }
+
+  #show(frame: Frame): void {
+    if (frame.bodies !== this.bodies?.count || frame.lineStarts.length !== this.bodies.lines.length + 1) {
+      this.#line.problem(problemOf("frame", "a frame does not fit its cast", "reload the page"));
+      this.#regrantSoon();
+      return;
+    }
+    this.frame = frame;
+    this.shown = { cycle: frame.cycle, time_s: frame.time_s, leftOut: frame.leftOut };
+    if (frame.text.events.length > 0) this.events.add(frame.text.events);
+    for (const tell of this.#onFrame) tell();
+    this.#inspectSoon();
+  }
+
+  takeStatus(status: Status): void {
+    this.status = status;
+  }
+
+  takeEnd(problem: Problem): void {
+    this.ended = problem;
+    this.status = { ...this.status, state: "failed" };
+  }
+
+  /** Fetches events and samples; called regularly while the session is shown. */
+  refresh(withMetrics: boolean): void {
+    if (this.ended) return;
+    const cycle = 1 + (this.scene.is_recording ? this.lastCycle : Math.max(this.status.cycle, this.shown.cycle));
+    const quiet = (): void => undefined;
+    this.events
+      .fetch(cycle, (from, until, most) => this.#ask({ do: "events", from, until, most }))
+      .catch(quiet);
+    if (withMetrics) this.metrics.fetch((from) => this.#ask({ do: "metrics", from })).catch(quiet);
+  }
+
+  // What the page can do with it.
+
+  play(): void {
+    void this.tell({ do: "play", speed: this.speed });
+  }
+
+  pause(): void {
+    void this.tell({ do: "pause" });
+  }
+
+  toggle(): void {
+    if (this.isPlaying) this.pause();
+    else this.play();
+  }
+
+  step(cycles: number): void {
+    if (cycles >= 0) void this.tell({ do: "step", cycles });
+    else this.seek(this.shown.cycle + cycles);
+  }
+
+  setSpeed(speed: Speed): void {
+    if (this.isPlaying) void this.tell({ do: "play", speed });
+    this.speed = speed;
+  }
+
+  /** Goes to the next or the previous of the usual speeds. */
+  changeSpeed(direction: 1 | -1): void {
+    const now = this.speed === "fastest" ? Infinity : this.speed.times;
+    const sizes = SPEEDS.map((speed) => (speed === "fastest" ? Infinity : speed));
+    const wanted = direction > 0 ? sizes.find((s) => s > now) : sizes.findLast((s) => s < now);
+    if (wanted !== undefined) this.setSpeed(wanted === Infinity ? "fastest" : { times: wanted });
+  }
+
+  /** Goes to a cycle; while one is under way only the latest wish is kept. */
+  seek(cycle: number): void {
+    this.#seekTo = Math.round(Math.min(Math.max(0, cycle), this.lastCycle));
+    if (!this.#isSeeking) void this.#seekOn();
+  }
+
+  async #seekOn(): Promise<void> {
+    this.#isSeeking = true;
+    while (this.#seekTo !== null) {
+      const cycle = this.#seekTo;
+      this.#seekTo = null;
+      await this.tell({ do: "seek", cycle });
+    }
+    this.#isSeeking = false;
+  }
+
+  /** Starts anew. Returns whether the server agreed. */
+  async restart(seed: number | null, text: string | null): Promise<boolean> {
+    const answer = await this.tell({ do: "restart", seed, text });
+    if (answer === null) return false;
+    if (text !== null) this.text = text;
+    if (answer.is === "opened") this.#begun(answer);
+    else this.#begun({ is: "opened", session: this.id, scene: this.scene, status: { ...this.status, cycle: 0 } });
+    this.credit.drawn();
+    this.#look();
+    return true;
+  }
+
+  select(who: Who | null): void {
+    const same = who && this.selected && whoKey(who) === whoKey(this.selected);
+    if (same) return;
+    this.selected = who;
+    this.inspection = null;
+    this.inspectProblem = null;
+    this.#look();
+    this.#inspectedAt_ms = 0;
+    this.#inspectSoon();
+  }
+
+  /** Goes to an event, and selects the agent that it is about. */
+  visit(event: Event): void {
+    const agent = [event.who, event.with].find((who) => {
+      const index = who ? this.bodies?.find(who) : undefined;
+      return index !== undefined && this.bodies?.cast.is_agent[index];
+    });
+    if (agent) this.select(agent);
+    this.seek(event.cycle);
+  }
+
+  /** Jumps to the next or the previous event of the kinds that are shown. */
+  jump(direction: 1 | -1): void {
+    const kinds = this.eventKinds;
+    const event = this.events.neighbor(this.shown.cycle, direction, (e) => !kinds.has(e.kind));
+    if (event) this.visit(event);
+  }
+
+  source(): Promise<Answer> {
+    return this.#ask({ do: "source" });
+  }
+
+  check(text: string): Promise<Answer> {
+    return this.#ask({ do: "check", text });
+  }
+
+  /** Sends a call and shows its problem, if there is one. */
+  async tell(call: OwnCall): Promise<Answer | null> {
+    try {
+      return await this.#ask(call);
+    } catch (error) {
+      if (!(error instanceof Refused)) throw error;
+      this.#line.problem(error.problem);
+      return null;
+    }
+  }
+
+  /** Sends a call whose failure nobody needs to hear of. */
+  quietly(call: OwnCall): void {
+    this.#ask(call).catch(() => undefined);
+  }
+
+  #ask(call: OwnCall): Promise<Answer> {
+    // Between two connections the session has no number at the server.
+    if (this.id === 0) return Promise.reject(new Refused(NO_SESSION));
+    return this.#line.ask({ ...call, session: this.id } as Call);
+  }
+
+  #look(): void {
+    this.quietly({ do: "look", scans_of: this.selected ? [this.selected] : [] });
+  }
+
+  #inspectSoon(): void {
+    if (!this.selected || this.#isInspecting || this.#inspectTimer !== null) return;
+    const wait_ms = Math.max(0, this.#inspectedAt_ms + INSPECT_EVERY_MS - performance.now());
+    this.#inspectTimer = setTimeout(() => {
+      this.#inspectTimer = null;
+      void this.#inspect();
+    }, wait_ms);
+  }
+
+  async #inspect(): Promise<void> {
+    const who = this.selected;
+    const frame = this.frame;
+    if (!who) return;
+    this.#isInspecting = true;
+    this.#inspectedAt_ms = performance.now();
+    try {
+      const answer = await this.#ask({ do: "inspect", who });
+      if (this.selected === who && answer.is === "inspection") {
+        this.inspection = answer;
+        this.inspectProblem = null;
+      }
+    } catch (error) {
+      if (!(error instanceof Refused)) throw error;
+      if (this.selected === who) this.inspectProblem = error.problem;
+    } finally {
+      this.#isInspecting = false;
+      for (const tell of this.#onFrame) tell();
+      if (this.selected !== who || this.frame !== frame) this.#inspectSoon();
+    }
+  }
+}

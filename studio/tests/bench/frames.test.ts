@@ -1,0 +1,91 @@
+/**
+ * Frames of ten thousand robots that reach the screen each second, in headless Chromium with software rendering.
+ * Without STUDIO_URL the made-up server sends them; with it, a real one that runs crowd.toml as a text.
+ */
+
+import { readFileSync } from "node:fs";
+import type { Browser, CDPSession, Page } from "playwright-core";
+import { afterAll, beforeAll, expect, test } from "vitest";
+import { drawn, launch, openPage, WAIT_MS } from "../browser";
+import { FakeServer } from "../fake/server";
+
+const url = process.env.STUDIO_URL;
+const MEASURED_S = 10;
+const server = new FakeServer("dist");
+let browser: Browser;
+beforeAll(async () => {
+  if (!url) await server.start();
+  browser = await launch();
+});
+afterAll(async () => {
+  await browser.close();
+  if (!url) await server.stop();
+});
+
+/** A crowd: opened by its name from the made-up server, run as a text by a real one. */
+async function openCrowd(page: Page): Promise<void> {
+  if (!url) {
+    await page.getByRole("button", { name: "crowd", exact: true }).first().click();
+    return drawn(page);
+  }
+  await page.getByRole("button", { name: "robots", exact: true }).first().click();
+  await drawn(page);
+  await page.getByRole("tab", { name: "Text" }).click();
+  const text = page.getByRole("textbox", { name: "Text of the scenario" });
+  await text.click();
+  await page.keyboard.press("Control+A");
+  await page.keyboard.insertText(readFileSync(new URL("crowd.toml", import.meta.url), "utf8"));
+  await page.getByTestId("check").filter({ hasText: "no problems" }).waitFor();
+  await page.getByRole("button", { name: "Run", exact: true }).click();
+  await page.locator("canvas.picture").waitFor();
+}
+
+interface Count {
+  pictures: number;
+  cycles: number;
+  leftOut: number;
+  scripting_ms: number;
+  heap_mb: number;
+}
+
+async function count(page: Page, client: CDPSession): Promise<Count> {
+  const { metrics } = await client.send("Performance.getMetrics");
+  const of = (name: string): number => metrics.find((metric) => metric.name === name)?.value ?? 0;
+  const number = async (id: string): Promise<number> => {
+    const found = page.getByTestId(id);
+    return (await found.count()) === 0 ? 0 : Number((await found.textContent())!.replace(/\D/g, ""));
+  };
+  return {
+    pictures: Number(await page.locator(".view").getAttribute("data-pictures")),
+    cycles: await number("cycle"),
+    leftOut: await number("left-out"),
+    scripting_ms: 1000 * of("ScriptDuration"),
+    heap_mb: of("JSHeapUsedSize") / 1e6,
+  };
+}
+
+test("ten thousand robots are shown", { timeout: 4 * WAIT_MS }, async () => {
+  const { page, complaints } = await openPage(browser, url ?? server.url);
+  await openCrowd(page);
+  await page.getByTestId("agent-count").filter({ hasText: "10000" }).waitFor();
+  const client = await page.context().newCDPSession(page);
+  await client.send("Performance.enable");
+  await page.getByLabel("Speed", { exact: true }).selectOption(url ? "fastest" : "10");
+  await page.getByRole("button", { name: "Play" }).click();
+  await expect.poll(async () => (await count(page, client)).pictures, { timeout: WAIT_MS }).toBeGreaterThan(20);
+  const before = await count(page, client);
+  const began = performance.now();
+  await page.waitForTimeout(1000 * MEASURED_S);
+  const after = await count(page, client);
+  const seconds = (performance.now() - began) / 1000;
+  const perSecond = (after.pictures - before.pictures) / seconds;
+  const script = (after.scripting_ms - before.scripting_ms) / (after.pictures - before.pictures);
+  console.log(
+    `${perSecond.toFixed(1)} frames/s shown, ${((after.leftOut - before.leftOut) / seconds).toFixed(1)}/s left out, ` +
+      `${((after.cycles - before.cycles) / seconds).toFixed(0)} cycles/s, ${script.toFixed(1)} ms of script a frame, ` +
+      `heap ${before.heap_mb.toFixed(0)} -> ${after.heap_mb.toFixed(0)} MB`,
+  );
+  await page.screenshot({ path: "screenshots/crowd.png" });
+  expect(perSecond).toBeGreaterThan(1);
+  expect(complaints).toEqual([]);
+});

@@ -1,0 +1,52 @@
+/** Chromium and pages for tests. */
+
+import { chromium, type Browser, type Page } from "playwright-core";
+
+/** On a busy machine software rendering is slow; nothing waits for luck. */
+export const WAIT_MS = Number(process.env.WAIT_MS ?? 60_000);
+
+export function launch(): Promise<Browser> {
+  return chromium.launch({
+    executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+    headless: true,
+    args: [
+      "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update",
+      "--disable-sync", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+    ],
+  });
+}
+
+export interface Look {
+  width?: number;
+  height?: number;
+  isDark?: boolean;
+}
+
+/** Opens the page; what it complains about is gathered in `complaints`. */
+export async function openPage(browser: Browser, url: string, look: Look = {}): Promise<{ page: Page; complaints: string[] }> {
+  const context = await browser.newContext({
+    viewport: { width: look.width ?? 1280, height: look.height ?? 800 },
+    colorScheme: look.isDark ? "dark" : "light",
+    reducedMotion: "reduce",
+  });
+  const page = await context.newPage();
+  page.setDefaultTimeout(WAIT_MS);
+  const complaints: string[] = [];
+  page.on("console", (message) => {
+    if (message.type() === "error" || message.type() === "warning") complaints.push(message.text());
+  });
+  page.on("pageerror", (error) => complaints.push(String(error)));
+  await page.goto(url);
+  return { page, complaints };
+}
+
+/** Waits until the picture shows a frame that was asked for by now. */
+export async function drawn(page: Page): Promise<void> {
+  await page.waitForFunction(() => Number(document.querySelector<HTMLElement>(".view")?.dataset.pictures ?? 0) > 1);
+}
+
+/** Begins with the defaults of a world. */
+export async function openNew(page: Page, world: string): Promise<void> {
+  await page.getByRole("button", { name: world, exact: true }).first().click();
+  await drawn(page);
+}

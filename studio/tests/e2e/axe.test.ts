@@ -1,0 +1,62 @@
+/** axe finds nothing to object to, in any of the page's states. */
+
+import { readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import type { Browser, Page } from "playwright-core";
+import { afterAll, beforeAll, expect, test } from "vitest";
+import { launch, openNew, openPage } from "../browser";
+import { FakeServer } from "../fake/server";
+
+const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+const server = new FakeServer("dist");
+let browser: Browser;
+beforeAll(async () => {
+  await server.start();
+  browser = await launch();
+});
+afterAll(async () => {
+  await browser.close();
+  await server.stop();
+});
+
+interface Finding {
+  id: string;
+  nodes: { target: string[]; failureSummary: string }[];
+}
+
+async function findings(page: Page): Promise<string[]> {
+  await page.evaluate(AXE);
+  const found = await page.evaluate(async () => {
+    const { axe } = window as unknown as { axe: { run(): Promise<{ violations: Finding[] }> } };
+    return (await axe.run()).violations;
+  });
+  return found.map(({ id, nodes }) => `${id}: ${nodes.map((n) => `${n.target.join(" ")} ${n.failureSummary}`).join("; ")}`);
+}
+
+for (const [width, isDark] of [[1280, false], [1280, true], [400, false], [400, true]] as const) {
+  test(`at ${width} pixels, ${isDark ? "dark" : "light"}`, async () => {
+    const { page } = await openPage(browser, server.url, { width, isDark });
+    await page.getByText("Nothing is open.").waitFor();
+    expect(await findings(page)).toEqual([]);
+    await page.getByRole("button", { name: /^Open a scenario/ }).click();
+    await page.getByRole("button", { name: /^more/ }).waitFor();
+    expect(await findings(page)).toEqual([]);
+    await page.keyboard.press("Escape");
+    await openNew(page, "robots");
+    await page.getByRole("slider", { name: "Cycle" }).fill("300");
+    await page.locator(".agents").getByRole("option").nth(2).click();
+    if (width === 400) await page.getByRole("tab", { name: "inspector" }).click();
+    await page.locator("details").first().waitFor();
+    expect(await findings(page)).toEqual([]);
+    if (width === 400) await page.getByRole("tab", { name: "events" }).click();
+    await page.getByRole("button", { name: /^contact/ }).first().waitFor();
+    expect(await findings(page)).toEqual([]);
+    await page.getByRole("tab", { name: "Text" }).click();
+    await page.getByTestId("check").filter({ hasText: "no problems" }).waitFor();
+    expect(await findings(page)).toEqual([]);
+    await page.getByRole("tab", { name: "View" }).click();
+    await page.getByRole("button", { name: "Help" }).click();
+    expect(await findings(page)).toEqual([]);
+    await page.context().close();
+  });
+}

@@ -1,0 +1,337 @@
+/** What a person can do with the page, in a real browser, against a server of made-up worlds. */
+
+import type { Browser, Page } from "playwright-core";
+import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from "vitest";
+import { launch, openNew, openPage, WAIT_MS, type Look } from "../browser";
+import { FakeServer } from "../fake/server";
+
+const server = new FakeServer("dist");
+let browser: Browser;
+let page: Page;
+let complaints: string[];
+
+beforeAll(async () => {
+  await server.start();
+  browser = await launch();
+});
+afterAll(async () => {
+  await browser.close();
+  await server.stop();
+});
+beforeEach(() => {
+  server.calls.length = 0;
+});
+afterEach(async () => {
+  await page.context().close();
+});
+
+async function visit(world: string | null, look: Look = {}): Promise<void> {
+  ({ page, complaints } = await openPage(browser, server.url, look));
+  if (world) await openNew(page, world);
+}
+
+const cycle = async (): Promise<number> =>
+  Number((await page.getByTestId("cycle").textContent())!.replace(/\D/g, ""));
+
+/** Waits until the shown cycle is this one, or passes a test. */
+async function cycleIs(wanted: number | ((c: number) => boolean)): Promise<void> {
+  const passes = typeof wanted === "number" ? (c: number): boolean => c === wanted : wanted;
+  await expect.poll(async () => passes(await cycle()), { timeout: WAIT_MS }).toBe(true);
+}
+
+const asked = (what: string): number => server.calls.filter((call) => call.do === what).length;
+
+async function askedFor(what: string, times: number): Promise<void> {
+  await expect.poll(() => asked(what), { timeout: 30_000 }).toBeGreaterThanOrEqual(times);
+}
+
+describe("transport", () => {
+  test("a run is opened, played, paused and stepped, and nothing complains", async () => {
+    await visit("robots");
+    expect(await cycle()).toBe(0);
+    await page.getByRole("button", { name: "Play" }).click();
+    await cycleIs((c) => c >= 3);
+    await page.getByRole("button", { name: "Pause" }).click();
+    await page.getByTestId("state").filter({ hasText: "paused" }).waitFor();
+    const stopped = await cycle();
+    await page.getByRole("button", { name: "One cycle on" }).click();
+    await cycleIs(stopped + 1);
+    await page.getByRole("button", { name: "One cycle back" }).click();
+    await cycleIs(stopped);
+    expect(complaints).toEqual([]);
+  });
+
+  test("the timeline seeks, and shows events as ticks", async () => {
+    await visit("robots");
+    const slider = page.getByRole("slider", { name: "Cycle" });
+    await slider.fill("5000");
+    await cycleIs(5000);
+    await page.getByRole("button", { name: /^contact/ }).first().waitFor();
+    const colored = await page.locator(".timeline canvas").evaluate((canvas: HTMLCanvasElement) => {
+      const { data } = canvas.getContext("2d")!.getImageData(0, 0, canvas.width, canvas.height);
+      return data.some((value, i) => i % 4 === 3 && value > 0);
+    });
+    expect(colored).toBe(true);
+    await slider.fill("12");
+    await cycleIs(12);
+  });
+
+  test("another seed starts anew", async () => {
+    await visit("robots");
+    await page.getByRole("slider", { name: "Cycle" }).fill("100");
+    await cycleIs(100);
+    await page.getByRole("textbox", { name: "Seed" }).fill("77");
+    await page.getByRole("button", { name: "Restart" }).click();
+    await page.getByRole("button", { name: /seed 77/ }).waitFor();
+    await cycleIs(0);
+  });
+
+  test("frames that are left out are told", async () => {
+    await visit("robots");
+    await page.evaluate(() => {
+      const draw = window.requestAnimationFrame.bind(window);
+      window.requestAnimationFrame = () => 0;
+      window.addEventListener("blur", () => (window.requestAnimationFrame = draw));
+    });
+    await page.getByLabel("Speed", { exact: true }).selectOption("fastest");
+    await page.getByRole("button", { name: "Play" }).click();
+    await expect.poll(() => server.leftOut(), { timeout: 30_000 }).toBeGreaterThan(3);
+    await page.evaluate(() => window.dispatchEvent(new Event("blur")));
+    await page.getByRole("button", { name: "Fit" }).click();
+    await page.getByTestId("left-out").filter({ hasText: "frames" }).waitFor();
+  });
+});
+
+describe("agents", () => {
+  test("a click in the picture selects, and the inspector shows facts", async () => {
+    await visit("airspace");
+    await page.getByRole("slider", { name: "Cycle" }).fill("10");
+    await cycleIs(10);
+    const found = await page.locator(".view").evaluate((view) => {
+      const box = view.getBoundingClientRect();
+      return { x: box.x, y: box.y, width: box.width, height: box.height };
+    });
+    // ONE11 flies east through the middle of the picture's height: look for it there.
+    let met = false;
+    for (let x = 10; x < found.width && !met; x += 7) {
+      await page.mouse.move(found.x + x, found.y + found.height / 2 + 3);
+      met = await page.locator(".tip").isVisible();
+      if (met) await page.mouse.click(found.x + x, found.y + found.height / 2 + 3);
+    }
+    expect(met).toBe(true);
+    await page.getByRole("heading", { name: /^ONE1/ }).waitFor();
+    await page.getByText("probability").waitFor();
+    await page.getByRole("list", { name: "Marks" }).getByText("chosen").waitFor();
+  });
+
+  test("the list selects, filters ten thousand, and has only the rows that are seen", async () => {
+    await visit("crowd");
+    await page.getByTestId("agent-count").filter({ hasText: "10000" }).waitFor();
+    expect(await page.locator(".agents").getByRole("option").count()).toBeLessThan(60);
+    await page.keyboard.press("/");
+    await page.keyboard.type("robot 9999");
+    await page.getByTestId("agent-count").filter({ hasText: "1 of 10000" }).waitFor();
+    await page.keyboard.press("Enter");
+    await page.getByRole("heading", { name: "robot 9999" }).waitFor();
+    await page.getByText("nearest wall").waitFor();
+    await page.getByRole("button", { name: "robot 0" }).or(page.getByRole("button", { name: "courier Anna" })).first().click();
+    await page.getByRole("heading", { name: "courier Anna" }).waitFor();
+  });
+
+  test("beams of the selected are asked for and shown with a legend", async () => {
+    await visit("robots");
+    await page.getByRole("option", { name: "robot 5" }).click();
+    await page.getByRole("list", { name: "Marks" }).getByText("as reported").waitFor();
+    expect(server.calls.some((call) => call.do === "look" && call.scans_of[0]?.number === 5)).toBe(true);
+  });
+});
+
+describe("events", () => {
+  test("a click goes there and selects, kinds can be hidden, and keys jump", async () => {
+    await visit("robots");
+    await page.getByRole("slider", { name: "Cycle" }).fill("400");
+    await cycleIs(400);
+    await page.getByRole("group", { name: "Kinds of events" }).getByRole("button", { name: /contact/ }).click();
+    await page.getByTestId("event-count").filter({ hasText: /^3$/ }).waitFor();
+    await page.getByRole("listitem").getByRole("button", { name: /trip/ }).nth(1).click();
+    await cycleIs(220);
+    await page.getByRole("heading", { name: "robot 4" }).waitFor();
+    await page.locator("canvas.picture").focus();
+    await page.keyboard.press("k");
+    await cycleIs(110);
+    await page.keyboard.press("j");
+    await cycleIs(220);
+  });
+});
+
+describe("text", () => {
+  test("a wrong key is marked where it stands, refused, and a right text runs", async () => {
+    await visit("robots");
+    await page.getByRole("tab", { name: "Text" }).click();
+    const text = page.getByRole("textbox", { name: "Text of the scenario" });
+    await text.waitFor();
+    await page.getByTestId("check").filter({ hasText: "no problems" }).waitFor();
+    await text.click();
+    await page.keyboard.press("Control+End");
+    await page.keyboard.type("\ncuont = 3");
+    await page.getByTestId("check").filter({ hasText: "1 problem" }).waitFor();
+    await page.locator(".cm-lintRange-error").waitFor();
+    await page.getByRole("list", { name: "Problems" }).getByText("no key `cuont`").waitFor();
+    await page.getByRole("button", { name: "Run", exact: true }).click();
+    await page.getByRole("alert").getByText("no key `cuont`").waitFor();
+    await page.getByRole("alert").getByRole("button", { name: "Dismiss" }).click();
+    await text.click();
+    await page.keyboard.press("Control+End");
+    for (let i = 0; i < "cuont = 3".length; i++) await page.keyboard.press("Backspace");
+    await page.keyboard.type("size = 3");
+    await page.getByTestId("check").filter({ hasText: "no problems" }).waitFor();
+    await page.getByRole("button", { name: "Run", exact: true }).click();
+    await page.locator("canvas.picture").waitFor();
+    const restart = server.calls.findLast((call) => call.do === "restart");
+    expect(restart?.do === "restart" && restart.text?.endsWith("size = 3")).toBe(true);
+    expect(complaints).toEqual([]);
+  });
+});
+
+describe("keyboard", () => {
+  test("keys play, step, change speed, show help, and leave fields alone", async () => {
+    await visit("robots");
+    const speed = page.getByLabel("Speed", { exact: true });
+    await page.locator("canvas.picture").focus();
+    await page.keyboard.press("]");
+    expect(await speed.inputValue()).toBe("2");
+    await page.keyboard.press("[");
+    await page.keyboard.press("[");
+    expect(await speed.inputValue()).toBe("0.5");
+    await page.keyboard.press("ArrowRight");
+    await cycleIs(1);
+    await page.keyboard.press("Shift+ArrowRight");
+    await cycleIs(11);
+    await page.keyboard.press("ArrowLeft");
+    await cycleIs(10);
+    await page.keyboard.press(" ");
+    await cycleIs((c) => c > 10);
+    await page.keyboard.press(" ");
+    await page.getByTestId("state").filter({ hasText: "paused" }).waitFor();
+    await page.keyboard.press("?");
+    await page.getByRole("dialog", { name: "Help" }).waitFor();
+    await page.keyboard.press("Escape");
+    await page.keyboard.press("t");
+    expect(await page.getByLabel("Trails").inputValue()).toBe("all");
+    const plays = asked("play");
+    await page.getByRole("searchbox", { name: "Filter agents" }).focus();
+    await page.keyboard.type("j k f");
+    expect(asked("play")).toBe(plays);
+  });
+
+  test("everything can be reached by Tab, and shows that it is", async () => {
+    await visit("robots");
+    const reached = new Set<string>();
+    for (let i = 0; i < 60; i++) {
+      await page.keyboard.press("Tab");
+      const [name, ring] = await page.evaluate(() => {
+        const e = document.activeElement as HTMLElement;
+        if (e === document.body) return ["", ""] as const;
+        return [e.getAttribute("aria-label") ?? e.textContent?.trim().slice(0, 20) ?? "", getComputedStyle(e).outlineStyle] as const;
+      });
+      if (name) reached.add(name);
+      if (name) expect([name, ring]).not.toEqual([name, "none"]);
+    }
+    for (const name of ["Open…", "Agents", "Filter agents", "Play", "Cycle", "Speed", "Restart", "Help", "Trails"]) {
+      expect([...reached].some((one) => one.startsWith(name)), name).toBe(true);
+    }
+  });
+});
+
+describe("layout", () => {
+  for (const width of [400, 1280]) {
+    test(`at ${width} pixels nothing needs horizontal scrolling`, async () => {
+      await visit("airspace", { width });
+      await page.locator(".agents").getByRole("option").first().click();
+      for (const tab of width === 400 ? ["agents", "events", "inspector", "charts"] : []) {
+        await page.getByRole("tab", { name: tab }).click();
+        const box = await page.getByRole("tabpanel").boundingBox();
+        expect(box!.x >= 0 && box!.x + box!.width <= width).toBe(true);
+      }
+      const wide = await page.evaluate(() => document.scrollingElement!.scrollWidth);
+      expect(wide).toBeLessThanOrEqual(width);
+      for (const name of ["Play", "Restart", "Open…", "Help"]) {
+        const box = (await page.getByRole("button", { name }).first().boundingBox())!;
+        expect(box.x >= 0 && box.x + box.width <= width && box.y + box.height <= 800, name).toBe(true);
+      }
+    });
+  }
+
+  test("dark and light follow the system, and a switch", async () => {
+    await visit("robots", { isDark: true });
+    const back = (): Promise<string> => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+    const dark = await back();
+    await page.getByRole("button", { name: "Light theme" }).click();
+    expect(await back()).not.toBe(dark);
+    await page.emulateMedia({ colorScheme: "light" });
+    await page.getByRole("button", { name: "Dark theme" }).click();
+    expect(await back()).toBe(dark);
+  });
+});
+
+describe("sessions", () => {
+  test("two beside each other go in step, and only when asked to", async () => {
+    await visit("robots");
+    await page.getByRole("button", { name: "Open…" }).click();
+    await page.getByRole("dialog", { name: "Open" }).getByRole("button", { name: "chain", exact: true }).click();
+    await page.getByRole("button", { name: "Side by side" }).click();
+    await page.waitForFunction(() => document.querySelectorAll("canvas.picture").length === 2);
+    await page.locator("canvas.picture").first().focus();
+    await page.keyboard.press("ArrowRight");
+    await cycleIs(1);
+    expect(asked("step")).toBe(1);
+    await page.getByRole("button", { name: "In step" }).click();
+    await page.locator("canvas.picture").first().focus();
+    await page.keyboard.press("ArrowRight");
+    await cycleIs(2);
+    await askedFor("step", 3);
+    await page.getByRole("button", { name: "Close Made-up snake" }).click();
+    await page.waitForFunction(() => document.querySelectorAll("canvas.picture").length === 1);
+  });
+
+  test("what cannot be opened is told with its remedy", async () => {
+    await visit(null);
+    await page.getByRole("button", { name: /^Open a scenario/ }).click();
+    await page.getByRole("button", { name: /nowhere/ }).click();
+    await page.getByRole("alert").getByText("there is no such scenario").waitFor();
+    await page.getByRole("alert").getByText("choose another one").waitFor();
+  });
+
+  test("a session that ended says why", async () => {
+    await visit("robots");
+    server.endAll();
+    await page.getByTestId("ended").getByText("the disk is full").waitFor();
+    await page.getByTestId("ended").getByText("make room").waitFor();
+  });
+
+  test("a recording that was played is opened again too, as it was", async () => {
+    await visit(null);
+    await page.getByRole("button", { name: /^Open a scenario/ }).click();
+    await page.getByRole("button", { name: /chain\.mcap/ }).click();
+    await page.getByRole("slider", { name: "Cycle" }).fill("100");
+    await cycleIs(100);
+    await server.stop();
+    await page.getByTestId("banner").filter({ hasText: "does not answer" }).waitFor();
+    await server.start();
+    await page.getByTestId("banner").filter({ hasText: "reopened Made-up snake at cycle 100" }).waitFor();
+    await cycleIs(100);
+  });
+
+  test("a server that dies and comes back finds its sessions where they were", async () => {
+    await visit("robots");
+    await page.getByRole("slider", { name: "Cycle" }).fill("345");
+    await cycleIs(345);
+    await server.stop();
+    await page.getByTestId("banner").filter({ hasText: "does not answer" }).waitFor();
+    await server.start();
+    await page.getByTestId("banner").filter({ hasText: "reopened Made-up hall at cycle 345" }).waitFor();
+    await cycleIs(345);
+    await page.getByRole("button", { name: "One cycle on" }).click();
+    await cycleIs(346);
+  });
+});

@@ -1,0 +1,281 @@
+/** A small server that speaks the studio's protocol about made-up worlds. Tests kill it and start it again. */
+
+import { readFileSync } from "node:fs";
+import { createServer, type Server } from "node:http";
+import type { AddressInfo } from "node:net";
+import { extname, join, normalize } from "node:path";
+import { WebSocketServer, type WebSocket } from "ws";
+import type { Answer, Call, Notice, Problem, Request, Status, Subject } from "../../src/protocol";
+import { encodeFrame } from "./encode";
+import { airplanes, chain, robots, type FakeWorld } from "./scenes";
+
+export const POLICY = "default-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'";
+const TYPES: Record<string, string> = {
+  ".html": "text/html; charset=utf-8", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml",
+};
+
+const WORLDS: Record<string, () => FakeWorld> = {
+  robots: () => robots(24), crowd: () => robots(10_000), chain, airspace: airplanes,
+};
+
+const TEXT = `# A made-up scenario.
+format = 1
+world = "robots"
+name = "Made-up hall"
+seed = 1
+
+[[robots]]
+name = "couriers"
+count = 24
+size = 2
+`;
+
+function problemOf(cause: string, remedy: string, line: number | null = null, column: number | null = null): Problem {
+  return { place: "made-up.toml", line, column, cause, remedy, is_warning: false };
+}
+
+class Run {
+  credit = 0;
+  cycle = 0;
+  playing = false;
+  speed: Status["speed"] = { times: 1 };
+  seed: string;
+  leftOut = 0;
+  scansOf: { kind: string; number: number; part: number | null }[] = [];
+  text = TEXT;
+  #fraction = 0;
+  #owed = false;
+  readonly id: number;
+  readonly world: FakeWorld;
+  readonly #socket: WebSocket;
+
+  constructor(id: number, world: FakeWorld, seed: number | null, socket: WebSocket) {
+    this.id = id;
+    this.world = world;
+    this.#socket = socket;
+    this.seed = String(seed ?? 1);
+  }
+
+  status(): Status {
+    const { cyclesPlanned: planned, scene } = this.world;
+    const isOver = this.cycle >= planned;
+    return {
+      session: this.id, state: isOver ? "over" : this.playing ? "playing" : "paused", cycle: this.cycle, cycles_planned: planned,
+      time_s: this.cycle * scene.cycle_s, speed: this.speed, cycles_per_s: this.playing ? 10 : 0, seed: this.seed,
+      digest: isOver ? "a1b2c3d4e5f60718" : null, banner: null,
+    };
+  }
+
+  cast(): Notice {
+    return { notice: "cast", session: this.id, cast: 1, ...this.world.cast };
+  }
+
+  tick(seconds: number): void {
+    if (this.playing && this.cycle < this.world.cyclesPlanned) {
+      const times = this.speed === "fastest" ? 100 : this.speed.times;
+      this.#fraction += this.speed === "fastest" ? 3 : (times * seconds) / this.world.scene.cycle_s;
+      const whole = Math.floor(this.#fraction);
+      this.#fraction -= whole;
+      if (whole > 0) this.goTo(this.cycle + whole);
+    } else if (this.#owed) this.send();
+  }
+
+  goTo(cycle: number): void {
+    this.cycle = Math.min(this.world.cyclesPlanned, Math.max(0, cycle));
+    if (this.#owed) this.leftOut++;
+    this.#owed = true;
+    this.send();
+  }
+
+  send(): void {
+    if (this.credit === 0) return;
+    this.credit--;
+    this.#owed = false;
+    const { scene } = this.world;
+    const text = { scans: this.scansOf.flatMap((who) => this.world.scans(who, this.cycle)), events: [], events_left_out: 0 };
+    this.#socket.send(encodeFrame({
+      session: this.id, cast: 1, dimensions: scene.dimensions as 2 | 3, cycle: this.cycle, time_s: this.cycle * scene.cycle_s,
+      leftOut: this.leftOut, text, ...this.world.columns(this.cycle),
+    }));
+  }
+}
+
+export class FakeServer {
+  readonly calls: Call[] = [];
+  port = 0;
+  /** What the command line would have asked to open. */
+  open: Subject[] = [];
+  readonly #dist: string;
+  #http: Server | null = null;
+  #sockets: WebSocketServer | null = null;
+  #timer: ReturnType<typeof setInterval> | null = null;
+  #runs = new Map<number, Run>();
+  #next = 1;
+
+  constructor(dist: string) {
+    this.#dist = dist;
+  }
+
+  get url(): string {
+    return `http://127.0.0.1:${this.port}/`;
+  }
+
+  async start(): Promise<void> {
+    const http = createServer((request, response) => {
+      const path = normalize(new URL(request.url ?? "/", "http://x").pathname);
+      const file = path === "/" ? "/index.html" : path;
+      try {
+        const body = readFileSync(join(this.#dist, file));
+        response.writeHead(200, { "content-type": TYPES[extname(file)] ?? "application/octet-stream", "content-security-policy": POLICY });
+        response.end(body);
+      } catch {
+        response.writeHead(404).end();
+      }
+    });
+    this.#sockets = new WebSocketServer({ server: http, path: "/socket" });
+    this.#sockets.on("connection", (socket) => this.#greet(socket));
+    await new Promise<void>((ready) => http.listen(this.port, "127.0.0.1", ready));
+    this.port = (http.address() as AddressInfo).port;
+    this.#http = http;
+    this.#timer = setInterval(() => this.#tick(), 33);
+  }
+
+  /** Dies as a killed process does. */
+  async stop(): Promise<void> {
+    if (this.#timer) clearInterval(this.#timer);
+    for (const socket of this.#sockets?.clients ?? []) socket.terminate();
+    this.#runs.clear();
+    this.#next = 1;
+    const http = this.#http;
+    http?.closeAllConnections();
+    await new Promise((closed) => (http ? http.close(closed) : closed(null)));
+  }
+
+  /** Ends all sessions by themselves, and says why. */
+  endAll(): void {
+    for (const session of this.#runs.keys()) {
+      const notice: Notice = { notice: "ended", session, problem: problemOf("the disk is full", "make room and start again") };
+      for (const socket of this.#sockets?.clients ?? []) socket.send(JSON.stringify(notice));
+    }
+    this.#runs.clear();
+  }
+
+  /** Frames that the page was too slow for. */
+  leftOut(): number {
+    return Math.max(0, ...[...this.#runs.values()].map((run) => run.leftOut));
+  }
+
+  #greet(socket: WebSocket): void {
+    const say = (words: unknown): void => socket.send(JSON.stringify(words));
+    say({ notice: "hello", version: 1, program: "sidestep 0.0.0 (made up)", worlds: Object.keys(WORLDS), read_only: false, open: this.open });
+    const mine = new Set<number>();
+    socket.on("message", (data) => {
+      const { id, call } = JSON.parse(String(data)) as Request;
+      this.calls.push(call);
+      try {
+        const answer = this.#answer(call, socket, say);
+        if (answer.is === "opened") mine.add(answer.session);
+        say({ id, answer });
+        if (answer.is === "opened") say(this.#runs.get(answer.session)!.cast());
+      } catch (problem) {
+        say({ id, problem });
+      }
+    });
+    socket.on("close", () => mine.forEach((id) => this.#runs.delete(id)));
+  }
+
+  #tick(): void {
+    for (const run of this.#runs.values()) {
+      const before = JSON.stringify(run.status());
+      run.tick(0.033);
+      if (JSON.stringify(run.status()) !== before) this.#tell(run);
+    }
+  }
+
+  #tell(run: Run): void {
+    const text = JSON.stringify({ notice: "status", ...run.status() });
+    for (const socket of this.#sockets?.clients ?? []) socket.send(text);
+  }
+
+  #answer(call: Call, socket: WebSocket, say: (words: unknown) => void): Answer {
+    if (call.do === "files") return files(call.folder);
+    if (call.do === "open") {
+      const { what } = call;
+      const key = what.kind === "new" ? what.world : what.path.replace(/\.\w+$/, "");
+      const world = WORLDS[key]?.();
+      if (!world) throw { ...problemOf("there is no such scenario", "choose another one"), place: key };
+      if (what.kind === "recording") world.scene.is_recording = true;
+      if (what.kind === "recording" && call.seed !== null) throw problemOf("a recording has a seed of its own", "open its scenario");
+      const run = new Run(this.#next++, world, call.seed, socket);
+      this.#runs.set(run.id, run);
+      run.goTo(0);
+      return { is: "opened", session: run.id, scene: world.scene, status: run.status() };
+    }
+    const run = this.#runs.get(call.session);
+    if (!run) throw problemOf("no such session", "open it again");
+    const answer = act(call, run);
+    if (call.do === "close") this.#runs.delete(run.id);
+    if (answer.is === "done") say({ notice: "status", ...run.status() });
+    return answer;
+  }
+}
+
+function files(folder: string | null): Answer {
+  if (folder !== null) return { is: "files", entries: [{ path: "crowd.toml", name: "crowd.toml", kind: "scenario", about: "Ten thousand robots" }] };
+  return { is: "files", entries: [
+    { path: "more", name: "more", kind: "folder", about: "" },
+    ...["robots", "chain", "airspace"].map((name) => ({ path: `${name}.toml`, name: `${name}.toml`, kind: "scenario" as const, about: "made up" })),
+    { path: "nowhere.toml", name: "nowhere.toml", kind: "scenario", about: "cannot be opened" },
+    { path: "chain.mcap", name: "chain.mcap", kind: "recording", about: "made up" },
+    { path: "sweep", name: "sweep", kind: "sweep", about: "40 runs" },
+  ] };
+}
+
+function act(call: Exclude<Call, { do: "files" | "open" }>, run: Run): Answer {
+  switch (call.do) {
+    case "play": run.playing = true; run.speed = call.speed; return { is: "done" };
+    case "pause": run.playing = false; return { is: "done" };
+    case "step": run.playing = false; run.goTo(run.cycle + call.cycles); return { is: "done" };
+    case "seek": run.goTo(call.cycle); return { is: "done" };
+    case "look": run.scansOf = call.scans_of; run.goTo(run.cycle); return { is: "done" };
+    case "credit": run.credit += call.frames; run.tick(0); return { is: "done" };
+    case "close": return { is: "done" };
+    case "restart": return restart(run, call.seed, call.text);
+    case "inspect": return { is: "inspection", ...run.world.inspect(call.who, run.cycle) };
+    case "metrics": return metrics(run, call.from);
+    case "events": {
+      const all = run.world.events(call.from, call.until);
+      return { is: "events", entries: all.slice(0, call.most), left_out: Math.max(0, all.length - call.most), known_until: call.until };
+    }
+    case "source": return { is: "source", place: "made-up.toml", text: run.text, read_only: false };
+    case "check": return { is: "problems", problems: check(call.text) };
+  }
+}
+
+function restart(run: Run, seed: number | null, text: string | null): Answer {
+  const [problem] = check(text ?? run.text).filter((one) => !one.is_warning);
+  if (problem) throw problem;
+  run.text = text ?? run.text;
+  run.seed = String(seed ?? run.seed);
+  run.playing = false;
+  run.goTo(0);
+  return { is: "opened", session: run.id, scene: run.world.scene, status: run.status() };
+}
+
+/** Any key that is not known is a problem, as the program itself would say. */
+function check(text: string): Problem[] {
+  const known = /^(format|world|name|seed|count|size|cycles)$/;
+  return text.split("\n").flatMap((line, i) => {
+    const key = /^(\w+)\s*=/.exec(line)?.[1];
+    return key !== undefined && !known.test(key) ? [problemOf(`there is no key \`${key}\``, "did you mean `count`?", i + 1, 1)] : [];
+  });
+}
+
+function metrics(run: Run, from: number): Answer {
+  const samples = Array.from({ length: Math.floor(run.cycle / 10) + 1 }, (_, i) => 10 * i).slice(from);
+  const names = [["contacts", "contacts per cycle", ""], ["speed", "mean speed", "m/s"], ["group", "largest group", "robots"], ["messages", "messages", "kB"]];
+  return {
+    is: "metrics", names: names.map(([key, words, unit]) => ({ key: key!, words: words!, unit: unit! })), first: from, thinned: 0, cycles: samples,
+    values: names.map((_, k) => samples.map((c) => (k === 3 && c < 50 ? null : (k + 1) * (2 + Math.sin(c / (20 + 9 * k)))))),
+  };
+}

@@ -1,0 +1,49 @@
+/** All shipped kinds of scenarios through a real server: STUDIO_URL names a page that `sidestep studio scenarios` serves. */
+
+import { mkdirSync } from "node:fs";
+import type { Browser } from "playwright-core";
+import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import { drawn, launch, openPage } from "../browser";
+
+const url = process.env.STUDIO_URL ?? "";
+/** Pictures for people to look at; MANY=1 for all widths and themes. */
+const LOOKS = process.env.MANY
+  ? [[1280, false], [1280, true], [400, false], [400, true]] as const
+  : [[1280, false]] as const;
+
+const SCENARIOS = [
+  ["robots", "office.toml"], ["robots", "crossing.toml"], ["robots", "radio.toml"],
+  ["chain", "arm.toml"], ["chain", "snake3d.toml"], ["chain", "movers.toml"], ["chain", "serpentine.toml"],
+  ["airspace", "superconflict.toml"],
+] as const;
+
+describe.skipIf(url === "")("a real server", () => {
+  let browser: Browser;
+  beforeAll(async () => {
+    mkdirSync("screenshots", { recursive: true });
+    browser = await launch();
+  });
+  afterAll(async () => browser.close());
+
+  for (const [folder, name] of SCENARIOS) {
+    for (const [width, isDark] of LOOKS) {
+      test(`${folder}/${name} at ${width}${isDark ? ", dark" : ""} plays and is inspected`, async () => {
+        const { page, complaints } = await openPage(browser, url, { width, isDark });
+        await page.getByRole("button", { name: "Open…" }).click();
+        await page.getByRole("button", { name: `${folder}/` }).click();
+        await page.getByRole("button", { name }).first().click();
+        await drawn(page);
+        await page.getByRole("button", { name: "Play" }).click();
+        await page.waitForFunction(() => Number(document.querySelector("[data-testid=cycle]")?.textContent?.replace(/\D/g, "")) >= 20);
+        await page.getByRole("button", { name: "Pause" }).click();
+        await page.locator(".agents").getByRole("option").nth(2).click();
+        if (width === 400) await page.getByRole("tab", { name: "inspector" }).click();
+        await page.locator(".inspector details, .inspector .problem").first().waitFor();
+        if (width === 1280) await page.locator(".chart .value").filter({ hasText: /\d/ }).first().waitFor();
+        await page.screenshot({ path: `screenshots/real-${folder}-${name.replace(".toml", "")}-${width}${isDark ? "-dark" : ""}.png` });
+        expect(complaints).toEqual([]);
+        await page.context().close();
+      });
+    }
+  }
+});

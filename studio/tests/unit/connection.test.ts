@@ -1,0 +1,114 @@
+/** A connection that breaks is made again, later and later; calls that were open fail and say why. */
+
+import { beforeEach, expect, test } from "vitest";
+import { waitBefore_ms } from "../../src/backoff";
+import { Connection, Refused, type Socket } from "../../src/connection";
+import type { Notice } from "../../src/protocol";
+
+class FakeSocket implements Socket {
+  binaryType = "";
+  onopen: (() => void) | null = null;
+  onclose: (() => void) | null = null;
+  onmessage: ((event: { data: unknown }) => void) | null = null;
+  sent: string[] = [];
+  isClosed = false;
+  send(text: string): void {
+    this.sent.push(text);
+  }
+  close(): void {
+    this.isClosed = true;
+  }
+}
+
+let sockets: FakeSocket[];
+/** Timers that were not canceled, without those that wait for a greeting. */
+let timers: { ms: number; then: () => void }[];
+let greetings: { ms: number; then: () => void }[];
+let heard: (Notice | string)[];
+let connection: Connection;
+
+beforeEach(() => {
+  sockets = [];
+  timers = [];
+  greetings = [];
+  heard = [];
+  connection = new Connection(
+    { notice: (notice) => heard.push(notice), frame: (bytes) => heard.push(`frame ${bytes.byteLength}`), lost: (n) => heard.push(`lost ${n}`) },
+    {
+      open: () => {
+        sockets.push(new FakeSocket());
+        return sockets.at(-1)!;
+      },
+      after: (ms, then) => (ms === 6000 ? greetings : timers).push({ ms, then }),
+      cancel: () => undefined,
+    },
+  );
+  connection.connect();
+});
+
+const HELLO = JSON.stringify({ notice: "hello", version: 1, program: "x", worlds: [], read_only: false, open: [] });
+
+test("waits double from a quarter of a second up to eight seconds", () => {
+  expect([0, 1, 2, 3, 4, 5, 6, 50].map(waitBefore_ms)).toEqual([250, 500, 1000, 2000, 4000, 8000, 8000, 8000]);
+});
+
+test("each attempt waits longer, and a greeting begins anew", () => {
+  for (let i = 0; i < 3; i++) {
+    sockets.at(-1)!.onclose!();
+    timers.at(-1)!.then();
+  }
+  expect(timers.map(({ ms }) => ms)).toEqual([250, 500, 1000]);
+  expect(heard).toEqual(["lost 1", "lost 2", "lost 3"]);
+  sockets.at(-1)!.onmessage!({ data: HELLO });
+  sockets.at(-1)!.onclose!();
+  expect(timers.at(-1)!.ms).toBe(250);
+});
+
+test("a socket that stays silent is given up", () => {
+  sockets[0]!.onopen!();
+  greetings[0]!.then();
+  expect([sockets[0]!.isClosed, heard]).toEqual([true, ["lost 1"]]);
+  timers[0]!.then();
+  greetings[0]!.then();
+  expect(heard).toEqual(["lost 1"]);
+});
+
+test("replies find their calls, also out of order", async () => {
+  const socket = sockets[0]!;
+  socket.onopen!();
+  const first = connection.ask({ do: "pause", session: 1 });
+  const second = connection.ask({ do: "source", session: 1 });
+  expect(JSON.parse(socket.sent[1]!)).toEqual({ id: 2, call: { do: "source", session: 1 } });
+  socket.onmessage!({ data: JSON.stringify({ id: 2, answer: { is: "source", place: "p", text: "t", read_only: false } }) });
+  socket.onmessage!({ data: JSON.stringify({ id: 1, answer: { is: "done" } }) });
+  expect((await first).is).toBe("done");
+  expect((await second).is).toBe("source");
+});
+
+test("a refusal carries place, cause and remedy", async () => {
+  sockets[0]!.onopen!();
+  const call = connection.ask({ do: "pause", session: 9 });
+  const problem = { place: "session 9", line: null, column: null, cause: "none such", remedy: "open it", is_warning: false };
+  sockets[0]!.onmessage!({ data: JSON.stringify({ id: 1, problem }) });
+  await expect(call).rejects.toMatchObject({ problem });
+});
+
+test("calls that are open when the socket dies are refused, as are those without one", async () => {
+  sockets[0]!.onopen!();
+  const call = connection.ask({ do: "pause", session: 1 });
+  sockets[0]!.onclose!();
+  await expect(call).rejects.toBeInstanceOf(Refused);
+  await expect(connection.ask({ do: "pause", session: 1 })).rejects.toBeInstanceOf(Refused);
+});
+
+test("connecting now gives up the old socket, whose end is then nobody's loss", () => {
+  const old = sockets[0]!;
+  connection.connect();
+  expect([old.isClosed, old.onclose]).toEqual([true, null]);
+  expect(heard).toEqual([]);
+});
+
+test("bytes are frames", () => {
+  sockets[0]!.onmessage!({ data: new ArrayBuffer(8) });
+  expect(heard).toEqual(["frame 8"]);
+});

@@ -1,0 +1,36 @@
+/** All events are asked for, however many there are, and each that is missing is counted once. */
+
+import { expect, test } from "vitest";
+import type { Answer, Event } from "../../src/protocol";
+import { Events } from "../../src/state/events.svelte";
+
+function event(cycle: number, number: number): Event {
+  return { cycle, level: "info", kind: "contact", who: { kind: "robot", number, part: null }, with: null, at_m: null, value: null, words: "" } as Event;
+}
+
+function server(all: Event[], lost = 0): (from: number, until: number, most: number) => Promise<Answer> {
+  return (from, until, most) => {
+    const there = all.filter(({ cycle }) => cycle >= from && cycle < until);
+    const entries = there.slice(0, most);
+    return Promise.resolve({ is: "events", entries, left_out: there.length - entries.length + lost, known_until: until });
+  };
+}
+
+test("what does not fit into one answer is asked for again", async () => {
+  const events = new Events();
+  await events.fetch(5000, server(Array.from({ length: 5000 }, (_, i) => event(i, 1))));
+  expect([events.list.length, events.leftOut]).toEqual([5000, 0]);
+});
+
+test("a cycle of more events than an answer holds is fetched as a whole", async () => {
+  const events = new Events();
+  await events.fetch(10, server(Array.from({ length: 4500 }, (_, i) => event(3, i))));
+  expect([events.list.length, events.leftOut]).toEqual([4500, 0]);
+});
+
+test("what the server never kept is counted once", async () => {
+  const events = new Events();
+  await events.fetch(10, server([event(3, 1)], 7));
+  await events.fetch(20, server([event(9, 1), event(12, 1)]));
+  expect([events.list.length, events.leftOut]).toEqual([2, 7]);
+});

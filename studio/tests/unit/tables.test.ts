@@ -1,0 +1,24 @@
+/** Columns that are the same in every row stand above a table, so that it is narrow; nothing is lost. */
+
+import { expect, test } from "vitest";
+import { lifted } from "../../src/panels/tables";
+import type { Value } from "../../src/protocol";
+
+const text = (words: string): Value => ({ text: words });
+
+test("what is the same in all rows becomes a fact", () => {
+  const rows = [[text("sonar"), text("0°")], [text("sonar"), text("90°")]];
+  expect(lifted({ columns: ["sensor", "beam"], rows })).toEqual({
+    same: [{ label: "sensor", value: text("sonar") }],
+    columns: ["beam"],
+    rows: [[text("0°")], [text("90°")]],
+  });
+});
+
+test("a single row, no row, and rows that are all the same stay a table", () => {
+  const one = { columns: ["a"], rows: [[text("x")]] };
+  expect(lifted(one)).toEqual({ same: [], ...one });
+  expect(lifted({ columns: ["a"], rows: [] })).toEqual({ same: [], columns: ["a"], rows: [] });
+  const alike = { columns: ["a"], rows: [[text("x")], [text("x")]] };
+  expect(lifted(alike)).toEqual({ same: [], ...alike });
+});

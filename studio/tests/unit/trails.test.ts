@@ -1,0 +1,44 @@
+/** Trails hold what was seen: in order, bounded, and true after going back. */
+
+import { expect, test } from "vitest";
+import { Trails } from "../../src/scene/trails";
+
+const at = (...numbers: number[]): Float32Array => Float32Array.from(numbers);
+
+test("places follow each other, and standing still adds none", () => {
+  const trails = new Trails(2, 2);
+  trails.push(0, at(0, 0, 9, 9));
+  trails.push(1, at(1, 0, 9, 9));
+  trails.push(2, at(2, 0, 9, 9));
+  expect(trails.of(0)).toEqual([[0, 0], [1, 0], [2, 0]]);
+  expect(trails.of(1)).toEqual([[9, 9]]);
+});
+
+test("a ring forgets the oldest place", () => {
+  const trails = new Trails(1, 3);
+  for (let c = 0; c < trails.length + 5; c++) trails.push(c, at(c, 0, 0));
+  const way = trails.of(0);
+  expect(way.length).toBe(trails.length);
+  expect([way[0]![0], way.at(-1)![0]]).toEqual([5, trails.length + 4]);
+});
+
+test("going back takes away what is later, also where the ring has turned", () => {
+  const trails = new Trails(1, 2);
+  for (let c = 0; c < trails.length + 5; c++) trails.push(c, at(c, 0));
+  trails.push(7, at(7, 0));
+  expect(trails.of(0)).toEqual([[5, 0], [6, 0], [7, 0]]);
+  trails.push(8, at(8, 1));
+  expect(trails.of(0).at(-1)).toEqual([8, 1]);
+});
+
+test("a jump ahead begins anew, since nobody saw the way", () => {
+  const trails = new Trails(1, 2);
+  trails.push(0, at(0, 0));
+  trails.push(5000, at(50, 0));
+  expect(trails.of(0)).toEqual([[50, 0]]);
+});
+
+test("many bodies have short trails, so that memory is bounded", () => {
+  expect(new Trails(10_000, 2).length).toBeLessThan(30);
+  expect(new Trails(10, 2).length).toBe(600);
+});
