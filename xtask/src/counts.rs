@@ -5,7 +5,7 @@ use std::ops::AddAssign;
 use crate::measures::{circles, clones, comments, functions, long, public, size, tuples};
 use crate::members::Member;
 
-/// What was counted in one crate, or in all.
+/// Counts of one crate, or of all.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Counts {
     code: u64,
@@ -43,7 +43,7 @@ impl AddAssign<&Counts> for Counts {
     }
 }
 
-/// How a figure follows from the counts.
+/// The formula of a figure from the counts.
 enum Value {
     Whole(fn(&Counts) -> u64),
     /// One count over another; none where the other is zero.

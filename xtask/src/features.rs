@@ -1,4 +1,4 @@
-//! What is compiled for the command is compiled for the tests, too: every package has the same features in
+//! Features of packages, equal for the command and the tests: every package has the same features in
 //! both. Else `cargo run` compiles again what the tests have, and all that stands on it.
 
 use std::collections::BTreeSet;

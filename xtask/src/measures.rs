@@ -1,4 +1,4 @@
-//! What is counted, one file per measure.
+//! The measures that are counted, one file each.
 
 pub(crate) mod circles;
 pub(crate) mod clones;

@@ -73,7 +73,7 @@ impl Tree<'_> {
 /// Module in a file of its own, as its parent declares it.
 struct Declared {
     names: Vec<String>,
-    /// Where the file may be.
+    /// The possible places of the file.
     paths: Vec<PathBuf>,
     is_test: bool,
 }

@@ -190,6 +190,36 @@ fn lies_within(folder: &Path, file: &str) -> bool {
     })
 }
 
+/// Question words, with which no documentation begins: they make a clause without a head.
+const HEADLESS: [&str; 8] = ["What", "Who", "Whom", "Whose", "Where", "Which", "How", "Why"];
+
+/// Returns documentation that begins with a question word, in place of a noun phrase or a verb.
+fn headless(members: &[Member]) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for member in members {
+        for source in &member.sources {
+            let mut before = None;
+            for (number, line) in (1..).zip(&source.lines) {
+                let documented = documentation(&line.text);
+                let begins = documented.filter(|_| before.is_none());
+                before = documented;
+                let word = begins.and_then(|words| words.split_whitespace().next());
+                if word.is_some_and(|word| HEADLESS.contains(&word)) {
+                    let path = member.folder.join(&source.path);
+                    wrong.push(format!("{}:{number} begins with a question", path.display()));
+                }
+            }
+        }
+    }
+    wrong
+}
+
+/// Returns the words of a line of documentation.
+fn documentation(line: &str) -> Option<&str> {
+    let line = line.trim_start();
+    line.strip_prefix("///").or_else(|| line.strip_prefix("//!"))
+}
+
 fn std_thread() -> [String; 2] {
     ["std", "thread"].map(String::from)
 }
@@ -222,6 +252,7 @@ fn the_rules_of_the_house_hold() {
         threads(&members),
         names_worlds(&members),
         reaches_out(&members),
+        headless(&members),
         differing(&circles::listed(&members), KNOWN),
     ]
     .concat();
@@ -299,6 +330,14 @@ mod small {
             reaches_out(&[member("crates/a", "", text)]),
             ["crates/a/src/lib.rs compiles in ../../maps/a.png: not in the crate"]
         );
+    }
+
+    #[test]
+    fn documentation_begins_with_no_question_but_may_go_on_with_one() {
+        let text = "//! What it is.\n\n/// Whether it is.\n/// What it may be.\nfn f() {}\n\n    /// Who asks.\nfn g() {}";
+        let wrong = headless(&[member("crates/a", "", text)]);
+        let at = |line: usize| format!("crates/a/src/lib.rs:{line} begins with a question");
+        assert_eq!(wrong, [at(1), at(7)]);
     }
 
     #[test]

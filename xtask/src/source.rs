@@ -9,7 +9,7 @@ use syn::{Attribute, ImplItem, Item, Meta};
 
 use crate::lines::{self, Line, Range};
 
-/// What a file is for, by the folder that it lies in.
+/// The purpose of a file, by the folder that it lies in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Role {
     Code,
@@ -39,7 +39,7 @@ pub(crate) struct Source {
     pub(crate) items: Vec<Item>,
     /// Modules in files of their own that are built for tests only, as [`Source::items`] lacks them.
     pub(crate) test_modules: Vec<Item>,
-    /// Where the file is in the tree of modules; none where no module names it, or only tests do.
+    /// The file's place in the tree of modules; none where no module names it, or only tests do.
     pub(crate) module: Option<Place>,
 }
 

@@ -21,7 +21,7 @@ pub(crate) fn run(chosen: &[String]) -> ExitCode {
     if passed { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// Why tests were skipped: they say so in a file, as nobody sees what a test prints that passes.
+/// Reasons why tests were skipped: they say so in a file, as nobody sees what a test prints that passes.
 struct Skipped(PathBuf);
 
 impl Skipped {

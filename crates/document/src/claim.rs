@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// What we say of a claim.
+/// Our verdict on a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
@@ -74,7 +74,7 @@ pub fn tally(claims: &[Claim]) -> String {
     format!("Of {} claims: {}.{rest}", claims.len() - settings, judged.join(", "))
 }
 
-/// How to read a list of claims.
+/// Words on how to read a list of claims.
 pub const NOTE: &str = "Every verdict follows from the figures by the rule in its row; intervals are \
                         95 %, and fewer than 5 runs decide nothing but a counterexample. `held`: each \
                         comparison of the claim is on its side of the threshold. `refuted`: one is \

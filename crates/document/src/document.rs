@@ -223,7 +223,7 @@ impl Document {
     }
 }
 
-/// What stands above a report of little weight.
+/// The words above a report of little weight.
 const REHEARSAL: &str = "**A rehearsal: its figures have no weight.** Everything was run, with \
                              too few runs to measure anything; without `--quick` it is measured.";
 

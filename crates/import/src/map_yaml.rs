@@ -206,7 +206,7 @@ fn byte_offset(text: &str, index: usize) -> usize {
     text.char_indices().nth(index).map_or(text.len(), |(offset, _)| offset)
 }
 
-/// What a pixel's brightness stands for; see [`super::rosmap`].
+/// The meaning of a pixel's brightness; see [`super::rosmap`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Mode {
     Trinary,
@@ -214,7 +214,7 @@ pub(super) enum Mode {
     Raw,
 }
 
-/// How a brightness is read as a cell.
+/// The rule by which a brightness is read as a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Reading {
     pub(super) mode: Mode,

@@ -5,7 +5,7 @@ use sidestep_map::Cell;
 
 use super::PixelMap;
 
-/// What a beam meets first on a map.
+/// The first thing that a beam meets on a map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Sight {
     /// A wall, at a range in meters.

@@ -120,7 +120,7 @@ const BY_LINK: [&str; 4] = [
     "optimization_s_1_gbit_s",
 ];
 
-/// What a run spent on all of its optimizations.
+/// The effort of a run on all of its optimizations.
 #[derive(Debug, Clone, Copy)]
 struct Spent {
     /// Seconds of deciding, if every agent has a processor of its own: for a team the time of all
@@ -399,7 +399,7 @@ impl Report {
     }
 }
 
-/// What the marks of flights say.
+/// The words of the marks of flights.
 const WAYS: &str = "A ring is where an airplane starts, an arrowhead where it arrives.";
 
 fn flight(id: u32, track_m: &[AirPoint]) -> Series {

@@ -20,7 +20,7 @@ pub struct MethodResult {
     pub method: &'static str,
     /// Runs; run `k` of every method has the same traffic.
     pub runs: usize,
-    /// What another seed changes; where it changes nothing, there is one run.
+    /// The effect of another seed; where it changes nothing, there is one run.
     pub seeds: Seeds,
     /// Runs without any loss of separation, and the 95 % interval of their share (Wilson).
     pub loss_free: usize,

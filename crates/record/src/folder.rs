@@ -33,7 +33,7 @@ pub struct NewRun {
     pub cycles_planned: u64,
 }
 
-/// How to treat an existing run in the folder.
+/// The treatment of an existing run in the folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Existing {
     /// Leave it alone and fail.

@@ -10,7 +10,7 @@ use sidestep_draw::{DrawError, Style};
 const PX_PER_MM: f64 = 96.0 / 25.4;
 const PX_PER_PT: f64 = 96.0 / 72.0;
 
-/// How figures for print look.
+/// The look of figures for print.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Print {
     /// Width and height in mm.

@@ -1,4 +1,4 @@
-//! Where the keys of a scenario stand, for errors about keys that were read long ago.
+//! Places of the keys of a scenario in its text, for errors about keys that were read long ago.
 //!
 //! A key is named as overrides name it, `robots.1.count`: elements of arrays by their number, and
 //! a section that stands alone by 0 or without a number.

@@ -79,7 +79,7 @@ pub trait Compiled: Send + Sync {
     fn as_any(&self) -> &dyn Any;
 }
 
-/// What another seed changes in the runs of a scenario.
+/// The effect of another seed on the runs of a scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Seeds {

@@ -11,7 +11,7 @@ pub struct Meaning {
     pub words: &'static str,
     /// Its unit; empty for the one that the name ends in, if it does.
     pub unit: &'static str,
-    /// What was counted or measured, in a phrase.
+    /// The thing counted or measured, in a phrase.
     pub meaning: &'static str,
 }
 
@@ -22,7 +22,7 @@ pub struct Told {
     pub words: String,
     /// Its unit, if it has one.
     pub unit: Option<&'static str>,
-    /// What was counted or measured; empty where the world does not say.
+    /// The thing counted or measured; empty where the world does not say.
     pub meaning: &'static str,
 }
 

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// How much a remark matters.
+/// The weight of a remark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
@@ -25,7 +25,7 @@ impl Severity {
 /// A remark on a valid scenario.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Remark {
-    /// How much it matters.
+    /// Its weight.
     pub severity: Severity,
     /// The key that it is about, as overrides name it: `robots.0.effector`.
     pub key: String,

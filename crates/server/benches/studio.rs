@@ -1,4 +1,4 @@
-//! What watching costs: frames, cycles a second with a page that watches, inspection, and seeking.
+//! The costs of watching: frames, cycles a second with a page that watches, inspection, and seeking.
 //!
 //! `cargo bench -p sidestep-server [-- PART ...]` with the parts `frame`, `watched`, `inspect` and `seek`; the bars in
 //! brackets are those of the project. Ratios are taken in one run, as the machine may be noisy.

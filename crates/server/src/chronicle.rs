@@ -19,7 +19,7 @@ pub(crate) struct Chronicle {
     kept: Vec<Entry>,
     /// The cycle from which on nothing was computed yet.
     frontier: Cycle,
-    /// How many were not kept, about when.
+    /// Numbers of events that were not kept, about when.
     lost: Vec<(Cycle, u64)>,
     /// Those since the last frame that was sent.
     fresh: Vec<Entry>,

@@ -1,4 +1,4 @@
-//! What a page may read: files below the folders that were named at start, after links are resolved.
+//! Files that a page may read: those below the folders that were named at start, after links are resolved.
 
 use crate::encode::problem;
 use crate::protocol::{FileEntry, FileKind, Problem};
@@ -25,7 +25,7 @@ pub(crate) struct Files(Arc<Vec<Root>>);
 struct Root {
     /// As it was named.
     path: PathBuf,
-    /// Where it really is.
+    /// Its real place, links resolved.
     real: PathBuf,
 }
 

@@ -1,4 +1,4 @@
-//! Who may ask: the right host and origin on every request, and a token where others can reach the port.
+//! The rules of who may ask: the right host and origin on every request, and a token where others can reach the port.
 //!
 //! A page of somebody else may make a browser ask a server on this machine. So the `Host` must be one of ours (else
 //! a name that was bound anew to this machine would do), and the `Origin`, which scripts cannot change, must be the
@@ -13,7 +13,7 @@ use std::net::{IpAddr, SocketAddr};
 /// The name of the cookie, followed by the port: cookies are shared by all ports of a host.
 const COOKIE_NAME: &str = "sidestep-studio-";
 
-/// Why a request is refused.
+/// The reason why a request is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Refusal {
     /// It was sent to another name than ours.

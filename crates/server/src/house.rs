@@ -1,4 +1,4 @@
-//! What all sockets of a server share.
+//! The state that all sockets of a server share.
 
 use crate::guard::Guard;
 use crate::protocol::{Named, Notice, Problem, SessionId, VERSION};
@@ -15,11 +15,11 @@ const MOST_SOCKETS: usize = 16;
 /// The time that sessions have to end with the server.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// What all sockets share.
+/// The state that all sockets share.
 pub(crate) struct House {
-    /// What sessions need to begin.
+    /// The means that sessions need to begin.
     pub(crate) means: Means,
-    /// Who may ask.
+    /// The rules of who may ask.
     pub(crate) guard: Guard,
     program: String,
     open: Vec<Named>,

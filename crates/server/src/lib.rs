@@ -55,7 +55,7 @@ pub const KEYFRAME_BYTES: usize = 256 << 20;
 /// Speeds at which a run can be played, in simulated seconds per second.
 pub const SPEEDS: RangeInclusive<f64> = 0.1..=100.0;
 
-/// How a server is started.
+/// Options for the start of a server.
 #[derive(Clone)]
 pub struct Options {
     /// The worlds.

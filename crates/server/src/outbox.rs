@@ -1,4 +1,4 @@
-//! What waits to be sent to one socket: of texts all, of frames and states the newest only.
+//! Messages that wait to be sent to one socket: of texts all, of frames and states the newest only.
 //!
 //! Sessions put things here from their threads and never wait; the socket takes them when it can.
 

@@ -18,7 +18,7 @@ pub(crate) const HEADER: &str = "\
 
 ";
 
-/// How many imports are followed to where an item is declared; a circle of them has no end.
+/// The number of imports that are followed to where an item is declared; a circle of them has no end.
 const DETOURS: usize = 16;
 
 /// Returns the circles of a crate: the strongly connected components of more than one file.

@@ -21,7 +21,7 @@ pub(crate) struct ArmPicture<'a> {
     pub(crate) connectors: &'a [Vector],
     /// Position that the tip shall have, in m.
     pub(crate) target: Option<Vector>,
-    /// What is in the way.
+    /// The obstacles in the way.
     pub(crate) obstacles: &'a [Sphere],
 }
 

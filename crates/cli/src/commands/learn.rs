@@ -219,7 +219,7 @@ impl TopicArgs {
     }
 }
 
-/// How counts become probabilities.
+/// The rule by which counts become probabilities.
 #[derive(Debug, Args)]
 struct EstimateArgs {
     /// Smoothing: added to every count before rows are normalized

@@ -41,7 +41,7 @@ pub(crate) struct MapArgs {
     #[arg(long = "resolution", value_name = "R")]
     resolution_m: Option<f64>,
 
-    /// How to treat unmapped (unknown) boxes; in scenarios the default is wall
+    /// Treatment of unmapped (unknown) boxes; in scenarios the default is wall
     #[arg(long, value_enum, default_value_t = Unknown::Keep)]
     unknown: Unknown,
 

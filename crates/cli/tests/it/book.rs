@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_sidestep");
-/// What commands of the pages read.
+/// Files that commands of the pages read.
 const INPUTS: [&str; 2] = ["examples", "scenarios"];
 
 fn root() -> PathBuf {

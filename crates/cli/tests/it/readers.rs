@@ -61,7 +61,7 @@ pub(crate) fn has(modules: &str) -> bool {
     false
 }
 
-/// What a script says.
+/// The output of a script.
 pub(crate) fn script(name: &str, args: &[&Path]) -> Value {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python").join(name);
     let output = Command::new(python()).arg(path).args(args).output().expect("python starts");
@@ -80,7 +80,7 @@ fn recorded(place: &Place, scenario: &str, more: &[&str]) -> (Value, Value) {
     (run, script("read_mcap.py", &args))
 }
 
-/// What holds of the recording of any world.
+/// Properties of the recording of any world.
 fn check(run: &Value, read: &Value, cycles: u64) {
     let metadata = &read["metadata"];
     assert_eq!(metadata["digest"], run["digest"]);

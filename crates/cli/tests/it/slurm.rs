@@ -37,7 +37,7 @@ impl Slurm {
         self.daemons.push(command.spawn().expect("the daemon starts"));
     }
 
-    /// What a client command prints.
+    /// The output of a client command.
     fn run(&self, program: &str, args: &[&str]) -> String {
         let output = Command::new(program).args(args).env("SLURM_CONF", &self.conf).output();
         let output = output.expect("the client starts");

@@ -67,15 +67,15 @@ impl Source {
 /// The topics of a bag to read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Wanted {
-    /// Where the robot believes to be.
+    /// The robot's belief of its place.
     pub odometry: Option<Source>,
-    /// Where it is.
+    /// Its true place.
     pub truth: Source,
-    /// What its scanner measures.
+    /// The measurements of its scanner.
     pub scans: Option<String>,
 }
 
-/// What was read.
+/// The content that was read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BagLog {
     /// The poses that the robot believes, by time; empty where none are wanted.

@@ -28,7 +28,7 @@ pub(super) struct RawMessage<'a> {
     pub(super) bytes: &'a [u8],
 }
 
-/// What is recorded under a topic.
+/// Messages recorded under a topic.
 #[derive(Debug, Default)]
 pub(super) struct Topic {
     /// The name of the type of its messages.

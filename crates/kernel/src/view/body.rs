@@ -4,7 +4,7 @@ use super::pose::{Place, Pose};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Which body: its kind, its number, and its part of things that have parts.
+/// The name of a body: its kind, its number, and its part of things that have parts.
 pub type Who = (Kind, u32, Option<u32>);
 
 /// Returns the name of a body, which it keeps during the run, such as `robot/3` or `connector/0/7`.

@@ -1,22 +1,22 @@
-//! What a body perceives and decides, and what comes of it: facts for a panel, and marks for the scene.
+//! Percepts and decisions of a body, and their outcome: facts for a panel, and marks for the scene.
 
 use super::body::Who;
 use super::pose::Place;
 use crate::units::Cycle;
 use serde::Serialize;
 
-/// What a body perceives and decides in a cycle, and what will come of it. It names no world.
+/// Percepts and decisions of a body in a cycle, and their outcome. It names no world.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Inspection {
     /// The body.
     pub who: Who,
     /// The cycle that is about to run.
     pub cycle: Cycle,
-    /// What people call the body.
+    /// The body's name among people.
     pub title: String,
-    /// What is known of it, by topic.
+    /// Facts about it, by topic.
     pub sections: Vec<Section>,
-    /// What to draw over the scene.
+    /// Marks to draw over the scene.
     pub marks: Vec<Mark>,
 }
 
@@ -83,7 +83,7 @@ pub struct Mark {
     pub label: String,
     /// From 0 to 1: how likely, how strong; 1 where that means nothing.
     pub weight: f64,
-    /// What is drawn.
+    /// Its shape.
     pub shape: MarkShape,
 }
 
@@ -91,29 +91,29 @@ pub struct Mark {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
-    /// What is there to be perceived.
+    /// The truth that is there to be perceived.
     True,
-    /// What is perceived.
+    /// The percept.
     Reported,
-    /// What the body wants.
+    /// The body's wish.
     Wish,
-    /// What it will have done.
+    /// The deed that comes of it.
     Done,
-    /// What stands against it, or is not done.
+    /// An obstacle to it, or a deed that is not done.
     Refused,
-    /// What it claims for its action.
+    /// Room that it claims for its action.
     Claim,
     /// The others with which it is in conflict.
     Group,
-    /// What may come.
+    /// A future that may come.
     Predicted,
-    /// What was chosen of that.
+    /// The future that was chosen.
     Chosen,
-    /// What it knows of others.
+    /// Its knowledge of others.
     Known,
-    /// What it can always fall back to.
+    /// The orbit that it can always fall back to.
     Orbit,
-    /// Where it wants to get.
+    /// Its destination.
     Target,
 }
 

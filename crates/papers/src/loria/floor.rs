@@ -13,7 +13,7 @@ const LARGE: &str = include_str!("../../scenarios/loria/large.toml");
 /// Boxes at each end of a corridor that count as its end.
 const END_BOXES: u32 = 4;
 
-/// How a robot that goes to and fro gets past what is in its way, by the names of a scenario.
+/// The way of a robot that goes to and fro past obstacles, by the names of a scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Mind {

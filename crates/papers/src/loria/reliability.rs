@@ -371,7 +371,7 @@ impl SweepCase {
     }
 }
 
-/// Who causes more contacts.
+/// The errors that cause more contacts, where they are those of sensors.
 pub(super) const SENSORS: &str = "sensors";
 /// See [`SENSORS`].
 pub(super) const EFFECTORS: &str = "effectors";
@@ -385,7 +385,7 @@ pub(super) struct Larger {
     pub(super) level: f64,
     /// Contacts by sensor errors alone minus those by effector errors alone.
     pub(super) sensors_less_effectors: Estimate,
-    /// Who causes more, if that is conclusive by Holm's correction over all points.
+    /// The errors that cause more, if that is conclusive by Holm's correction over all points.
     pub(super) by: &'static str,
 }
 

@@ -10,7 +10,7 @@
 //! | `/scan/BODY/SENSOR` | `foxglove.LaserScan` | each frame: ranges in the frame `world` |
 //! | `/log` | `foxglove.Log` | each event, at its own time |
 //!
-//! What never moves has a topic of its own, because a viewer that jumps to a moment shows the last
+//! Things that never move have a topic of their own, because a viewer that jumps to a moment shows the last
 //! message of each topic before it.
 //!
 //! `log_time` is simulated time in nanoseconds. The scenario and its files are attachments; the

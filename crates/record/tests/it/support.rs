@@ -11,7 +11,7 @@ pub(crate) fn column(name: &str, ty: ColumnType, labels: &[&str]) -> ColumnSpec 
     ColumnSpec { labels, ..ColumnSpec::new(name, ty, &format!("the {name}")) }
 }
 
-/// Where two robots are in every cycle.
+/// The places of two robots in every cycle.
 pub(crate) fn trajectories() -> TableSchema {
     TableSchema::new(
         "trajectories",

@@ -5,7 +5,7 @@ use crate::protocol::{Cast, Look, SessionId};
 use sidestep::kernel::view::{Body, COLORS, Kind, Shape};
 use std::collections::BTreeMap;
 
-/// What of a body stays the same as long as the cast does.
+/// The part of a body that stays the same as long as the cast does.
 #[derive(PartialEq)]
 struct Member {
     kind: Kind,

@@ -1,4 +1,4 @@
-//! What the kernel shows, in the words of the protocol.
+//! Views of the kernel in the words of the protocol.
 
 use crate::protocol::{Event, Floor, Look, Problem, Scan, Scene, Shape, StillBody, Who};
 use sidestep::kernel::view::{self, Body, Entry, Level, Occupancy, Scenery};

@@ -1,13 +1,13 @@
-//! What a body perceives, decides and does, for a panel and for marks on the canvas. Names no world.
+//! Percepts, decisions and deeds of a body, for a panel and for marks on the canvas. Names no world.
 
 use super::Who;
 use serde::Serialize;
 
-/// What a body perceives, decides and does.
+/// Facts and marks of a body: its percepts, decisions and deeds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Inspection {
-    /// Which body.
+    /// The body.
     pub who: Who,
     /// Cycles done.
     pub cycle: f64,
@@ -15,7 +15,7 @@ pub struct Inspection {
     pub title: String,
     /// Facts, by subject.
     pub sections: Vec<Section>,
-    /// What can be drawn of it.
+    /// Marks to draw of it.
     pub marks: Vec<Mark>,
 }
 
@@ -37,7 +37,7 @@ pub struct Section {
 pub struct Fact {
     /// Its name, in words.
     pub label: String,
-    /// What it is.
+    /// Its value.
     pub value: Value,
 }
 
@@ -81,7 +81,7 @@ pub struct Table {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Mark {
-    /// What it stands for.
+    /// Its meaning.
     pub role: Role,
     /// The same in words.
     pub label: String,
@@ -91,7 +91,7 @@ pub struct Mark {
     pub shape: MarkShape,
 }
 
-/// What a mark stands for.
+/// The meaning of a mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]
@@ -104,19 +104,19 @@ pub enum Role {
     Wish,
     /// As it was done.
     Done,
-    /// What was refused.
+    /// A thing that was refused.
     Refused,
-    /// What is claimed.
+    /// Room that is claimed.
     Claim,
     /// Those in conflict.
     Group,
     /// As it was foreseen.
     Predicted,
-    /// What was chosen.
+    /// The choice.
     Chosen,
-    /// What is known of others.
+    /// Knowledge of others.
     Known,
-    /// A way around.
+    /// The orbit that it can always fall back to.
     Orbit,
     /// A destination.
     Target,

@@ -1,4 +1,4 @@
-//! What a page asks.
+//! The requests of a page.
 
 use super::SessionId;
 use serde::{Deserialize, Serialize};
@@ -10,11 +10,11 @@ use serde::{Deserialize, Serialize};
 pub struct Request {
     /// Chosen by the page, from 1 on: a request that cannot be read is answered with number 0.
     pub id: u32,
-    /// What is asked.
+    /// The question.
     pub call: Call,
 }
 
-/// What a page can ask.
+/// A question or an order of a page.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
@@ -26,31 +26,31 @@ pub enum Call {
     },
     /// Opens a scenario or a recording: a new session, which is paused at its start and belongs to the socket.
     Open {
-        /// What is opened.
+        /// The thing to open.
         what: Subject,
         /// Another seed than the scenario's.
         seed: Option<u64>,
     },
     /// Ends a session.
     Close {
-        /// Which one.
+        /// The session.
         session: SessionId,
     },
     /// Lets a session go on.
     Play {
-        /// Which one.
+        /// The session.
         session: SessionId,
-        /// How fast.
+        /// The speed.
         speed: Speed,
     },
     /// Lets a session stand still.
     Pause {
-        /// Which one.
+        /// The session.
         session: SessionId,
     },
     /// Goes some cycles on and stays paused; answered there.
     Step {
-        /// Which session.
+        /// The session.
         session: SessionId,
         /// Number of cycles.
         cycles: u32,
@@ -58,7 +58,7 @@ pub enum Call {
     /// Goes to a cycle, earlier or later, and stays paused; answered there. A problem tells that another request
     /// has changed the way meanwhile.
     Seek {
-        /// Which session.
+        /// The session.
         session: SessionId,
         /// The cycle; a run that is over before it stays at its end.
         cycle: u64,
@@ -66,7 +66,7 @@ pub enum Call {
     /// Starts anew, with another seed and with another text where they are given. Answered by
     /// [`Opened`](super::Answer::Opened), with the session's own number; the run before stays if the text is wrong.
     Restart {
-        /// Which session.
+        /// The session.
         session: SessionId,
         /// Another seed.
         seed: Option<u64>,
@@ -75,35 +75,35 @@ pub enum Call {
     },
     /// Names the bodies whose scans frames shall hold.
     Look {
-        /// Which session.
+        /// The session.
         session: SessionId,
         /// The bodies.
         scans_of: Vec<Who>,
     },
     /// Grants the server further frames; it sends none without.
     Credit {
-        /// Which session.
+        /// The session.
         session: SessionId,
         /// Number of frames.
         frames: u32,
     },
     /// Asks what a body perceives, decides and does.
     Inspect {
-        /// Which session.
+        /// The session.
         session: SessionId,
-        /// Which body.
+        /// The body.
         who: Who,
     },
     /// Asks for samples of all metrics from the sample of this number on.
     Metrics {
-        /// Which session.
+        /// The session.
         session: SessionId,
         /// The number of the first sample wanted.
         from: u32,
     },
     /// Asks for the events so far between two cycles (`from` is inside, `until` is not), at most `most`.
     Events {
-        /// Which session.
+        /// The session.
         session: SessionId,
         /// The first cycle.
         from: u64,
@@ -114,19 +114,19 @@ pub enum Call {
     },
     /// Asks for the scenario's text.
     Source {
-        /// Which session.
+        /// The session.
         session: SessionId,
     },
     /// Asks for the problems of a text that stands for the session's scenario.
     Check {
-        /// Which session.
+        /// The session.
         session: SessionId,
         /// The text.
         text: String,
     },
 }
 
-/// What can be opened.
+/// A thing that can be opened.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
@@ -148,7 +148,7 @@ pub enum Subject {
     },
 }
 
-/// How fast a run is played.
+/// The speed at which a run is played.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]
@@ -159,7 +159,7 @@ pub enum Speed {
     Fastest,
 }
 
-/// Which body: kind, number, and part of things that have parts.
+/// The name of a body: kind, number, and part of things that have parts.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]

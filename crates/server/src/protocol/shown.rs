@@ -1,9 +1,9 @@
-//! What is to be seen: the scene that stays, the cast of bodies that move, and the text of frames.
+//! All that is to be seen: the scene that stays, the cast of bodies that move, and the text of frames.
 
 use super::{SessionId, Who};
 use serde::Serialize;
 
-/// What stays as it is.
+/// The scene, which stays as it is.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Scene {
@@ -47,7 +47,7 @@ pub struct Floor {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct StillBody {
-    /// Which body.
+    /// The body.
     pub who: Who,
     /// Its own name, if it has one.
     pub name: Option<String>,
@@ -116,7 +116,7 @@ pub struct Look {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Cast {
-    /// Which session.
+    /// The session.
     pub session: SessionId,
     /// Its number, which frames name.
     pub cast: u32,
@@ -138,7 +138,7 @@ pub struct Cast {
     pub look: Vec<u16>,
     /// Names of those that have their own: index of body, name.
     pub names: Vec<(u32, String)>,
-    /// Which bodies are agents: what can be inspected.
+    /// The bodies that are agents, which can be inspected.
     pub is_agent: Vec<bool>,
 }
 
@@ -186,7 +186,7 @@ pub struct Event {
     pub level: String,
     /// From the fixed vocabulary of events, e.g. `contact`, `veto`, `trip`; empty where the world does not tell it.
     pub kind: String,
-    /// Whom it is about.
+    /// The body that it is about.
     pub who: Option<Who>,
     /// With whom, or with what.
     pub with: Option<Who>,

@@ -1,4 +1,4 @@
-//! What the server says: replies, and notices without a request.
+//! The server's messages: replies, and notices without a request.
 
 use super::{Cast, Event, Inspection, Scene, SessionId, Speed};
 use serde::Serialize;
@@ -14,15 +14,15 @@ pub struct Reply {
     pub result: Outcome,
 }
 
-/// What came of a request.
+/// The outcome of a request.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]
 #[expect(clippy::large_enum_variant, reason = "there is one at a time, for an instant")]
 pub enum Outcome {
-    /// What was asked for.
+    /// The answer.
     Answer(Answer),
-    /// Why it cannot be had.
+    /// The reason why there is no answer.
     Problem(Problem),
 }
 
@@ -35,19 +35,19 @@ pub enum Answer {
     Done,
     /// The content of a folder.
     Files {
-        /// What can be opened in it, by name.
+        /// Its entries that can be opened, by name.
         entries: Vec<FileEntry>,
     },
     /// A session at its start.
     Opened {
         /// Its number.
         session: SessionId,
-        /// What stays as it is.
+        /// The scene, which stays as it is.
         scene: Scene,
         /// Its state.
         status: Status,
     },
-    /// What a body perceives, decides and does.
+    /// Facts and marks of a body: its percepts, decisions and deeds.
     Inspection(Inspection),
     /// Samples of all metrics.
     Metrics {
@@ -55,8 +55,8 @@ pub enum Answer {
         names: Vec<MetricName>,
         /// Number of the first sample here: the one that was asked for, or the number of all samples.
         first: u32,
-        /// How often the samples were thinned by half, and numbered anew, since the session began: ask from 0
-        /// whenever it has changed.
+        /// The number of times that the samples were thinned by half, and numbered anew, since the session began:
+        /// ask from 0 whenever it has changed.
         thinned: u32,
         /// The cycle of each sample.
         cycles: Vec<f64>,
@@ -81,7 +81,7 @@ pub enum Answer {
         /// Whether it cannot be replaced by another text.
         read_only: bool,
     },
-    /// What is wrong with a text, and what will surprise.
+    /// The errors of a text, and its surprises.
     Problems {
         /// Nothing for a valid text without surprises.
         problems: Vec<Problem>,
@@ -98,9 +98,9 @@ pub struct Problem {
     pub line: Option<u32>,
     /// Its column, from 1.
     pub column: Option<u32>,
-    /// What is wrong.
+    /// The cause.
     pub cause: String,
-    /// What would be right.
+    /// The remedy: the right way to write or to do it.
     pub remedy: String,
     /// Whether the text is valid all the same.
     pub is_warning: bool,
@@ -127,13 +127,13 @@ pub struct FileEntry {
     pub path: String,
     /// Its name in its folder.
     pub name: String,
-    /// What it is.
+    /// Its kind.
     pub kind: FileKind,
     /// A few words on its content; may be empty.
     pub about: String,
 }
 
-/// What a file or a folder is.
+/// The kind of a file or a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]
@@ -152,7 +152,7 @@ pub enum FileKind {
     Foreign,
 }
 
-/// What the server says unasked.
+/// A message of the server that nobody asked for.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(tag = "notice", rename_all = "kebab-case")]
@@ -167,7 +167,7 @@ pub enum Notice {
         worlds: Vec<String>,
         /// Whether texts of the page are refused.
         read_only: bool,
-        /// What the command line asked to open.
+        /// The things that the command line asked to open.
         open: Vec<Named>,
     },
     /// The bodies that the columns of frames with this number stand for; before the first such frame.
@@ -176,14 +176,14 @@ pub enum Notice {
     Status(Status),
     /// A session ended by itself, and why.
     Ended {
-        /// Which one.
+        /// The session.
         session: SessionId,
-        /// Why.
+        /// The reason.
         problem: Problem,
     },
 }
 
-/// What the command line named: a kind as in [`Subject`](super::Subject), with its path.
+/// A thing that the command line named: a kind as in [`Subject`](super::Subject), with its path.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Named {
@@ -197,9 +197,9 @@ pub struct Named {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Status {
-    /// Which session.
+    /// The session.
     pub session: SessionId,
-    /// What it does.
+    /// Its activity.
     pub state: State,
     /// Cycles done.
     pub cycle: f64,
@@ -207,7 +207,7 @@ pub struct Status {
     pub cycles_planned: f64,
     /// Simulated seconds since the start.
     pub time_s: f64,
-    /// How fast it plays, or played last.
+    /// Its speed now, or when it played last.
     pub speed: Speed,
     /// Cycles per second over the last second.
     pub cycles_per_s: f64,
@@ -219,7 +219,7 @@ pub struct Status {
     pub banner: Option<String>,
 }
 
-/// What a session does.
+/// The activity of a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]

@@ -1,4 +1,4 @@
-//! What a body perceives, decides and does, in the words of the protocol.
+//! Percepts, decisions and deeds of a body, in the words of the protocol.
 
 use crate::encode::{body, who};
 use crate::protocol::{

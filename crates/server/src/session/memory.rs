@@ -1,4 +1,4 @@
-//! What a session keeps of a run as it goes on: places to go back to, samples of metrics, and events.
+//! The memory of a session of a run as it goes on: places to go back to, samples of metrics, and events.
 
 use crate::KEYFRAME_BYTES;
 use crate::chronicle::Chronicle;
@@ -8,7 +8,7 @@ use sidestep::kernel::Simulation;
 use sidestep::scenario::Meaning;
 use std::time::{Duration, Instant};
 
-/// What is kept of one run, by whichever of its computations comes to a cycle first.
+/// The memory of one run, filled by whichever of its computations comes to a cycle first.
 pub(super) struct Memory {
     pub(super) keyframes: Keyframes,
     pub(super) samples: Samples,

@@ -31,13 +31,13 @@ const MOST_WAITING: usize = 256;
 /// The longest wait for a request, after which the thread looks around again.
 const LONGEST_WAIT: Duration = Duration::from_secs(3600);
 
-/// What is asked first of a session.
+/// The first request of a session.
 pub(crate) struct Opening {
     /// The session's number.
     pub(crate) session: SessionId,
     /// The request.
     pub(crate) id: u32,
-    /// What is opened.
+    /// The thing to open.
     pub(crate) what: Subject,
     /// Another seed than the scenario's.
     pub(crate) seed: Option<u64>,
@@ -118,7 +118,7 @@ struct Desk {
     orders: Receiver<(u32, Call)>,
 }
 
-/// Why work was not done to its end.
+/// The reason why work was not done to its end.
 enum Broken {
     /// It was interrupted, as nobody wants it any more.
     Unwanted,

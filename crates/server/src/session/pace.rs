@@ -1,4 +1,4 @@
-//! How far a run goes at a time, and when the next cycle is due.
+//! The number of cycles that a run goes at a time, and when the next cycle is due.
 
 use crate::protocol::Speed;
 use sidestep::kernel::Cycle;

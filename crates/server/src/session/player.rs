@@ -48,7 +48,7 @@ pub(super) struct Player {
     rate: Rate,
     /// Digest of the state, and its cycle.
     digest: Option<(Cycle, String)>,
-    /// What came of comparing a recording with its digest.
+    /// The result of comparing a recording with its digest.
     verdict: Option<String>,
 }
 

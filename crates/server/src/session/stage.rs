@@ -1,4 +1,4 @@
-//! What a session runs, and where it comes from.
+//! The run of a session, and its origin.
 
 use crate::encode::problem;
 use crate::files::Files;
@@ -7,12 +7,12 @@ use sidestep::kernel::{Cycle, Simulation};
 use sidestep::scenario::{Meaning, Source, Worlds};
 use sidestep_session::{Error, Recorded, read};
 
-/// What sessions need to begin.
+/// The means that sessions need to begin.
 #[derive(Clone)]
 pub(crate) struct Means {
     /// The worlds.
     pub(crate) worlds: Worlds,
-    /// What may be read.
+    /// The files that may be read.
     pub(crate) files: Files,
     /// The number of worker threads of each session.
     pub(crate) workers: usize,

@@ -1,4 +1,4 @@
-//! What a session shows: frames for which there is credit, and its state when it changes.
+//! The output of a session: frames for which there is credit, and its state when it changes.
 
 use crate::FRAMES_PER_S;
 use crate::chronicle::Chronicle;

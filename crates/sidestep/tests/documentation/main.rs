@@ -1,4 +1,4 @@
-//! What the pages for people say is there: paths, links, pictures, scenarios, code, columns.
+//! Things that the pages for people say are there: paths, links, pictures, scenarios, code, columns.
 
 mod columns;
 

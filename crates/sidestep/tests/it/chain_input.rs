@@ -54,7 +54,7 @@ fn try_out(mut run: Box<dyn Simulation>) {
     run.digest();
 }
 
-/// How many were refused, and how many ran.
+/// The numbers of those that were refused, and of those that ran.
 fn try_all(text: &str) -> [usize; 2] {
     let table: toml::Table = text.parse().expect("a right scenario");
     let mut told = [0; 2];

@@ -71,7 +71,7 @@ beyond = [0.20, 0.30, 0.50]
 const NAMES: [&str; 4] = ["nothing", "wall", "door", "person"];
 const CLASSES: [&str; 3] = ["near", "medium", "far"];
 
-/// What the four beams truly meet, the row that its report is drawn from, and the row of its
+/// The things that the four beams truly meet, the row that its report is drawn from, and the row of its
 /// class: those of [`watchers`], copied by hand.
 const TRUTHS: [(&str, &str, [f64; 4], [f64; 3]); 4] = [
     ("wall", "near", [0.10, 0.70, 0.15, 0.05], [0.80, 0.15, 0.05]),
@@ -188,7 +188,7 @@ fn one_action(art: &str, regime: &str, action: &str) -> BTreeMap<Outcome, u64> {
     tiles.outcomes(&simulation)
 }
 
-/// Where the nomad's actions end in a free place, for a body at `[3, 3]`: written for each
+/// The ends of the nomad's actions in a free place, for a body at `[3, 3]`: written for each
 /// heading by hand.
 fn in_the_open(heading: u8, action: &str) -> BTreeMap<Outcome, f64> {
     let ahead = [(1, 0), (0, 1), (-1, 0), (0, -1)][usize::from(heading)];
@@ -261,7 +261,7 @@ fn pairs(robots: [[i32; 3]; 2], effector: &str, seed: u64) -> Source {
     Source::new("pairs.toml", text, "")
 }
 
-/// Where both robots of each tile stand after one cycle.
+/// The places of both robots of each tile after one cycle.
 fn meet(robots: [[i32; 3]; 2], effector: &str, seed: u64) -> Vec<[(i32, i32); 2]> {
     let source = pairs(robots, effector, seed);
     let mut simulation = robots_run(&source, 2).unwrap_or_else(|e| panic!("{e}"));

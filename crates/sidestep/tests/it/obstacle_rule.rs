@@ -80,7 +80,7 @@ fn check_exact(tiles: &Tiles, by_hand: &BTreeMap<Outcome, f64>) {
     assert!(largest < 1e-12, "{tiles:?}: off by {largest}: {exact:?}");
 }
 
-/// What the scenario's robots try, as data.
+/// The actions that the scenario's robots try, as data.
 fn action_of(tiles: &Tiles) -> (Vec<Transition>, u32, ObstacleRule) {
     use sidestep::worlds::robots::world::Role;
     let compiled = compile(&tiles.single());

@@ -30,7 +30,7 @@ pub(crate) struct Tiles {
     keys: String,
     /// Sections beside map, robots and people.
     sections: String,
-    /// What it says of the robots.
+    /// Its lines on the robots.
     robots: String,
 }
 
@@ -79,7 +79,7 @@ impl Tiles {
         })
     }
 
-    /// Where the robot of a tile begins.
+    /// The start of the robot of a tile.
     pub(crate) fn start(&self) -> Pose {
         let robot = |(col, row, character): (u32, u32, char)| {
             let heading = ['>', '^', '<', 'v'].iter().position(|&h| h == character)? as u8;
@@ -154,7 +154,7 @@ impl Tiles {
         robots_run(&self.source(), 2).unwrap_or_else(|e| panic!("{e}"))
     }
 
-    /// How often the robots are where, seen from their tile, and what they touched.
+    /// Counts of the robots' places, seen from their tile, and what they touched.
     pub(crate) fn outcomes(&self, simulation: &RobotsRun) -> BTreeMap<Outcome, u64> {
         let (width, height) = self.pitch();
         let robots = simulation.agents();

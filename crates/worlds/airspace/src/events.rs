@@ -35,7 +35,7 @@ pub enum EventKind {
     Intruder,
 }
 
-/// What the value of an event measures.
+/// The quantity that the value of an event measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Measure {
     /// Meters.
@@ -128,7 +128,7 @@ pub struct Event {
     pub other: EntityId,
     /// See [`EventKind`]; 0 where a kind has none.
     pub value: f64,
-    /// Where the airplane is at the end of the cycle.
+    /// The airplane's place at the end of the cycle.
     pub at_m: Option<Place>,
 }
 

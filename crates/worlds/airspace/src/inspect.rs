@@ -1,4 +1,4 @@
-//! What an airplane knows, what each of its actions would bring, what it chooses, what the shield makes
+//! Knowledge of an airplane, the worth of each of its actions, its choice, what the shield makes
 //! of that, and what comes of it: the cycle is tried on a copy of the state, for its group alone.
 
 #[cfg(test)]

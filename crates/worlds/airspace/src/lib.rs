@@ -79,7 +79,7 @@ pub struct Scratch {
     /// them.
     decide_ns: u64,
     flying: Vec<Slot>,
-    /// What is noted for somebody who asks about an airplane; nothing in a run.
+    /// Notes for somebody who asks about an airplane; none in a run.
     notes: Option<Box<notes::Notes>>,
 }
 

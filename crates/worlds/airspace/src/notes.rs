@@ -1,4 +1,4 @@
-//! What is noted of one airplane while its group decides and flies.
+//! Notes on one airplane while its group decides and flies.
 
 use crate::agents::Decided;
 use crate::agents::contact::Contacts;
@@ -18,9 +18,9 @@ pub(crate) struct Notes {
     pub(crate) group: Vec<Known>,
     /// Those of the group that mind nobody.
     pub(crate) intruders: Vec<Intruder>,
-    /// What it knew of others before.
+    /// Its knowledge of others before.
     pub(crate) contacts: Contacts,
-    /// What the optimizer decided for it.
+    /// The optimizer's decision for it.
     pub(crate) decided: Option<Decided>,
     /// Messages of the group's optimization.
     pub(crate) talk: Traffic,
@@ -28,7 +28,7 @@ pub(crate) struct Notes {
     pub(crate) wishes: Vec<Action>,
     /// The different ways of those for one `dt`.
     pub(crate) ways: Vec<Way>,
-    /// What the shield made of that.
+    /// The shield's decision on that.
     pub(crate) decision: Option<Decision>,
     /// Its stored orbit before.
     pub(crate) flyer: Option<Flyer>,
@@ -38,7 +38,7 @@ pub(crate) struct Notes {
     pub(crate) exchanged: Traffic,
     /// The way that it flies.
     pub(crate) flown: Option<Way>,
-    /// What happened to it.
+    /// Its events.
     pub(crate) events: Vec<Event>,
 }
 

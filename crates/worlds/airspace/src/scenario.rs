@@ -140,7 +140,7 @@ pub struct Compiled {
     pub seed: u64,
     /// Largest number of cycles; a run ends when all have arrived.
     pub cycles: u64,
-    /// What another seed changes.
+    /// The effect of another seed.
     pub seeds: Seeds,
     /// The tables to keep.
     pub record: RecordSection,

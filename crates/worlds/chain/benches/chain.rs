@@ -273,7 +273,7 @@ struct Pulled {
     clearance_m: f64,
 }
 
-/// Where the leader starts: in the first, straight part. The tail may still be outside.
+/// The leader's start: in the first, straight part. The tail may still be outside.
 const LEAD_M: f64 = 13.0;
 
 fn pull(width_m: f64, followers: usize, rod: Rod, look_at_every_step: bool) -> Pulled {

@@ -28,9 +28,9 @@ pub(crate) struct Task<const D: usize> {
     pub(crate) driver: Driver<D>,
     /// Longest duration of the task, s; infinite if it may take as long as it needs.
     pub(crate) lasts_s: f64,
-    /// How long a vetoed motion is retried before the task is given up, s.
+    /// The time for which a vetoed motion is retried before the task is given up, s.
     pub(crate) patience_s: f64,
-    /// How long its local rules may come no nearer to a target before a way is planned, s; none if
+    /// The time for which its local rules may come no nearer to a target before a way is planned, s; none if
     /// nothing is ever planned.
     pub(crate) plans_after_s: Option<f64>,
 }
@@ -133,7 +133,7 @@ pub struct Objection {
     pub reason: Reason,
 }
 
-/// How far an initiator got, compared with how far it wanted to go.
+/// The distance that an initiator got, as a share of its wish.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Way {
     /// Length of the way that it wanted to go, meters.
@@ -245,7 +245,7 @@ impl<const D: usize> Wander<D> {
     }
 }
 
-/// How strongly a wandering initiator that is outside turns back, per step.
+/// The turn back of a wandering initiator that is outside, per step.
 const HOMESICK: f64 = 0.1;
 
 #[cfg(test)]

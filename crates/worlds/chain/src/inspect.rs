@@ -1,4 +1,4 @@
-//! What a chain's initiator wants, who objects and why, what the ladder makes of that, and what comes of
+//! The wish of a chain's initiator, who objects and why, what the ladder makes of that, and what comes of
 //! it for one connector: the cycle is tried on a copy of the state, for its group alone.
 
 mod motion;

@@ -356,7 +356,7 @@ pub struct ChainMetrics {
     /// Joint values of an arm that reproduce its connectors' positions, rad or m, by name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joints: Option<BTreeMap<String, f64>>,
-    /// Why an arm has no joint values, if it has none.
+    /// The reason why an arm has no joint values, if it has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joints_error: Option<String>,
     /// Counts of the run.

@@ -1,4 +1,4 @@
-//! What is noted of one chain while it acts.
+//! Notes on one chain while it acts.
 
 use crate::motion::replan::Climbed;
 use crate::rods::geometry::Point;
@@ -10,9 +10,9 @@ use sidestep_kernel::Slot;
 pub(crate) struct Notes<const D: usize> {
     /// The chain.
     pub(crate) slot: Slot,
-    /// What its driver wants.
+    /// Its driver's wish.
     pub(crate) wish: Option<Wanted<D>>,
-    /// What its initiator did on the ladder.
+    /// Its initiator's steps on the ladder.
     pub(crate) climbed: Option<Climbed<D>>,
     /// Objections, in their order.
     pub(crate) vetoes: Vec<Veto<D>>,
@@ -25,6 +25,6 @@ pub(crate) struct Notes<const D: usize> {
 pub(crate) struct Wanted<const D: usize> {
     /// In words.
     pub(crate) words: &'static str,
-    /// Where the initiator wants to be.
+    /// The place that the initiator wants to reach.
     pub(crate) to: Option<Point<D>>,
 }

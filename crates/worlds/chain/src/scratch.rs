@@ -37,7 +37,7 @@ pub struct Scratch<const D: usize> {
     pub(crate) escaped: Vec<Point<D>>,
     /// Events of this task.
     pub(crate) events: Vec<Event>,
-    /// What is noted for somebody who asks about a chain; nothing in a run.
+    /// Notes for somebody who asks about a chain; none in a run.
     pub(crate) notes: Option<Box<Notes<D>>>,
 }
 

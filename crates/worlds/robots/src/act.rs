@@ -14,7 +14,7 @@ use sidestep_kernel::space::BoxWord;
 pub(super) struct Verdict {
     /// Number of steps that are made.
     pub(super) steps: usize,
-    /// What stopped it.
+    /// The obstacle that stopped it.
     pub(super) contact: Option<Touch>,
 }
 

@@ -1,4 +1,4 @@
-//! What a body perceives, decides and claims in a cycle, and what comes of it: the cycle is tried on a
+//! Percepts, decisions and claims of a body in a cycle, and what comes of them: the cycle is tried on a
 //! copy of the state, as far as this body's turn.
 
 mod outcome;

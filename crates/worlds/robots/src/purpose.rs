@@ -1,8 +1,8 @@
-//! What random draws of this world are for.
+//! Purposes of the random draws of this world.
 
 use sidestep_kernel::stream::Purpose;
 
-/// Where bodies without a given place begin.
+/// Starts of bodies without a given place.
 pub(crate) const PLACE: Purpose = Purpose(1);
 /// Phases of periods.
 pub(crate) const PHASE: Purpose = Purpose(2);

@@ -157,7 +157,7 @@ pub struct Books {
     gathered: Vec<Event>,
     /// and those that wait for the next frame.
     pub(super) log: Log<Event>,
-    /// What the wheels of each robot claim, by id, while somebody watches that.
+    /// The claims of each robot's wheels, by id, while somebody watches that.
     odometry: Option<Vec<Claimed>>,
     sensor_samples: Vec<SensorSample>,
     motion_samples: Vec<MotionSample>,

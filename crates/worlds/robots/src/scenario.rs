@@ -196,7 +196,7 @@ pub(super) struct BehaviourSection {
     pub(super) weights_after_contact: Option<BTreeMap<String, f64>>,
 }
 
-/// How robots that go somewhere get past what is in their way.
+/// The way of robots that go somewhere past obstacles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum AvoidanceSection {

@@ -176,7 +176,7 @@ impl RobotsWorld {
     }
 }
 
-/// What many bodies have in common when they are looked at: no sine is computed for each.
+/// Values that many bodies have in common when they are looked at: no sine is computed for each.
 struct Eye<'a> {
     world: &'a RobotsWorld,
     plane: TurnedPlane,

@@ -113,7 +113,7 @@ mod tests {
         compiled.start(&source, 1)
     }
 
-    /// What the listener must remember after cycle `now`: the last turn of the talker before it.
+    /// The word that the listener must remember after cycle `now`: the last turn of the talker before it.
     fn expected(period: u64, phase: u64, now: Cycle) -> u32 {
         let is_turn = |cycle: &Cycle| (cycle + phase).is_multiple_of(period);
         (0..now).rev().find(is_turn).map_or(0, |cycle| cycle as u32 + 1)

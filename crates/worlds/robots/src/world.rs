@@ -45,7 +45,7 @@ impl StorageOrder {
     }
 }
 
-/// Which errors are switched on.
+/// The errors that are switched on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Regime {

@@ -13,7 +13,7 @@ pub(super) struct Found {
     error_m: f64,
     /// Angle in rad by which the tip is turned otherwise than asked; null if no orientation counts.
     error_rad: Option<f64>,
-    /// Why the target is not reached; null if it is.
+    /// The reason why the target is not reached; null if it is.
     reason: Option<String>,
     target: Vector,
     /// The orientation asked, as a quaternion x, y, z, w; null if none counts.

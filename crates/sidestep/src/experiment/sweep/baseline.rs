@@ -1,4 +1,4 @@
-//! What the variants of a sweep are compared with.
+//! The baseline that the variants of a sweep are compared with.
 //!
 //! A baseline that gives the values of some keys is matched within the others: with
 //! `method = "none"` in a grid of methods and numbers of airplanes, every variant is compared with
@@ -24,7 +24,7 @@ pub struct Wanted {
     pub settings: Vec<Setting>,
 }
 
-/// What the variants are compared with.
+/// The baseline that the variants are compared with.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Baseline {
     /// Its name in tables: `method=none`.

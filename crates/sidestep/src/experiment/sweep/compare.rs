@@ -48,7 +48,7 @@ pub struct Comparison {
     pub p_sign: Option<f64>,
 }
 
-/// What each variant is compared with.
+/// The baseline of each variant.
 pub(super) struct Reference {
     /// Its name in tables.
     pub(super) name: String,

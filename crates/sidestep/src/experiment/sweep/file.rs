@@ -39,7 +39,7 @@ pub struct Sweep {
     pub until: Option<Until>,
     /// The metrics to report; all that vary if empty.
     pub metrics: Vec<String>,
-    /// What others are compared with; empty for no comparison.
+    /// The variant that others are compared with; empty for no comparison.
     pub baseline: Wanted,
     /// Whether every run is recorded in a folder of its own.
     pub record: bool,

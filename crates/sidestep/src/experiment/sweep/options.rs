@@ -1,4 +1,4 @@
-//! What a summary is asked for.
+//! Options of a summary.
 
 use crate::scenario::Meaning;
 use crate::statistics::Bootstrap;
@@ -11,7 +11,7 @@ pub struct SummaryOptions {
     pub metrics: Option<Vec<String>>,
     /// Largest number of metrics shown if none are requested.
     pub max_metrics: usize,
-    /// What variants are compared with; `None` for the first variant, but for nothing in grids of
+    /// The baseline of variants; `None` for the first variant, but for nothing in grids of
     /// several parameters and in scattered designs, where the first is like no other.
     pub against: Option<Against>,
     /// Names of the variants, where the table has their numbers.
@@ -24,7 +24,7 @@ pub struct SummaryOptions {
     pub meanings: &'static [Meaning],
 }
 
-/// What variants are compared with.
+/// The baseline of variants.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Against {
     /// The variant of this name.

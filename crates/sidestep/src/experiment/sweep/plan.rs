@@ -33,7 +33,7 @@ pub struct Plan {
     pub until: Option<Until>,
     /// The metrics to report; all that vary if empty.
     pub metrics: Vec<String>,
-    /// What the variants are compared with.
+    /// The baseline that the variants are compared with.
     pub baseline: Option<Baseline>,
     /// Number of agents of the largest variant.
     pub agents: u64,

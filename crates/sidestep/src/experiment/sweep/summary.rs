@@ -123,7 +123,7 @@ pub struct MetricSummary {
     pub name: String,
     /// Its label, with its unit.
     pub label: Label,
-    /// What was counted or measured; empty where the world does not say.
+    /// The thing counted or measured; empty where the world does not say.
     pub meaning: &'static str,
     /// Whether it is a share of runs.
     pub is_share: bool,
@@ -138,7 +138,7 @@ pub struct MetricSummary {
     pub effects: Vec<Effect>,
 }
 
-/// How a metric goes with a parameter over samples of a box.
+/// The correlation of a metric with a parameter over samples of a box.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Trend {
     /// Name of the metric's column.
@@ -176,7 +176,7 @@ pub struct Summary {
     pub metrics: Vec<MetricSummary>,
     /// The metrics that are not shown.
     pub left_out: Vec<LeftOut>,
-    /// How metrics go with parameters, if the variants are samples of a box of them.
+    /// Correlations of metrics with parameters, if the variants are samples of a box of them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub trends: Vec<Trend>,
     /// Remarks that a reader must know.
@@ -192,7 +192,7 @@ pub struct Section {
     pub name: String,
     /// The metric as text.
     pub title: String,
-    /// What was counted or measured; may be empty.
+    /// The thing counted or measured; may be empty.
     pub meaning: &'static str,
     /// Its figures.
     pub figures: Vec<Figure>,

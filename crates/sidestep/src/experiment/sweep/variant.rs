@@ -68,7 +68,7 @@ pub struct Variant {
     /// Number of the first settings that the name stands for; 0 without a name.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub named: usize,
-    /// What another seed changes in its runs.
+    /// The effect of another seed on its runs.
     #[serde(default)]
     pub seeds: Seeds,
     /// Its settings, beside those that all variants share.

@@ -356,7 +356,7 @@ fn recorded<const D: usize>(
     (run, recorder)
 }
 
-/// What came of each chain; nothing in it is about time that was spent.
+/// The outcome of each chain; nothing in it is about time that was spent.
 fn outcome<const D: usize>(run: &Running<D>) -> String {
     let one = |slot| format!("{:?}", run.world().metrics_of(run.state(), slot));
     (0..run.state().len()).map(one).collect()

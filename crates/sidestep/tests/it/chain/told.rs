@@ -1,4 +1,4 @@
-//! What a run says of itself is what its record shows.
+//! Events that a run tells are those that its record shows.
 
 use super::recount::balls;
 use super::*;

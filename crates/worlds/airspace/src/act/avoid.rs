@@ -16,7 +16,7 @@ use crate::intruder::Intruder;
 use crate::shield::{Flyer, Way, apart_for};
 use std::f64::consts::PI;
 
-/// How well a way keeps clear of all intruders.
+/// The clearance of a way from all intruders.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 struct Merit {
     /// Whether no intruder can come too near within `dt`.

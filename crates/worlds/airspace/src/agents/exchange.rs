@@ -17,7 +17,7 @@
 //!    those that go before it have accepted it, else its fallback. It does not ask those that it
 //!    goes before, nor those from whom its plan keeps apart whatever they do.
 //!
-//! Who goes first follows from ids, time and what can be seen, and so both know it without a word.
+//! The order of going first follows from ids, time and what can be seen, and so both know it without a word.
 //! It cannot follow from anything that was heard: whatever the one has heard, the other may not
 //! know of it, and both might believe that they go first.
 //!

@@ -36,7 +36,7 @@ pub(super) enum Topic {
 pub(super) struct Talk<'a> {
     /// Faults of the network; with `None` it loses nothing, and agents wait as long as it takes.
     pub(super) network: Option<&'a Network>,
-    /// Where the airplanes are; without it, all reach all.
+    /// Places of the airplanes; without them, all reach all.
     pub(super) state: Option<&'a AirspaceState>,
     pub(super) streams: Streams,
     pub(super) topic: Topic,

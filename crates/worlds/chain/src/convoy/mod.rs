@@ -80,7 +80,7 @@ impl Plan {
 /// The surroundings of a convoy.
 #[derive(Debug, Clone, Default)]
 pub struct Surroundings {
-    /// What is in its way.
+    /// The obstacle in its way.
     pub obstacles: Obstacles<2>,
     /// The place that its leader goes to, if any.
     pub target: Option<Point<2>>,

@@ -17,7 +17,7 @@ pub struct Obstacle<const D: usize> {
     pub id: u32,
     /// Its inner part.
     pub core: Core<D>,
-    /// How far it reaches beyond its core, meters; 0 for a thin wall.
+    /// Its reach beyond its core, meters; 0 for a thin wall.
     pub radius_m: f64,
     /// Its velocity; zero for static obstacles.
     pub velocity_m_s: Point<D>,

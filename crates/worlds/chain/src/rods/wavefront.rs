@@ -345,7 +345,7 @@ mod tests {
         measures_as_single_motions_do(start, &heads);
     }
 
-    /// What lanes measure is what is measured motion by motion.
+    /// Lanes measure the same as single motions do.
     fn measures_as_single_motions_do<const D: usize>(start: Chain<D>, heads: &[Point<D>]) {
         for group in heads.chunks(LANES) {
             let (mut at_once, mut single) = (start.clone(), start.clone());

@@ -83,7 +83,7 @@ pub enum Motion {
     },
     /// Rest.
     Wait {
-        /// How long, in s, not negative.
+        /// The duration in s, not negative.
         duration_s: f64,
     },
 }

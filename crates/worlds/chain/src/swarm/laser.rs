@@ -19,7 +19,7 @@ pub const LASER_NOISE: Purpose = Purpose(1);
 pub struct Body {
     /// Its inner part.
     pub core: Core<2>,
-    /// How far it reaches beyond its core, meters.
+    /// Its reach beyond its core, meters.
     pub radius_m: f64,
 }
 

@@ -49,7 +49,7 @@ pub struct Goto {
     pub goals: Vec<Arc<FlowField>>,
     /// Whether it starts again after the last goal, rather than staying there.
     pub repeat: bool,
-    /// How it gets past what is in its way.
+    /// Its way past obstacles.
     pub avoidance: Avoidance,
 }
 
@@ -58,7 +58,7 @@ pub struct Goto {
 pub struct Shuttle {
     /// Shortest ways to the two regions.
     pub ends: [Arc<FlowField>; 2],
-    /// How it gets past what is in its way.
+    /// Its way past obstacles.
     pub avoidance: Avoidance,
 }
 

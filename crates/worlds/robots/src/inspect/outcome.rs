@@ -1,4 +1,4 @@
-//! What comes of a body's action: the transition that is drawn, and where it is cut.
+//! The outcome of a body's action: the transition that is drawn, and where it is cut.
 
 use super::Looking;
 use crate::Scratch;

@@ -1,4 +1,4 @@
-//! What a robot perceives, remembers and decides.
+//! Percepts, memory and decisions of a robot.
 
 use super::Looking;
 use crate::Scratch;
@@ -15,7 +15,7 @@ struct Beam<'a, T> {
     sensor: &'a MountedSensor,
     bearing_deg: f64,
     sector: Sector,
-    /// What it meets, and the distance to that in boxes.
+    /// The thing that it meets, and the distance to that in boxes.
     met: Option<(T, f64)>,
     truth: Reading,
     reported: Reading,

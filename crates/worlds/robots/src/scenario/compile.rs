@@ -66,7 +66,7 @@ pub struct Compiled {
     pub cycles: u64,
     /// The tables to keep.
     pub record: RecordSection,
-    /// What compiling found to be surprising.
+    /// Surprises found by compiling.
     pub remarks: Vec<Remark>,
 }
 

@@ -1,4 +1,4 @@
-//! What a scenario may not say, and what its author is told about it.
+//! Scenarios that are refused, and the words for their authors.
 
 use super::*;
 use sidestep_kernel::InputError;

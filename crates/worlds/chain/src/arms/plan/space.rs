@@ -138,7 +138,7 @@ impl<'a, const D: usize> Space<'a, D> {
 /// Longest way of a connector between two postures that are checked, in steps: turning evenly, the
 /// middle of a wide turn is faster than its ends.
 const MOST_STEPS: f64 = 3.0;
-/// How much a rod of a random posture may differ in direction from the one before.
+/// The largest angle by which a rod of a random posture may differ in direction from the one before.
 const STIFFNESS: [f64; 4] = [0.05, 0.15, 0.3, 1.0];
 
 fn direction<const D: usize>(draws: &mut Draws) -> Point<D> {

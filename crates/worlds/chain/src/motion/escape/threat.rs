@@ -28,7 +28,7 @@ pub(super) struct Threat {
     pub(super) part: Part,
     /// Index among [`Obstacles::moving`].
     pub(super) mover: usize,
-    /// How deep the part was in the margin when last measured, meters.
+    /// The depth of the part in the margin when last measured, meters.
     pub(super) depth_m: f64,
     /// Whether it could not be relieved.
     pub(super) given_up: bool,

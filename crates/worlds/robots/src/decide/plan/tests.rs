@@ -1,4 +1,4 @@
-//! What planning robots promise, tried in whole runs.
+//! Promises of planning robots, tried in whole runs.
 
 use crate::robots_run;
 use crate::run::RobotsRun;

@@ -32,7 +32,7 @@ const RULE: &str = "odometry against corrected poses, displacement over commande
     phase-averaged (L6), outcomes beyond the five spread in proportion; turns in place, true \
     over commanded taken for the share of a quarter turn, phase-averaged; every count plus alpha";
 
-/// What tells moves from turns, and how a result is described.
+/// The thresholds that tell moves from turns, and how a result is described.
 pub(super) struct Rule {
     /// The rule in words, for the profile.
     pub(super) words: &'static str,

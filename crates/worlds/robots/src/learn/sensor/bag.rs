@@ -197,7 +197,7 @@ impl<'a> Judge<'a> {
     }
 }
 
-/// Where a scanner sits on its robot, in the plane.
+/// The mount of a scanner on its robot, in the plane.
 struct Mount {
     place: Pose,
     /// -1 where it hangs upside down, so that its bearings run the other way.

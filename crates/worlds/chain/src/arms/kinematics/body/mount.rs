@@ -1,4 +1,4 @@
-//! Where a link of a model is, at a posture of an arm of it.
+//! The place of a link of a model, at a posture of an arm of it.
 
 use super::super::pose::Pose;
 use super::super::serial::{Drive, Motion, SerialChain};

@@ -3,7 +3,7 @@
 use super::*;
 use crate::scenes::{convoy, corridor_line, corridor_walls};
 
-/// Where the leader starts: in the first, straight part, which is 14 m long.
+/// The leader's start: in the first, straight part, which is 14 m long.
 const LEAD_M: f64 = 13.0;
 
 struct Run {
