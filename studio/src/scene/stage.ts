@@ -123,11 +123,12 @@ export class Stage {
     this.#frame = null;
   }
 
-  frame(frame: Frame): void {
+  /** Takes a frame; one that was sought need not follow the one before. */
+  frame(frame: Frame, isSought = false): void {
     if (frame === this.#frame || !this.#bodies) return;
     const isFirst = this.#frame === null;
     this.#frame = frame;
-    this.#trails?.push(frame.cycle, frame.places_m);
+    this.#trails?.push(frame.cycle, frame.places_m, isSought);
     if (isFirst) this.#extent = extentOf(this.#scene, this.#bodies, frame);
     if (isFirst && !this.#isFitted) this.fit();
     this.#bodiesChanged = this.#marksChanged = true;

@@ -3,7 +3,7 @@
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from "vitest";
 import { launch, openNew, openPage, WAIT_MS, type Look } from "../browser";
-import { FakeServer } from "../fake/server";
+import { FakeServer, PARTING } from "../fake/server";
 
 const server = new FakeServer("dist");
 let browser: Browser;
@@ -49,7 +49,7 @@ describe("transport", () => {
   test("a run is opened, played, paused and stepped, and nothing complains", async () => {
     await visit("robots");
     expect(await cycle()).toBe(0);
-    await page.getByRole("button", { name: "Play" }).click();
+    await page.getByRole("button", { name: "Play", exact: true }).click();
     await cycleIs((c) => c >= 3);
     await page.getByRole("button", { name: "Pause" }).click();
     await page.getByTestId("state").filter({ hasText: "paused" }).waitFor();
@@ -76,6 +76,26 @@ describe("transport", () => {
     await cycleIs(12);
   });
 
+  test("a run plays backwards, and stands still when asked to", async () => {
+    await visit("robots");
+    await page.getByRole("slider", { name: "Cycle" }).fill("800");
+    await cycleIs(800);
+    await page.getByLabel("Speed", { exact: true }).selectOption("10");
+    await page.locator("canvas.picture").focus();
+    await page.keyboard.press("b");
+    await page.getByTestId("state").filter({ hasText: "playing back" }).waitFor();
+    await cycleIs((c) => c < 770);
+    await page.keyboard.press(" ");
+    await page.getByTestId("state").filter({ hasText: "paused" }).waitFor();
+    const stopped = await cycle();
+    await page.getByRole("button", { name: "One cycle on" }).click();
+    await cycleIs(stopped + 1);
+    await page.getByRole("button", { name: "Play backwards" }).click();
+    await cycleIs((c) => c < stopped);
+    expect(complaints).toEqual([]);
+    expect(await page.getByRole("alert").textContent()).toBe("");
+  });
+
   test("another seed starts anew", async () => {
     await visit("robots");
     await page.getByRole("slider", { name: "Cycle" }).fill("100");
@@ -94,7 +114,7 @@ describe("transport", () => {
       window.addEventListener("blur", () => (window.requestAnimationFrame = draw));
     });
     await page.getByLabel("Speed", { exact: true }).selectOption("fastest");
-    await page.getByRole("button", { name: "Play" }).click();
+    await page.getByRole("button", { name: "Play", exact: true }).click();
     await expect.poll(() => server.leftOut(), { timeout: 30_000 }).toBeGreaterThan(3);
     await page.evaluate(() => window.dispatchEvent(new Event("blur")));
     await page.getByRole("button", { name: "Fit" }).click();
@@ -293,6 +313,35 @@ describe("sessions", () => {
     await page.getByRole("button", { name: "Close Made-up snake" }).click();
     await page.waitForFunction(() => document.querySelectorAll("canvas.picture").length === 1);
   });
+
+  test("the first difference of two runs in step is found, and who differs", async () => {
+    await visit("robots");
+    await page.getByRole("button", { name: "Open…" }).click();
+    await page.getByRole("textbox", { name: "Seed" }).first().fill("2");
+    await page.getByRole("dialog", { name: "Open" }).getByRole("button", { name: "robots", exact: true }).click();
+    await page.getByRole("button", { name: "In step" }).click();
+    await page.getByRole("button", { name: "First difference" }).click();
+    await page.getByTestId("difference").filter({ hasText: `from cycle ${PARTING} on: robot 3 is 0.25\u202fm away.` }).waitFor();
+    await cycleIs(PARTING);
+    await page.getByRole("heading", { name: "robot 3" }).waitFor();
+    expect(complaints).toEqual([]);
+  });
+
+  for (const [status, words] of [[503, "is full"], [401, "Open the whole address"], [421, "does not take this address"]] as const) {
+    test(`a server that answers ${status} is told as that, and found again`, async () => {
+      await visit("robots");
+      await page.getByRole("button", { name: "Play", exact: true }).click();
+      await cycleIs((c) => c > 2);
+      server.entrance = status;
+      await server.stop();
+      await server.start();
+      await page.getByTestId("banner").filter({ hasText: words }).waitFor();
+      server.entrance = 204;
+      await page.getByTestId("banner").getByRole("button", { name: "Try now" }).click();
+      await page.getByTestId("banner").filter({ hasText: "reopened Made-up hall" }).waitFor();
+      await page.getByTestId("state").filter({ hasText: "playing" }).waitFor();
+    });
+  }
 
   test("what cannot be opened is told with its remedy", async () => {
     await visit(null);

@@ -34,6 +34,9 @@ function problemOf(cause: string, remedy: string, line: number | null = null, co
   return { place: "made-up.toml", line, column, cause, remedy, is_warning: false };
 }
 
+/** The cycle from which on runs of the seed 2 are others. */
+export const PARTING = 137;
+
 class Run {
   credit = 0;
   cycle = 0;
@@ -62,8 +65,17 @@ class Run {
     return {
       session: this.id, state: isOver ? "over" : this.playing ? "playing" : "paused", cycle: this.cycle, cycles_planned: planned,
       time_s: this.cycle * scene.cycle_s, speed: this.speed, cycles_per_s: this.playing ? 10 : 0, seed: this.seed,
-      digest: isOver ? "a1b2c3d4e5f60718" : null, banner: null,
+      digest: this.playing && !isOver ? null : this.digest(), banner: null,
     };
+  }
+
+  /** Runs of the seed 2 part from the others. */
+  get hasParted(): boolean {
+    return this.seed === "2" && this.cycle >= PARTING;
+  }
+
+  digest(): string {
+    return `a1b2c3d4${this.cycle.toString(16).padStart(6, "0")}${this.hasParted ? "ff" : "00"}`;
   }
 
   cast(): Notice {
@@ -92,10 +104,13 @@ class Run {
     this.credit--;
     this.#owed = false;
     const { scene } = this.world;
+    const columns = this.world.columns(this.cycle);
+    // The fourth body stands elsewhere.
+    if (this.hasParted) columns.places_m[3 * scene.dimensions]! += 0.25;
     const text = { scans: this.scansOf.flatMap((who) => this.world.scans(who, this.cycle)), events: [], events_left_out: 0 };
     this.#socket.send(encodeFrame({
       session: this.id, cast: 1, dimensions: scene.dimensions as 2 | 3, cycle: this.cycle, time_s: this.cycle * scene.cycle_s,
-      leftOut: this.leftOut, text, ...this.world.columns(this.cycle),
+      leftOut: this.leftOut, text, ...columns,
     }));
   }
 }
@@ -105,6 +120,8 @@ export class FakeServer {
   port = 0;
   /** What the command line would have asked to open. */
   open: Subject[] = [];
+  /** What the way in answers; anything but 204 refuses sockets, too. */
+  entrance = 204;
   readonly #dist: string;
   #http: Server | null = null;
   #sockets: WebSocketServer | null = null;
@@ -122,6 +139,7 @@ export class FakeServer {
 
   async start(): Promise<void> {
     const http = createServer((request, response) => {
+      if (request.url === "/enter") return void response.writeHead(this.entrance).end();
       const path = normalize(new URL(request.url ?? "/", "http://x").pathname);
       const file = path === "/" ? "/index.html" : path;
       try {
@@ -166,6 +184,7 @@ export class FakeServer {
   }
 
   #greet(socket: WebSocket): void {
+    if (this.entrance !== 204) return socket.terminate();
     const say = (words: unknown): void => socket.send(JSON.stringify(words));
     say({ notice: "hello", version: 1, program: "sidestep 0.0.0 (made up)", worlds: Object.keys(WORLDS), read_only: false, open: this.open });
     const mine = new Set<number>();
