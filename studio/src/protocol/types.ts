@@ -13,12 +13,12 @@ export type Request = {
  */
 id: number,
 /**
- * What is asked.
+ * The question.
  */
 call: Call, };
 
 /**
- * What a page can ask.
+ * A question or an order of a page.
  */
 export type Call = { "do": "files",
 /**
@@ -26,7 +26,7 @@ export type Call = { "do": "files",
  */
 folder: string | null, } | { "do": "open",
 /**
- * What is opened.
+ * The thing to open.
  */
 what: Subject,
 /**
@@ -34,23 +34,23 @@ what: Subject,
  */
 seed: number | null, } | { "do": "close",
 /**
- * Which one.
+ * The session.
  */
 session: number, } | { "do": "play",
 /**
- * Which one.
+ * The session.
  */
 session: number,
 /**
- * How fast.
+ * The speed.
  */
 speed: Speed, } | { "do": "pause",
 /**
- * Which one.
+ * The session.
  */
 session: number, } | { "do": "step",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -58,7 +58,7 @@ session: number,
  */
 cycles: number, } | { "do": "seek",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -66,7 +66,7 @@ session: number,
  */
 cycle: number, } | { "do": "restart",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -78,7 +78,7 @@ seed: number | null,
  */
 text: string | null, } | { "do": "look",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -86,7 +86,7 @@ session: number,
  */
 scans_of: Array<Who>, } | { "do": "credit",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -94,15 +94,15 @@ session: number,
  */
 frames: number, } | { "do": "inspect",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
- * Which body.
+ * The body.
  */
 who: Who, } | { "do": "metrics",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -110,7 +110,7 @@ session: number,
  */
 from: number, } | { "do": "events",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -126,11 +126,11 @@ until: number,
  */
 most: number, } | { "do": "source",
 /**
- * Which session.
+ * The session.
  */
 session: number, } | { "do": "check",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -139,7 +139,7 @@ session: number,
 text: string, };
 
 /**
- * What can be opened.
+ * A thing that can be opened.
  */
 export type Subject = { "kind": "scenario",
 /**
@@ -156,12 +156,12 @@ world: string, } | { "kind": "recording",
 path: string, };
 
 /**
- * How fast a run is played.
+ * The speed at which a run is played.
  */
 export type Speed = { "times": number } | "fastest";
 
 /**
- * Which body: kind, number, and part of things that have parts.
+ * The name of a body: kind, number, and part of things that have parts.
  */
 export type Who = {
 /**
@@ -187,7 +187,7 @@ export type Reply = {
 id: number, } & ({ "answer": Answer } | { "problem": Problem });
 
 /**
- * What came of a request.
+ * The outcome of a request.
  */
 export type Outcome = { "answer": Answer } | { "problem": Problem };
 
@@ -196,7 +196,7 @@ export type Outcome = { "answer": Answer } | { "problem": Problem };
  */
 export type Answer = { "is": "done" } | { "is": "files",
 /**
- * What can be opened in it, by name.
+ * Its entries that can be opened, by name.
  */
 entries: Array<FileEntry>, } | { "is": "opened",
 /**
@@ -204,7 +204,7 @@ entries: Array<FileEntry>, } | { "is": "opened",
  */
 session: number,
 /**
- * What stays as it is.
+ * The scene, which stays as it is.
  */
 scene: Scene,
 /**
@@ -220,8 +220,8 @@ names: Array<MetricName>,
  */
 first: number,
 /**
- * How often the samples were thinned by half, and numbered anew, since the session began: ask from 0
- * whenever it has changed.
+ * The number of times that the samples were thinned by half, and numbered anew, since the session began:
+ * ask from 0 whenever it has changed.
  */
 thinned: number,
 /**
@@ -278,11 +278,23 @@ line: number | null,
  */
 column: number | null,
 /**
- * What is wrong.
+ * Line of its end, from 1.
+ */
+end_line: number | null,
+/**
+ * Column behind its end, from 1.
+ */
+end_column: number | null,
+/**
+ * Key of the scenario that is wrong, as `--set` names it: `robots.1.at.0`.
+ */
+key: string | null,
+/**
+ * The cause.
  */
 cause: string,
 /**
- * What would be right.
+ * The remedy: the right way to write or to do it.
  */
 remedy: string,
 /**
@@ -303,7 +315,7 @@ path: string,
  */
 name: string,
 /**
- * What it is.
+ * Its kind.
  */
 kind: FileKind,
 /**
@@ -312,7 +324,7 @@ kind: FileKind,
 about: string, };
 
 /**
- * What a file or a folder is.
+ * The kind of a file or a folder.
  */
 export type FileKind = "folder" | "scenario" | "run" | "recording" | "sweep" | "foreign";
 
@@ -334,7 +346,7 @@ words: string,
 unit: string, };
 
 /**
- * What the server says unasked.
+ * A message of the server that nobody asked for.
  */
 export type Notice = { "notice": "hello",
 /**
@@ -354,20 +366,20 @@ worlds: Array<string>,
  */
 read_only: boolean,
 /**
- * What the command line asked to open.
+ * The things that the command line asked to open.
  */
 open: Array<Named>, } | { "notice": "cast" } & Cast | { "notice": "status" } & Status | { "notice": "ended",
 /**
- * Which one.
+ * The session.
  */
 session: number,
 /**
- * Why.
+ * The reason.
  */
 problem: Problem, };
 
 /**
- * What the command line named: a kind as in [`Subject`](super::Subject), with its path.
+ * A thing that the command line named: a kind as in [`Subject`](super::Subject), with its path.
  */
 export type Named = {
 /**
@@ -384,11 +396,11 @@ path: string, };
  */
 export type Status = {
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
- * What it does.
+ * Its activity.
  */
 state: State,
 /**
@@ -404,7 +416,7 @@ cycles_planned: number,
  */
 time_s: number,
 /**
- * How fast it plays, or played last.
+ * Its speed now, or when it played last.
  */
 speed: Speed,
 /**
@@ -425,12 +437,12 @@ digest: string | null,
 banner: string | null, };
 
 /**
- * What a session does.
+ * The activity of a session.
  */
 export type State = "playing" | "paused" | "seeking" | "over" | "failed";
 
 /**
- * What stays as it is.
+ * The scene, which stays as it is.
  */
 export type Scene = {
 /**
@@ -500,7 +512,7 @@ runs: Array<number>, };
  */
 export type StillBody = {
 /**
- * Which body.
+ * The body.
  */
 who: Who,
 /**
@@ -584,7 +596,7 @@ layer: number, };
  */
 export type Cast = {
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -628,7 +640,7 @@ look: Array<number>,
  */
 names: Array<[number, string]>,
 /**
- * Which bodies are agents: what can be inspected.
+ * The bodies that are agents, which can be inspected.
  */
 is_agent: Array<boolean>, };
 
@@ -703,7 +715,7 @@ level: string,
  */
 kind: string,
 /**
- * Whom it is about.
+ * The body that it is about.
  */
 who: Who | null,
 /**
@@ -728,11 +740,11 @@ unit: string,
 words: string, };
 
 /**
- * What a body perceives, decides and does.
+ * Facts and marks of a body: its percepts, decisions and deeds.
  */
 export type Inspection = {
 /**
- * Which body.
+ * The body.
  */
 who: Who,
 /**
@@ -748,7 +760,7 @@ title: string,
  */
 sections: Array<Section>,
 /**
- * What can be drawn of it.
+ * Marks to draw of it.
  */
 marks: Array<Mark>, };
 
@@ -778,7 +790,7 @@ export type Fact = {
  */
 label: string,
 /**
- * What it is.
+ * Its value.
  */
 value: Value, };
 
@@ -813,7 +825,7 @@ rows: Array<Array<Value>>, };
  */
 export type Mark = {
 /**
- * What it stands for.
+ * Its meaning.
  */
 role: Role,
 /**
@@ -830,7 +842,7 @@ weight: number,
 shape: MarkShape, };
 
 /**
- * What a mark stands for.
+ * The meaning of a mark.
  */
 export type Role = "true" | "reported" | "wish" | "done" | "refused" | "claim" | "group" | "predicted" | "chosen" | "known" | "orbit" | "target";
 
