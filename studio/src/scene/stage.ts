@@ -189,6 +189,20 @@ export class Stage {
     this.changed();
   }
 
+  /** The picture as it is seen, with its words. */
+  snapshot(): Promise<Blob | null> {
+    // What was drawn before is gone once the browser has shown it.
+    cancelAnimationFrame(this.#request);
+    this.#draw();
+    const { domElement: picture } = this.#renderer;
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = [picture.width, picture.height];
+    const pen = canvas.getContext("2d")!;
+    pen.drawImage(picture, 0, 0);
+    pen.drawImage(this.#overlay.canvas, 0, 0, canvas.width, canvas.height);
+    return new Promise((then) => canvas.toBlob(then, "image/png"));
+  }
+
   /** Where a body appears, for tests and for keeping it in sight. */
   placeOf(index: number): Place | null {
     const frame = this.#frame;

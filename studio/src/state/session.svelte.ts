@@ -386,6 +386,18 @@ export class Session {
     return this.#ask({ do: "source" });
   }
 
+  /** The folder of the recording, where it is one: of such there are reports. */
+  get folder(): string | null {
+    const { subject } = this;
+    return subject.kind === "recording" && !/\.mcap$/i.test(subject.path) ? subject.path : null;
+  }
+
+  /** The names of the recorded tables. */
+  async tables(): Promise<string[]> {
+    const answer = await this.tell({ do: "tables" });
+    return answer?.is === "tables" ? answer.names : [];
+  }
+
   check(text: string): Promise<Answer> {
     return this.#ask({ do: "check", text });
   }

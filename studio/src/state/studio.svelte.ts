@@ -3,7 +3,7 @@
 import { Connection, LOST, Refused, problemOf, type Listener, type Surroundings } from "../connection";
 import { STANDING_WORDS, type Standing } from "../enter";
 import { HEADER_BYTES } from "../decode";
-import { VERSION, type Notice, type Problem, type Subject } from "../protocol";
+import { VERSION, type Named, type Notice, type Problem, type Subject } from "../protocol";
 import { Comparison } from "./comparison.svelte";
 import { remember } from "./recents";
 import { Session } from "./session.svelte";
@@ -21,6 +21,12 @@ export interface Around extends Surroundings {
   standing(): Promise<Standing>;
 }
 
+/** A sweep, by its folder. */
+export interface Sweep {
+  folder: string;
+  name: string;
+}
+
 type Hello = Extract<Notice, { notice: "hello" }>;
 
 export class Studio {
@@ -29,7 +35,10 @@ export class Studio {
   banner = $state.raw<Banner | null>(null);
   problems = $state.raw<{ key: number; problem: Problem }[]>([]);
   sessions = $state.raw<Session[]>([]);
-  activeKey = $state(0);
+  /** The sweep that is shown in the place of sessions, and the one that was last. */
+  sweep = $state.raw<Sweep | null>(null);
+  lastSweep = $state.raw<Sweep | null>(null);
+  #activeKey = $state(0);
   /** All sessions beside each other, or the active one only. */
   sideBySide = $state(false);
   /** Transport commands go to all sessions. */
@@ -49,6 +58,25 @@ export class Studio {
     };
     this.#around = around;
     this.#connection = new Connection(listener, around);
+  }
+
+  get activeKey(): number {
+    return this.#activeKey;
+  }
+
+  /** Shows a session. */
+  set activeKey(key: number) {
+    this.#activeKey = key;
+    this.sweep = null;
+  }
+
+  /** Shows a sweep. */
+  openSweep(folder: string, name: string): void {
+    this.sweep = this.lastSweep = { folder, name };
+  }
+
+  closeSweep(): void {
+    this.sweep = this.lastSweep = null;
   }
 
   get active(): Session | null {
@@ -217,7 +245,13 @@ export class Studio {
     this.isConnected = true;
     this.banner = null;
     if (this.sessions.length > 0) await this.#reopen(generation);
-    else if (isFirst) for (const subject of hello.open) await this.open(subject as Subject);
+    else if (isFirst) for (const named of hello.open) await this.#openNamed(named);
+  }
+
+  /** Opens what the command line named. */
+  async #openNamed({ kind, path }: Named): Promise<void> {
+    if (kind === "sweep") this.openSweep(path, path.split("/").at(-1) ?? path);
+    else await this.open({ kind, path } as Subject);
   }
 
   #lost(attempt: number, wait_ms: number): void {

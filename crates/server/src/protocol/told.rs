@@ -81,6 +81,22 @@ pub enum Answer {
         /// Whether it cannot be replaced by another text.
         read_only: bool,
     },
+    /// The names of a recording's tables; none of an MCAP file, or of what is no recording.
+    Tables {
+        /// The names.
+        names: Vec<String>,
+    },
+    /// The finished runs of a sweep.
+    Runs {
+        /// The sweep's name; may be empty.
+        name: String,
+        /// Whether these are all runs.
+        is_complete: bool,
+        /// The runs.
+        runs: Vec<SweepRun>,
+        /// Number of runs that are not listed.
+        left_out: u64,
+    },
     /// The errors of a text, and its surprises.
     Problems {
         /// Nothing for a valid text without surprises.
@@ -147,6 +163,20 @@ pub struct FileEntry {
     pub about: String,
 }
 
+/// A run of a sweep.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct SweepRun {
+    /// The name of its variant.
+    pub variant: String,
+    /// Its seed, in decimal digits, as it may be larger than a number of JavaScript can be.
+    pub seed: String,
+    /// The cause of its failure; empty if it did not fail.
+    pub failure: String,
+    /// Its recording; or its variant's scenario, which needs the seed.
+    pub replay: Named,
+}
+
 /// The kind of a file or a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -201,7 +231,7 @@ pub enum Notice {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Named {
-    /// `scenario` or `recording`.
+    /// `scenario`, `recording` or `sweep`.
     pub kind: String,
     /// Its path.
     pub path: String,

@@ -2,10 +2,12 @@
 
 use crate::encode::problem;
 use crate::files::Files;
+use crate::keyframes::Budget;
 use crate::protocol::{Problem, Subject};
 use sidestep::kernel::{Cycle, Simulation};
 use sidestep::scenario::{Meaning, Source, Worlds};
 use sidestep_session::{Error, Recorded, read};
+use std::sync::Arc;
 
 /// The means that sessions need to begin.
 #[derive(Clone)]
@@ -18,6 +20,8 @@ pub(crate) struct Means {
     pub(crate) workers: usize,
     /// Whether texts of a page are refused.
     pub(crate) read_only: bool,
+    /// The memory that the keyframes of all sessions share.
+    pub(crate) budget: Arc<Budget>,
 }
 
 /// A run, and where it comes from.
@@ -128,9 +132,23 @@ impl Stage {
         })
     }
 
+    /// Returns the memory that keyframes of all sessions share.
+    pub(crate) fn budget(&self) -> &Arc<Budget> {
+        &self.means.budget
+    }
+
     /// Returns the metrics of its world in words.
     pub(crate) fn meanings(&self) -> &'static [Meaning] {
         self.means.worlds.named(self.run.world()).map_or(&[], |kind| kind.meanings())
+    }
+
+    /// Returns the names of the recorded tables; none of what has no tables.
+    ///
+    /// # Errors
+    /// When the folder can no longer be read.
+    pub(crate) fn tables(&self) -> Result<Vec<String>, Problem> {
+        let recorded = self.recorded.as_ref();
+        recorded.map_or(Ok(Vec::new()), |recorded| recorded.tables().map_err(|e| problem(&e)))
     }
 
     /// Whether its text cannot be replaced.
@@ -197,7 +215,8 @@ fn fixed(place: &str) -> Problem {
     Problem::new(place, "a recording is computed again as it was", remedy)
 }
 
-fn stopped(error: &Error) -> Problem {
+/// Returns an error of a session as it is told.
+pub(crate) fn stopped(error: &Error) -> Problem {
     match error {
         Error::Input(error) => problem(error),
         Error::Stopped { cause, remedy } => Problem::new("", cause, remedy),

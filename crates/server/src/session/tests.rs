@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::files::Files;
+use crate::keyframes::Budget;
 use crate::outbox::Mail;
 use crate::protocol::{Speed, Who};
 use serde_json::{Value, json};
@@ -30,7 +31,8 @@ struct Page {
 
 fn means(folder: &std::path::Path, workers: usize) -> Means {
     let files = Files::below(&[folder.to_path_buf()]).expect("a folder");
-    Means { worlds: WORLDS, files, workers, read_only: false }
+    let budget = Arc::new(Budget::new(1 << 28, 1 << 28));
+    Means { worlds: WORLDS, files, workers, read_only: false, budget }
 }
 
 impl Page {
