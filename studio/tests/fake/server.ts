@@ -31,7 +31,7 @@ size = 2
 `;
 
 function problemOf(cause: string, remedy: string, line: number | null = null, column: number | null = null): Problem {
-  return { place: "made-up.toml", line, column, cause, remedy, is_warning: false };
+  return { place: "made-up.toml", line, column, end_line: null, end_column: null, key: null, cause, remedy, is_warning: false };
 }
 
 class Run {

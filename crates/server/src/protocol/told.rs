@@ -122,6 +122,12 @@ pub struct Problem {
     pub line: Option<u32>,
     /// Its column, from 1.
     pub column: Option<u32>,
+    /// Line of its end, from 1.
+    pub end_line: Option<u32>,
+    /// Column behind its end, from 1.
+    pub end_column: Option<u32>,
+    /// Key of the scenario that is wrong, as `--set` names it: `robots.1.at.0`.
+    pub key: Option<String>,
     /// The cause.
     pub cause: String,
     /// The remedy: the right way to write or to do it.
@@ -137,9 +143,17 @@ impl Problem {
         cause: impl Into<String>,
         remedy: impl Into<String>,
     ) -> Self {
-        let (line, column) = (None, None);
-        let (place, cause, remedy) = (place.into(), cause.into(), remedy.into());
-        Self { place, line, column, cause, remedy, is_warning: false }
+        Self {
+            place: place.into(),
+            line: None,
+            column: None,
+            end_line: None,
+            end_column: None,
+            key: None,
+            cause: cause.into(),
+            remedy: remedy.into(),
+            is_warning: false,
+        }
     }
 }
 

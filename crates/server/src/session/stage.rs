@@ -159,6 +159,7 @@ pub(crate) fn checked(
             let remarks = compiled.remarks().into_iter();
             let told = remarks.map(|remark| Problem {
                 is_warning: true,
+                key: Some(remark.key.clone()),
                 ..Problem::new(remark.key, remark.words, "")
             });
             told.collect()
