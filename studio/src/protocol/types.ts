@@ -390,6 +390,18 @@ line: number | null,
  */
 column: number | null,
 /**
+ * Line of its end, from 1.
+ */
+end_line: number | null,
+/**
+ * Column behind its end, from 1.
+ */
+end_column: number | null,
+/**
+ * Key of the scenario that is wrong, as `--set` names it: `robots.1.at.0`.
+ */
+key: string | null,
+/**
  * The cause.
  */
 cause: string,

@@ -18,7 +18,6 @@ pub struct Reply {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]
-#[expect(clippy::large_enum_variant, reason = "there is one at a time, for an instant")]
 pub enum Outcome {
     /// The answer.
     Answer(Answer),
@@ -127,11 +126,11 @@ pub struct Problem {
     /// Column behind its end, from 1.
     pub end_column: Option<u32>,
     /// Key of the scenario that is wrong, as `--set` names it: `robots.1.at.0`.
-    pub key: Option<String>,
+    pub key: Option<Box<str>>,
     /// The cause.
     pub cause: String,
     /// The remedy: the right way to write or to do it.
-    pub remedy: String,
+    pub remedy: Box<str>,
     /// Whether the text is valid all the same.
     pub is_warning: bool,
 }
@@ -141,7 +140,7 @@ impl Problem {
     pub fn new(
         place: impl Into<String>,
         cause: impl Into<String>,
-        remedy: impl Into<String>,
+        remedy: impl Into<Box<str>>,
     ) -> Self {
         Self {
             place: place.into(),
