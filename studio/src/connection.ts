@@ -33,7 +33,7 @@ export class Refused extends Error {
 
 /** A problem that the page itself has noticed. */
 export function problemOf(place: string, cause: string, remedy: string): Problem {
-  return { place, line: null, column: null, cause, remedy, is_warning: false };
+  return { place, line: null, column: null, end_line: null, end_column: null, key: null, cause, remedy, is_warning: false };
 }
 
 /** A socket on which the server has not said hello by then is given up: whatever is in between may hold it open. */

@@ -136,7 +136,52 @@ session: number,
 /**
  * The text.
  */
-text: string, };
+text: string, } | { "do": "edit",
+/**
+ * Which session.
+ */
+session: number,
+/**
+ * The text.
+ */
+text: string,
+/**
+ * What is changed, all or nothing.
+ */
+edits: Array<Edit>, } | { "do": "model",
+/**
+ * Which session.
+ */
+session: number,
+/**
+ * The text.
+ */
+text: string, } | { "do": "schema",
+/**
+ * The world's name.
+ */
+world: string, } | { "do": "save",
+/**
+ * Which session.
+ */
+session: number,
+/**
+ * The text.
+ */
+text: string,
+/**
+ * Another place than the file that was opened.
+ */
+to: string | null,
+/**
+ * Whether a file that was changed meanwhile is written all the same.
+ */
+over: boolean, };
+
+/**
+ * A change of one key of a text.
+ */
+export type Edit = { "op": "set", key: string, value: unknown, } | { "op": "insert", key: string, at: number | null, value: unknown, } | { "op": "remove", key: string, } | { "op": "move", key: string, to: number, } | { "op": "rename", key: string, to: string, } | { "op": "paint", key: string, cells: Array<[number, number, string]>, };
 
 /**
  * What can be opened.
@@ -259,7 +304,31 @@ read_only: boolean, } | { "is": "problems",
 /**
  * Nothing for a valid text without surprises.
  */
-problems: Array<Problem>, };
+problems: Array<Problem>, } | { "is": "edited",
+/**
+ * The text with all edits.
+ */
+text: string, } | { "is": "model",
+/**
+ * Its tables.
+ */
+value: unknown,
+/**
+ * Files that it names.
+ */
+files: Array<string>, } | { "is": "schema",
+/**
+ * A JSON Schema.
+ */
+schema: unknown, } | { "is": "saved",
+/**
+ * Where.
+ */
+place: string, } | { "is": "differs",
+/**
+ * The text of the file, which was changed meanwhile.
+ */
+text: string, };
 
 /**
  * An error as people read it: where, what, remedy.
@@ -277,6 +346,18 @@ line: number | null,
  * Its column, from 1.
  */
 column: number | null,
+/**
+ * The line of its end, from 1.
+ */
+end_line: number | null,
+/**
+ * The column of its end, from 1.
+ */
+end_column: number | null,
+/**
+ * The path of the key that is wrong, as `--set` takes it.
+ */
+key: string | null,
 /**
  * What is wrong.
  */
