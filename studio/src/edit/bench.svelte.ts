@@ -234,7 +234,11 @@ const benches = new WeakMap<Draft, Bench>();
 
 /** The bench of a draft. */
 export function benchOf(draft: Draft): Bench {
-  const bench = benches.get(draft) ?? new Bench(draft);
-  benches.set(draft, bench);
-  return bench;
+  const known = benches.get(draft);
+  if (known) return known;
+  let made!: Bench;
+  // What it derives must outlive the component that asks first.
+  $effect.root(() => void (made = new Bench(draft)));
+  benches.set(draft, made);
+  return made;
 }

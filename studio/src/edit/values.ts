@@ -97,8 +97,18 @@ export function scaled(values: readonly number[]): number[] | null {
   return millionths.map((value) => value / 1e6);
 }
 
+/** Columns of places, which mean the same everywhere. */
+function usualColumns(path: Path, count: number): string[] | null {
+  const key = String(path.at(-1));
+  if (key === "track") return ["t_s", "x_m", "y_m", "altitude_m"].slice(0, count);
+  if (key === "at" || key === "goals") return ["column", "row", "heading"].slice(0, count);
+  return /_m(_s)?$/.test(key) && count <= 3 ? ["x", "y", "z"].slice(0, count) : null;
+}
+
 /** What the columns of a row stand for, as its neighbors in the section tell. */
 export function columnsOf(model: Table | null, path: Path, count: number): string[] {
+  const usual = usualColumns(path, count);
+  if (usual) return usual;
   const section = valueAt(model ?? {}, path.slice(0, path.indexOf("sensors") === 0 ? 2 : -1));
   const key = String(path.at(-1));
   const word = key === "distance_confusion" ? "distance_classes" : path.some((part) => String(part).startsWith("confusion")) ? "observations" : "";

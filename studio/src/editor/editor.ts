@@ -91,7 +91,7 @@ export class Editor {
         StreamLanguage.define(toml),
         syntaxHighlighting(HIGHLIGHT),
         keymap.of([...completionKeymap, ...defaultKeymap, indentWithTab]),
-        EditorView.contentAttributes.of({ "aria-label": "Text of the scenario" }),
+        EditorView.contentAttributes.of({ "aria-label": "Text of the scenario", tabindex: "0" }),
         EditorView.updateListener.of((update) => {
           const isOurs = update.transactions.some((one) => one.docChanged && !one.annotation(FROM_OUTSIDE));
           if (isOurs) hooks.changed(update.state.doc.toString());

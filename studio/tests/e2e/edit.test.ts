@@ -213,7 +213,7 @@ describe("forms", () => {
     expect(await edited(6)).toEqual({ op: "remove", key: "robots.0" });
     await page.getByLabel("Add a section").selectOption("record");
     expect(await edited(7)).toEqual({ op: "set", key: "record", value: {} });
-    await page.getByLabel("events").selectOption("false");
+    await page.getByLabel("events", { exact: true }).selectOption("false");
     expect(await edited(8)).toEqual({ op: "set", key: "record.events", value: false });
     for (let i = 0; i < 8; i++) await page.getByRole("button", { name: "Undo" }).click();
     await checked();
