@@ -45,7 +45,10 @@ impl Call {
             | Self::Metrics { session, .. }
             | Self::Events { session, .. }
             | Self::Source { session }
-            | Self::Check { session, .. } => Some(session),
+            | Self::Check { session, .. }
+            | Self::Edit { session, .. }
+            | Self::Model { session, .. }
+            | Self::Save { session, .. } => Some(session),
         }
     }
 }

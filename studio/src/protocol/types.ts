@@ -13,12 +13,12 @@ export type Request = {
  */
 id: number,
 /**
- * What is asked.
+ * The question.
  */
 call: Call, };
 
 /**
- * What a page can ask.
+ * A question or an order of a page.
  */
 export type Call = { "do": "files",
 /**
@@ -26,7 +26,7 @@ export type Call = { "do": "files",
  */
 folder: string | null, } | { "do": "open",
 /**
- * What is opened.
+ * The thing to open.
  */
 what: Subject,
 /**
@@ -34,23 +34,23 @@ what: Subject,
  */
 seed: number | null, } | { "do": "close",
 /**
- * Which one.
+ * The session.
  */
 session: number, } | { "do": "play",
 /**
- * Which one.
+ * The session.
  */
 session: number,
 /**
- * How fast.
+ * The speed.
  */
 speed: Speed, } | { "do": "pause",
 /**
- * Which one.
+ * The session.
  */
 session: number, } | { "do": "step",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -58,7 +58,7 @@ session: number,
  */
 cycles: number, } | { "do": "seek",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -66,7 +66,7 @@ session: number,
  */
 cycle: number, } | { "do": "restart",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -78,7 +78,7 @@ seed: number | null,
  */
 text: string | null, } | { "do": "look",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -86,7 +86,7 @@ session: number,
  */
 scans_of: Array<Who>, } | { "do": "credit",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -94,15 +94,15 @@ session: number,
  */
 frames: number, } | { "do": "inspect",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
- * Which body.
+ * The body.
  */
 who: Who, } | { "do": "metrics",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -110,7 +110,7 @@ session: number,
  */
 from: number, } | { "do": "events",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -126,11 +126,11 @@ until: number,
  */
 most: number, } | { "do": "source",
 /**
- * Which session.
+ * The session.
  */
 session: number, } | { "do": "check",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -138,7 +138,7 @@ session: number,
  */
 text: string, } | { "do": "edit",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -146,23 +146,19 @@ session: number,
  */
 text: string,
 /**
- * What is changed, all or nothing.
+ * The changes.
  */
 edits: Array<Edit>, } | { "do": "model",
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
  * The text.
  */
-text: string, } | { "do": "schema",
+text: string, } | { "do": "save",
 /**
- * The world's name.
- */
-world: string, } | { "do": "save",
-/**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -170,21 +166,71 @@ session: number,
  */
 text: string,
 /**
- * Another place than the file that was opened.
+ * The path of the file; the session's own without it.
  */
 to: string | null,
 /**
- * Whether a file that was changed meanwhile is written all the same.
+ * Whether a file is replaced that holds something else than this session has read or written.
  */
 over: boolean, };
 
 /**
- * A change of one key of a text.
+ * A change of a text. Keys are those of `--set`: `robots.1.at.0`; elements count from 0, and a section that stands
+ * alone is 0 or left out. Parts that hold dots or are not bare are quoted: `kinds."a.b".observation`. Everything else
+ * in the text stays as it is, byte for byte.
  */
-export type Edit = { "op": "set", key: string, value: unknown, } | { "op": "insert", key: string, at: number | null, value: unknown, } | { "op": "remove", key: string, } | { "op": "move", key: string, to: number, } | { "op": "rename", key: string, to: string, } | { "op": "paint", key: string, cells: Array<[number, number, string]>, };
+export type Edit = { "op": "set",
+/**
+ * Its key.
+ */
+key: string,
+/**
+ * The value, which is not null.
+ */
+value: unknown, } | { "op": "insert",
+/**
+ * The key of the array.
+ */
+key: string,
+/**
+ * The element's number from then on; the last without it.
+ */
+at: number | null,
+/**
+ * The element, which is not null.
+ */
+value: unknown, } | { "op": "remove",
+/**
+ * Its key.
+ */
+key: string, } | { "op": "move",
+/**
+ * Its key, which ends in its number.
+ */
+key: string,
+/**
+ * Its number from then on.
+ */
+to: number, } | { "op": "rename",
+/**
+ * The key.
+ */
+key: string,
+/**
+ * Its new name, without the tables that it is in.
+ */
+to: string, } | { "op": "paint",
+/**
+ * The key of the drawing.
+ */
+key: string,
+/**
+ * Row from the top, column from the left, and the new character.
+ */
+cells: Array<[number, number, string]>, };
 
 /**
- * What can be opened.
+ * A thing that can be opened.
  */
 export type Subject = { "kind": "scenario",
 /**
@@ -201,12 +247,12 @@ world: string, } | { "kind": "recording",
 path: string, };
 
 /**
- * How fast a run is played.
+ * The speed at which a run is played.
  */
 export type Speed = { "times": number } | "fastest";
 
 /**
- * Which body: kind, number, and part of things that have parts.
+ * The name of a body: kind, number, and part of things that have parts.
  */
 export type Who = {
 /**
@@ -232,7 +278,7 @@ export type Reply = {
 id: number, } & ({ "answer": Answer } | { "problem": Problem });
 
 /**
- * What came of a request.
+ * The outcome of a request.
  */
 export type Outcome = { "answer": Answer } | { "problem": Problem };
 
@@ -241,7 +287,7 @@ export type Outcome = { "answer": Answer } | { "problem": Problem };
  */
 export type Answer = { "is": "done" } | { "is": "files",
 /**
- * What can be opened in it, by name.
+ * Its entries that can be opened, by name.
  */
 entries: Array<FileEntry>, } | { "is": "opened",
 /**
@@ -249,7 +295,7 @@ entries: Array<FileEntry>, } | { "is": "opened",
  */
 session: number,
 /**
- * What stays as it is.
+ * The scene, which stays as it is.
  */
 scene: Scene,
 /**
@@ -265,8 +311,8 @@ names: Array<MetricName>,
  */
 first: number,
 /**
- * How often the samples were thinned by half, and numbered anew, since the session began: ask from 0
- * whenever it has changed.
+ * The number of times that the samples were thinned by half, and numbered anew, since the session began:
+ * ask from 0 whenever it has changed.
  */
 thinned: number,
 /**
@@ -306,27 +352,24 @@ read_only: boolean, } | { "is": "problems",
  */
 problems: Array<Problem>, } | { "is": "edited",
 /**
- * The text with all edits.
+ * The text.
  */
 text: string, } | { "is": "model",
 /**
- * Its tables.
+ * The table of the text: dates are strings; numbers that JSON cannot hold are null.
  */
 value: unknown,
 /**
- * Files that it names.
+ * Files that a key of the text can name, as it would name them: those below its folder, and those
+ * elsewhere that it names.
  */
-files: Array<string>, } | { "is": "schema",
+files: Array<string>, } | { "is": "saved",
 /**
- * A JSON Schema.
- */
-schema: unknown, } | { "is": "saved",
-/**
- * Where.
+ * The file, which is the session's place from now on.
  */
 place: string, } | { "is": "differs",
 /**
- * The text of the file, which was changed meanwhile.
+ * The content of the file.
  */
 text: string, };
 
@@ -347,23 +390,11 @@ line: number | null,
  */
 column: number | null,
 /**
- * The line of its end, from 1.
- */
-end_line: number | null,
-/**
- * The column of its end, from 1.
- */
-end_column: number | null,
-/**
- * The path of the key that is wrong, as `--set` takes it.
- */
-key: string | null,
-/**
- * What is wrong.
+ * The cause.
  */
 cause: string,
 /**
- * What would be right.
+ * The remedy: the right way to write or to do it.
  */
 remedy: string,
 /**
@@ -384,7 +415,7 @@ path: string,
  */
 name: string,
 /**
- * What it is.
+ * Its kind.
  */
 kind: FileKind,
 /**
@@ -393,7 +424,7 @@ kind: FileKind,
 about: string, };
 
 /**
- * What a file or a folder is.
+ * The kind of a file or a folder.
  */
 export type FileKind = "folder" | "scenario" | "run" | "recording" | "sweep" | "foreign";
 
@@ -415,7 +446,7 @@ words: string,
 unit: string, };
 
 /**
- * What the server says unasked.
+ * A message of the server that nobody asked for.
  */
 export type Notice = { "notice": "hello",
 /**
@@ -435,20 +466,20 @@ worlds: Array<string>,
  */
 read_only: boolean,
 /**
- * What the command line asked to open.
+ * The things that the command line asked to open.
  */
 open: Array<Named>, } | { "notice": "cast" } & Cast | { "notice": "status" } & Status | { "notice": "ended",
 /**
- * Which one.
+ * The session.
  */
 session: number,
 /**
- * Why.
+ * The reason.
  */
 problem: Problem, };
 
 /**
- * What the command line named: a kind as in [`Subject`](super::Subject), with its path.
+ * A thing that the command line named: a kind as in [`Subject`](super::Subject), with its path.
  */
 export type Named = {
 /**
@@ -465,11 +496,11 @@ path: string, };
  */
 export type Status = {
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
- * What it does.
+ * Its activity.
  */
 state: State,
 /**
@@ -485,7 +516,7 @@ cycles_planned: number,
  */
 time_s: number,
 /**
- * How fast it plays, or played last.
+ * Its speed now, or when it played last.
  */
 speed: Speed,
 /**
@@ -506,12 +537,12 @@ digest: string | null,
 banner: string | null, };
 
 /**
- * What a session does.
+ * The activity of a session.
  */
 export type State = "playing" | "paused" | "seeking" | "over" | "failed";
 
 /**
- * What stays as it is.
+ * The scene, which stays as it is.
  */
 export type Scene = {
 /**
@@ -581,7 +612,7 @@ runs: Array<number>, };
  */
 export type StillBody = {
 /**
- * Which body.
+ * The body.
  */
 who: Who,
 /**
@@ -665,7 +696,7 @@ layer: number, };
  */
 export type Cast = {
 /**
- * Which session.
+ * The session.
  */
 session: number,
 /**
@@ -709,7 +740,7 @@ look: Array<number>,
  */
 names: Array<[number, string]>,
 /**
- * Which bodies are agents: what can be inspected.
+ * The bodies that are agents, which can be inspected.
  */
 is_agent: Array<boolean>, };
 
@@ -784,7 +815,7 @@ level: string,
  */
 kind: string,
 /**
- * Whom it is about.
+ * The body that it is about.
  */
 who: Who | null,
 /**
@@ -809,11 +840,11 @@ unit: string,
 words: string, };
 
 /**
- * What a body perceives, decides and does.
+ * Facts and marks of a body: its percepts, decisions and deeds.
  */
 export type Inspection = {
 /**
- * Which body.
+ * The body.
  */
 who: Who,
 /**
@@ -829,7 +860,7 @@ title: string,
  */
 sections: Array<Section>,
 /**
- * What can be drawn of it.
+ * Marks to draw of it.
  */
 marks: Array<Mark>, };
 
@@ -859,7 +890,7 @@ export type Fact = {
  */
 label: string,
 /**
- * What it is.
+ * Its value.
  */
 value: Value, };
 
@@ -894,7 +925,7 @@ rows: Array<Array<Value>>, };
  */
 export type Mark = {
 /**
- * What it stands for.
+ * Its meaning.
  */
 role: Role,
 /**
@@ -911,7 +942,7 @@ weight: number,
 shape: MarkShape, };
 
 /**
- * What a mark stands for.
+ * The meaning of a mark.
  */
 export type Role = "true" | "reported" | "wish" | "done" | "refused" | "claim" | "group" | "predicted" | "chosen" | "known" | "orbit" | "target";
 

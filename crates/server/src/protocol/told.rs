@@ -86,6 +86,30 @@ pub enum Answer {
         /// Nothing for a valid text without surprises.
         problems: Vec<Problem>,
     },
+    /// A text with all edits.
+    Edited {
+        /// The text.
+        text: String,
+    },
+    /// The values in a text.
+    Model {
+        /// The table of the text: dates are strings; numbers that JSON cannot hold are null.
+        #[cfg_attr(test, ts(type = "unknown"))]
+        value: serde_json::Value,
+        /// Files that a key of the text can name, as it would name them: those below its folder, and those
+        /// elsewhere that it names.
+        files: Vec<String>,
+    },
+    /// The text is in a file.
+    Saved {
+        /// The file, which is the session's place from now on.
+        place: String,
+    },
+    /// Nothing was written, because the file holds something else than the session has read or written.
+    Differs {
+        /// The content of the file.
+        text: String,
+    },
 }
 
 /// An error as people read it: where, what, remedy.
