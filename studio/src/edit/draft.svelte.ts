@@ -42,6 +42,10 @@ export class Draft {
   #asked = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #queue: Promise<unknown> = Promise.resolve();
+  /** Where it was saved, if elsewhere than where it came from. */
+  #file: string | null = null;
+  /** Where it was to be saved when the file there was found to be another's. */
+  #wanted: string | null = null;
   /** The text that runs now. */
   #running = "";
   #checked = "";
@@ -246,12 +250,17 @@ export class Draft {
     return worked;
   }
 
-  /** Writes the text to its file, or to another. Returns whether it is there now. */
+  /** Writes the text to its file, or to another, which is its own from then on. Returns whether it is there now. */
   async save(to: string | null, over: boolean): Promise<boolean> {
     const { text } = this;
-    const answer = await this.session.tell({ do: "save", text, to, over });
-    if (answer?.is === "differs") this.theirs = answer.text;
+    const file = to ?? this.#file;
+    const answer = await this.session.tell({ do: "save", text, to: file, over });
+    if (answer?.is === "differs") {
+      this.theirs = answer.text;
+      this.#wanted = file;
+    }
     if (answer?.is !== "saved") return false;
+    this.#file = file;
     this.place = answer.place;
     this.saved = text;
     this.wasSaved = true;
@@ -260,12 +269,19 @@ export class Draft {
     return true;
   }
 
+  /** Writes the text over that of somebody else. */
+  keepMine(): Promise<boolean> {
+    return this.save(this.#wanted, true);
+  }
+
   /** Takes the file's text, as one more step that can be undone. */
   takeTheirs(): void {
     if (this.theirs === null) return;
-    this.saved = this.theirs;
+    const { theirs } = this;
+    this.#file = this.#wanted;
+    this.saved = theirs;
     this.theirs = null;
-    this.replace(this.saved);
+    this.replace(theirs);
     this.session.isUnsaved = this.isDirty;
   }
 

@@ -142,7 +142,7 @@ export class World {
     const type = schema["type"];
     if (type === "boolean") return { kind: "switch" };
     if (type === "number" || type === "integer") return { kind: "number", isWhole: type === "integer", ...limitsOf(schema) };
-    if (type === "string") return { kind: "text", names: namesOf(schema["x-names"]) };
+    if (type === "string") return { kind: "text", names: namesOf(schema) };
     if (type === "array" || "items" in schema) return { kind: "list", of: isTable(schema["items"]) ? this.resolved(schema["items"]) : ANYTHING };
     const keys = this.keysOf(schema);
     if (keys.length > 0) return { kind: "table", keys };
@@ -156,6 +156,7 @@ function described(schema: Schema): Schema {
 }
 
 function choicesOf(schema: Schema): Choice[] | null {
+  if (typeof schema["const"] === "string") return [{ value: schema["const"], words: "" }];
   const listed = schema["enum"];
   if (Array.isArray(listed) && listed.every((one) => typeof one === "string" || one === null)) {
     return listed.filter((one): one is string => typeof one === "string").map((value) => ({ value, words: "" }));
@@ -182,9 +183,12 @@ function limitsOf(schema: Schema): { least: number | null; most: number | null }
   return { least: limit("minimum") ?? limit("exclusiveMinimum"), most: limit("maximum") ?? limit("exclusiveMaximum") };
 }
 
-function namesOf(given: Json | undefined): string[] {
-  if (typeof given === "string") return [given];
-  return Array.isArray(given) ? given.filter((one): one is string => typeof one === "string") : [];
+/** Names that are built in, and the table whose keys are names too, with a # before it. */
+function namesOf(schema: Schema): string[] {
+  const table = schema["x-names"];
+  if (typeof table !== "string") return [];
+  const builtIn = Array.isArray(schema["examples"]) ? schema["examples"].filter((one): one is string => typeof one === "string") : [];
+  return [...builtIn, `#${table}`];
 }
 
 /** The description of a schema, or nothing. */
@@ -203,7 +207,8 @@ const UNITS: [RegExp, string][] = [
   [/_m_s$/, "m/s"], [/_deg_s$/, "°/s"], [/_bit_s$/, "bit/s"], [/_per_s$/, "1/s"], [/_deg$/, "°"], [/_rad$/, "rad"], [/_gib$/, "GiB"], [/_m$/, "m"], [/_s$/, "s"],
 ];
 
-/** The unit that a key's name tells. */
-export function unitOf(key: string): string {
+/** The unit that a schema or a key's name tells. */
+export function unitOf(key: string, schema: Schema | null = null): string {
+  if (schema && typeof schema["x-unit"] === "string") return schema["x-unit"];
   return UNITS.find(([end]) => end.test(key))?.[1] ?? "";
 }

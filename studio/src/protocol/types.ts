@@ -156,7 +156,11 @@ session: number,
 /**
  * The text.
  */
-text: string, } | { "do": "save",
+text: string, } | { "do": "schema",
+/**
+ * The world's name.
+ */
+world: string, } | { "do": "save",
 /**
  * The session.
  */
@@ -363,7 +367,11 @@ value: unknown,
  * Files that a key of the text can name, as it would name them: those below its folder, and those
  * elsewhere that it names.
  */
-files: Array<string>, } | { "is": "saved",
+files: Array<string>, } | { "is": "schema",
+/**
+ * A JSON Schema.
+ */
+schema: unknown, } | { "is": "saved",
 /**
  * The file, which is the session's place from now on.
  */
@@ -389,6 +397,18 @@ line: number | null,
  * Its column, from 1.
  */
 column: number | null,
+/**
+ * Line of its end, from 1.
+ */
+end_line: number | null,
+/**
+ * Column behind its end, from 1.
+ */
+end_column: number | null,
+/**
+ * Key of the scenario that is wrong, as `--set` names it: `robots.1.at.0`.
+ */
+key: string | null,
 /**
  * The cause.
  */

@@ -45,7 +45,7 @@ describe("fields", () => {
   });
 
   test("units come from the names of keys", () => {
-    expect(["box_size_m", "v_m_s", "heading_deg", "dt_s", "omega_max_deg_s", "seed"].map(unitOf)).toEqual(["m", "m/s", "°", "s", "°/s", ""]);
+    expect(["box_size_m", "v_m_s", "heading_deg", "dt_s", "omega_max_deg_s", "seed"].map((key) => unitOf(key))).toEqual(["m", "m/s", "°", "s", "°/s", ""]);
   });
 
   test("an empty field takes the key away, an equal one changes nothing", () => {
