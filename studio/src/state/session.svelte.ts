@@ -54,8 +54,8 @@ export class Session {
   eventKinds = $state.raw<ReadonlySet<string>>(new Set());
   /** The text that this run was started with instead of the file's. */
   text = $state.raw<string | null>(null);
-  /** What the text view holds, while it differs from the file. */
-  draft: string | null = null;
+  /** Whether its text was changed and not saved. */
+  isUnsaved = $state(false);
   /** Cycle under the pointer in the timeline or a chart. */
   cursor = $state<number | null>(null);
   /** Counts starts, so that views begin anew. */
@@ -277,6 +277,15 @@ export class Session {
 
   check(text: string): Promise<Answer> {
     return this.#ask({ do: "check", text });
+  }
+
+  /** Sends a call of the editor's. */
+  ask(call: Call): Promise<Answer> {
+    return this.id === 0 ? Promise.reject(new Refused(NO_SESSION)) : this.#line.ask(call);
+  }
+
+  complain(problem: Problem): void {
+    this.#line.problem(problem);
   }
 
   /** Sends a call and shows its problem, if there is one. */
