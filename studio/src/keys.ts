@@ -3,7 +3,7 @@
 export type Action =
   | "play" | "play-back" | "next" | "back" | "next-ten" | "back-ten" | "slower" | "faster"
   | "next-event" | "previous-event" | "filter" | "fit" | "center" | "trails"
-  | "left" | "right" | "up" | "down" | "nearer" | "farther" | "deselect" | "help" | "session";
+  | "left" | "right" | "up" | "down" | "nearer" | "farther" | "deselect" | "edit" | "help" | "session";
 
 interface Key {
   action: Action;
@@ -36,6 +36,7 @@ export const KEYS: readonly Key[] = [
   { action: "nearer", keys: ["+", "="], shown: ["+"], words: "nearer" },
   { action: "farther", keys: ["-"], shown: ["−"], words: "farther" },
   { action: "session", keys: ["1", "2", "3", "4"], shown: ["1", "…", "4"], words: "go to a session" },
+  { action: "edit", keys: ["e"], shown: ["e"], words: "draw on the picture, or watch it" },
   { action: "deselect", keys: ["Escape"], shown: ["Esc"], words: "deselect" },
   { action: "help", keys: ["?"], shown: ["?"], words: "this help" },
 ];

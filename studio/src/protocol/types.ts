@@ -144,7 +144,102 @@ session: number,
 /**
  * The text.
  */
-text: string, };
+text: string, } | { "do": "edit",
+/**
+ * The session.
+ */
+session: number,
+/**
+ * The text.
+ */
+text: string,
+/**
+ * The changes.
+ */
+edits: Array<Edit>, } | { "do": "model",
+/**
+ * The session.
+ */
+session: number,
+/**
+ * The text.
+ */
+text: string, } | { "do": "schema",
+/**
+ * The world's name.
+ */
+world: string, } | { "do": "save",
+/**
+ * The session.
+ */
+session: number,
+/**
+ * The text.
+ */
+text: string,
+/**
+ * The path of the file; the session's own without it.
+ */
+to: string | null,
+/**
+ * Whether a file is replaced that holds something else than this session has read or written.
+ */
+over: boolean, };
+
+/**
+ * A change of a text. Keys are those of `--set`: `robots.1.at.0`; elements count from 0, and a section that stands
+ * alone is 0 or left out. Parts that hold dots or are not bare are quoted: `kinds."a.b".observation`. Everything else
+ * in the text stays as it is, byte for byte.
+ */
+export type Edit = { "op": "set",
+/**
+ * Its key.
+ */
+key: string,
+/**
+ * The value, which is not null.
+ */
+value: unknown, } | { "op": "insert",
+/**
+ * The key of the array.
+ */
+key: string,
+/**
+ * The element's number from then on; the last without it.
+ */
+at: number | null,
+/**
+ * The element, which is not null.
+ */
+value: unknown, } | { "op": "remove",
+/**
+ * Its key.
+ */
+key: string, } | { "op": "move",
+/**
+ * Its key, which ends in its number.
+ */
+key: string,
+/**
+ * Its number from then on.
+ */
+to: number, } | { "op": "rename",
+/**
+ * The key.
+ */
+key: string,
+/**
+ * Its new name, without the tables that it is in.
+ */
+to: string, } | { "op": "paint",
+/**
+ * The key of the drawing.
+ */
+key: string,
+/**
+ * Row from the top, column from the left, and the new character.
+ */
+cells: Array<[number, number, string]>, };
 
 /**
  * A thing that can be opened.
@@ -287,7 +382,32 @@ left_out: number, } | { "is": "problems",
 /**
  * Nothing for a valid text without surprises.
  */
-problems: Array<Problem>, };
+problems: Array<Problem>, } | { "is": "edited",
+/**
+ * The text.
+ */
+text: string, } | { "is": "model",
+/**
+ * The table of the text: dates are strings; numbers that JSON cannot hold are null.
+ */
+value: unknown,
+/**
+ * Files that a key of the text can name, as it would name them: those below its folder, and those
+ * elsewhere that it names.
+ */
+files: Array<string>, } | { "is": "schema",
+/**
+ * A JSON Schema.
+ */
+schema: unknown, } | { "is": "saved",
+/**
+ * The file, which is the session's place from now on.
+ */
+place: string, } | { "is": "differs",
+/**
+ * The content of the file.
+ */
+text: string, };
 
 /**
  * An error as people read it: where, what, remedy.

@@ -6,6 +6,7 @@ import type { AddressInfo } from "node:net";
 import { extname, join, normalize } from "node:path";
 import { WebSocketServer, type WebSocket } from "ws";
 import type { Answer, Call, Notice, Problem, Request, Status, Subject, SweepRun } from "../../src/protocol";
+import { check, edited, modelOf, SCHEMA, textOf } from "./edit";
 import { encodeFrame } from "./encode";
 import { airplanes, chain, robots, type FakeWorld } from "./scenes";
 
@@ -17,18 +18,6 @@ const TYPES: Record<string, string> = {
 const WORLDS: Record<string, () => FakeWorld> = {
   robots: () => robots(24), crowd: () => robots(10_000), chain, airspace: airplanes,
 };
-
-const TEXT = `# A made-up scenario.
-format = 1
-world = "robots"
-name = "Made-up hall"
-seed = 1
-
-[[robots]]
-name = "couriers"
-count = 24
-size = 2
-`;
 
 function problemOf(cause: string, remedy: string, line: number | null = null, column: number | null = null): Problem {
   return { place: "made-up.toml", line, column, end_line: null, end_column: null, key: null, cause, remedy, is_warning: false };
@@ -45,7 +34,7 @@ class Run {
   seed: string;
   leftOut = 0;
   scansOf: { kind: string; number: number; part: number | null }[] = [];
-  text = TEXT;
+  text: string;
   #fraction = 0;
   #owed = false;
   readonly id: number;
@@ -57,6 +46,7 @@ class Run {
     this.world = world;
     this.#socket = socket;
     this.seed = String(seed ?? 1);
+    this.text = textOf(world.scene.world);
   }
 
   status(): Status {
@@ -122,6 +112,8 @@ export class FakeServer {
   open: Subject[] = [];
   /** What the way in answers; anything but 204 refuses sockets, too. */
   entrance = 204;
+  /** The text that a file would have by now, if somebody else had changed it. */
+  theirs: string | null = null;
   readonly #dist: string;
   #http: Server | null = null;
   #sockets: WebSocketServer | null = null;
@@ -204,6 +196,12 @@ export class FakeServer {
     socket.on("close", () => mine.forEach((id) => this.#runs.delete(id)));
   }
 
+  #save(to: string | null, over: boolean): Answer {
+    if (this.theirs !== null && !over) return { is: "differs", text: this.theirs };
+    this.theirs = null;
+    return { is: "saved", place: to ?? "made-up.toml" };
+  }
+
   #tick(): void {
     for (const run of this.#runs.values()) {
       const before = JSON.stringify(run.status());
@@ -232,9 +230,10 @@ export class FakeServer {
       run.goTo(0);
       return { is: "opened", session: run.id, scene: world.scene, status: run.status() };
     }
+    if (call.do === "schema") return { is: "schema", schema: SCHEMA };
     const run = this.#runs.get(call.session);
     if (!run) throw problemOf("no such session", "open it again");
-    const answer = act(call, run);
+    const answer = call.do === "save" ? this.#save(call.to, call.over) : act(call, run);
     if (call.do === "close") this.#runs.delete(run.id);
     if (answer.is === "done") say({ notice: "status", ...run.status() });
     return answer;
@@ -276,7 +275,7 @@ function runs(): Answer {
   };
 }
 
-function act(call: Exclude<Call, { do: "files" | "open" | "runs" }>, run: Run): Answer {
+function act(call: Exclude<Call, { do: "files" | "open" | "runs" | "schema" | "save" }>, run: Run): Answer {
   switch (call.do) {
     case "play": run.playing = true; run.speed = call.speed; return { is: "done" };
     case "pause": run.playing = false; return { is: "done" };
@@ -295,6 +294,8 @@ function act(call: Exclude<Call, { do: "files" | "open" | "runs" }>, run: Run): 
     case "tables": return { is: "tables", names: run.world.scene.is_recording ? ["events", "trajectories"] : [] };
     case "source": return { is: "source", place: "made-up.toml", text: run.text, read_only: false };
     case "check": return { is: "problems", problems: check(call.text) };
+    case "edit": return { is: "edited", text: edited(call.text, call.edits) };
+    case "model": return model(call.text);
   }
 }
 
@@ -308,13 +309,12 @@ function restart(run: Run, seed: number | null, text: string | null): Answer {
   return { is: "opened", session: run.id, scene: run.world.scene, status: run.status() };
 }
 
-/** Any key that is not known is a problem, as the program itself would say. */
-function check(text: string): Problem[] {
-  const known = /^(format|world|name|seed|count|size|cycles)$/;
-  return text.split("\n").flatMap((line, i) => {
-    const key = /^(\w+)\s*=/.exec(line)?.[1];
-    return key !== undefined && !known.test(key) ? [problemOf(`there is no key \`${key}\``, "did you mean `count`?", i + 1, 1)] : [];
-  });
+function model(text: string): Answer {
+  try {
+    return { is: "model", value: modelOf(text), files: [] };
+  } catch (error) {
+    throw problemOf(String(error), "write TOML");
+  }
 }
 
 function metrics(run: Run, from: number): Answer {

@@ -123,7 +123,7 @@ pub(crate) fn problem(error: &InputError) -> Problem {
         column: number(column),
         end_line: number(end_line),
         end_column: number(end_column),
-        key: error.key().map(String::from),
+        key: error.key().map(Into::into),
         cause: error.cause().into(),
         remedy: error.remedy().into(),
         is_warning: false,

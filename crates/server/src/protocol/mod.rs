@@ -25,6 +25,7 @@
 //! [`FRAMES_PER_S`](crate::FRAMES_PER_S) are made in a second; those that were due and could not be sent are left
 //! out and counted.
 
+mod edit;
 mod inspected;
 mod request;
 mod shown;
@@ -32,6 +33,7 @@ mod told;
 #[cfg(test)]
 mod typescript;
 
+pub use edit::Edit;
 pub use inspected::{Fact, Inspection, Mark, MarkShape, Role, Section, Table, Value};
 pub use request::{Call, Request, Speed, Subject, Who};
 pub use shown::{Cast, Event, Floor, FrameText, Look, Scan, Scene, Shape, StillBody};

@@ -1,6 +1,6 @@
 //! The requests of a page.
 
-use super::SessionId;
+use super::{Edit, SessionId};
 use serde::{Deserialize, Serialize};
 
 /// A request; its reply has the same number.
@@ -133,6 +133,34 @@ pub enum Call {
         session: SessionId,
         /// The text.
         text: String,
+    },
+    /// Changes a text that stands for the session's scenario: all edits, one after the other, or none. Nothing is
+    /// kept of it here.
+    Edit {
+        /// The session.
+        session: SessionId,
+        /// The text.
+        text: String,
+        /// The changes.
+        edits: Vec<Edit>,
+    },
+    /// Asks for the values in a text that stands for the session's scenario.
+    Model {
+        /// The session.
+        session: SessionId,
+        /// The text.
+        text: String,
+    },
+    /// Writes a text into a file, which is the session's place from then on.
+    Save {
+        /// The session.
+        session: SessionId,
+        /// The text.
+        text: String,
+        /// The path of the file; the session's own without it.
+        to: Option<String>,
+        /// Whether a file is replaced that holds something else than this session has read or written.
+        over: bool,
     },
 }
 

@@ -18,7 +18,6 @@ pub struct Reply {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]
-#[expect(clippy::large_enum_variant, reason = "there is one at a time, for an instant")]
 pub enum Outcome {
     /// The answer.
     Answer(Answer),
@@ -102,6 +101,30 @@ pub enum Answer {
         /// Nothing for a valid text without surprises.
         problems: Vec<Problem>,
     },
+    /// A text with all edits.
+    Edited {
+        /// The text.
+        text: String,
+    },
+    /// The values in a text.
+    Model {
+        /// The table of the text: dates are strings; numbers that JSON cannot hold are null.
+        #[cfg_attr(test, ts(type = "unknown"))]
+        value: serde_json::Value,
+        /// Files that a key of the text can name, as it would name them: those below its folder, and those
+        /// elsewhere that it names.
+        files: Vec<String>,
+    },
+    /// The text is in a file.
+    Saved {
+        /// The file, which is the session's place from now on.
+        place: String,
+    },
+    /// Nothing was written, because the file holds something else than the session has read or written.
+    Differs {
+        /// The content of the file.
+        text: String,
+    },
 }
 
 /// An error as people read it: where, what, remedy.
@@ -119,11 +142,11 @@ pub struct Problem {
     /// Column behind its end, from 1.
     pub end_column: Option<u32>,
     /// Key of the scenario that is wrong, as `--set` names it: `robots.1.at.0`.
-    pub key: Option<String>,
+    pub key: Option<Box<str>>,
     /// The cause.
     pub cause: String,
     /// The remedy: the right way to write or to do it.
-    pub remedy: String,
+    pub remedy: Box<str>,
     /// Whether the text is valid all the same.
     pub is_warning: bool,
 }
@@ -133,7 +156,7 @@ impl Problem {
     pub fn new(
         place: impl Into<String>,
         cause: impl Into<String>,
-        remedy: impl Into<String>,
+        remedy: impl Into<Box<str>>,
     ) -> Self {
         Self {
             place: place.into(),

@@ -26,9 +26,9 @@ fn types() -> String {
         ($($name:ty),+ $(,)?) => { [$(declared::<$name>(&config)),+] };
     }
     let types = all![
-        Request, Call, Subject, Speed, Who, Reply, Outcome, Answer, Problem, FileEntry, FileKind,
-        MetricName, Notice, Named, Status, State, Scene, Floor, StillBody, Shape, Look, Cast,
-        SweepRun, FrameText, Scan, Event, Inspection, Section, Fact, Value, Table, Mark, Role,
+        Request, Call, Edit, Subject, Speed, Who, Reply, Outcome, Answer, Problem, FileEntry,
+        FileKind, MetricName, Notice, Named, Status, State, Scene, Floor, StillBody, Shape, Look,
+        Cast, SweepRun, FrameText, Scan, Event, Inspection, Section, Fact, Value, Table, Mark, Role,
         MarkShape,
     ];
     let version = format!(
