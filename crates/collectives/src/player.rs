@@ -202,7 +202,7 @@ mod tests {
             }
         }
 
-        /// Where both rest, q is the Boltzmann distribution, the minimum of eq. 7.
+        /// The Boltzmann distribution is where both rest: the minimum of eq. 7.
         #[test]
         fn without_cooling_both_updates_rest_at_the_minimum_of_the_lagrangian(
             costs in prop::collection::vec(0.0f64..3.0, 2..8),

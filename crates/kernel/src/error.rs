@@ -4,15 +4,18 @@
 //! be right; the command then ends with exit code 2 and has written nothing.
 
 use std::fmt;
+use std::ops::Range;
 
 /// Wrong input: a file, an option, a table that does not sum to 1.
 ///
 /// Displayed as `place:line:column: cause`, the offending line with a caret under it where
-/// the text is known, and `help: remedy`.
+/// the text is known, and `help: remedy`. The key is for programs that know the text by its keys.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InputError {
     place: String,
-    position: Option<Position>,
+    /// In a box, like the key, because errors travel in results by value.
+    position: Option<Box<Position>>,
+    key: Option<Box<str>>,
     cause: String,
     remedy: String,
 }
@@ -22,6 +25,8 @@ pub struct InputError {
 struct Position {
     line: usize,
     column: usize,
+    /// Line and column behind the wrong part, where it is known.
+    end: Option<(usize, usize)>,
     /// The line itself, where the text is known.
     text: Option<String>,
 }
@@ -36,6 +41,7 @@ impl InputError {
         Self {
             place: place.to_string(),
             position: None,
+            key: None,
             cause: cause.into(),
             remedy: remedy.into(),
         }
@@ -44,23 +50,38 @@ impl InputError {
     /// Adds line and column (both from 1).
     #[must_use]
     pub fn at(mut self, line: usize, column: usize) -> Self {
-        self.position = Some(Position { line, column, text: None });
+        self.position = Some(Box::new(Position { line, column, end: None, text: None }));
         self
     }
 
     /// Adds line and column of the byte at `offset` in `text`, and quotes that line.
     #[must_use]
     pub fn in_text(mut self, text: &str, offset: usize) -> Self {
-        let mut offset = offset.min(text.len());
-        // An offset inside a character counts as its start.
-        while !text.is_char_boundary(offset) {
-            offset -= 1;
-        }
+        let offset = boundary(text, offset);
+        let (line, column) = line_and_column(text, offset);
         let start = text[..offset].rfind('\n').map_or(0, |i| i + 1);
-        let line = text[..offset].matches('\n').count() + 1;
-        let column = text[start..offset].chars().count() + 1;
         let quoted = text[start..].lines().next().unwrap_or("").to_string();
-        self.position = Some(Position { line, column, text: Some(quoted) });
+        let text = Some(quoted);
+        self.position = Some(Box::new(Position { line, column, end: None, text }));
+        self
+    }
+
+    /// Adds line and column of the bytes `span` of `text` and of their end, and quotes the first
+    /// line.
+    #[must_use]
+    pub fn over(self, text: &str, span: Range<usize>) -> Self {
+        let end = line_and_column(text, boundary(text, span.end.max(span.start)));
+        let mut error = self.in_text(text, span.start);
+        if let Some(position) = &mut error.position {
+            position.end = Some(end);
+        }
+        error
+    }
+
+    /// Adds the key that is wrong, as `--set` names it: `robots.1.at.0`.
+    #[must_use]
+    pub fn with_key(mut self, key: impl Into<String>) -> Self {
+        self.key = Some(key.into().into());
         self
     }
 
@@ -72,6 +93,16 @@ impl InputError {
     /// Line and column, from 1, where known.
     pub fn position(&self) -> Option<(usize, usize)> {
         self.position.as_ref().map(|p| (p.line, p.column))
+    }
+
+    /// Line and column behind the wrong part, from 1, where known.
+    pub fn end(&self) -> Option<(usize, usize)> {
+        self.position.as_ref()?.end
+    }
+
+    /// The key that is wrong, as `--set` names it, where known: `robots.1.at.0`.
+    pub fn key(&self) -> Option<&str> {
+        self.key.as_deref()
     }
 
     /// The cause: a sentence that says what is wrong.
@@ -92,7 +123,7 @@ impl fmt::Display for InputError {
             write!(f, ":{}:{}", p.line, p.column)?;
         }
         write!(f, ": {}", self.cause)?;
-        if let Some(Position { line, column, text: Some(text) }) = &self.position {
+        if let Some(Position { line, column, text: Some(text), .. }) = self.position.as_deref() {
             let number = line.to_string();
             let shown = text.replace('\t', " ");
             write!(
@@ -110,6 +141,22 @@ impl fmt::Display for InputError {
 
 impl std::error::Error for InputError {}
 
+/// Returns the last start of a character that is not behind `offset`.
+fn boundary(text: &str, offset: usize) -> usize {
+    let mut offset = offset.min(text.len());
+    while !text.is_char_boundary(offset) {
+        offset -= 1;
+    }
+    offset
+}
+
+/// Returns line and column of the byte at `offset`, the start of a character.
+fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
+    let before = &text[..offset];
+    let start = before.rfind('\n').map_or(0, |i| i + 1);
+    (before.matches('\n').count() + 1, before[start..].chars().count() + 1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -126,9 +173,20 @@ mod tests {
     }
 
     #[test]
+    fn a_span_adds_the_end_and_a_key_the_key_and_neither_changes_what_is_displayed() {
+        let text = "a = [\n  1,\n]\n";
+        let plain = InputError::new("x.toml", "c", "r").in_text(text, 4);
+        let spanned = InputError::new("x.toml", "c", "r").over(text, 4..12).with_key("a");
+        assert_eq!((spanned.position(), spanned.end()), (Some((1, 5)), Some((3, 2))));
+        assert_eq!((spanned.key(), plain.key(), plain.end()), (Some("a"), None, None));
+        assert_eq!(spanned.to_string(), plain.to_string());
+    }
+
+    #[test]
     fn an_offset_behind_the_end_or_inside_a_character_is_no_panic() {
         let text = "é";
         assert_eq!(InputError::new("f", "c", "r").in_text(text, 1).position(), Some((1, 1)));
         assert_eq!(InputError::new("f", "c", "r").in_text(text, 99).position(), Some((1, 2)));
+        assert_eq!(InputError::new("f", "c", "r").over(text, 1..99).end(), Some((1, 2)));
     }
 }

@@ -184,6 +184,19 @@ fn of_runs(result: &MethodResult, estimate: &Estimate) -> String {
     }
 }
 
+/// Returns the sentence without which the shield's deeds would pass for those of a method.
+fn shielded(results: &[MethodResult]) -> Option<String> {
+    let changed = |r: &&MethodResult| r.shield_overrides.mean.is_some_and(|mean| mean > 0.0);
+    let names: Vec<_> = results.iter().filter(changed).map(|r| r.method).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "The shield changed commands of {}: there it is the shield that keeps airplanes apart, in part \
+             or in whole. Fly the methods bare with --set shield=off.",
+            names.join(", ")
+        )
+    })
+}
+
 /// Returns what a reader must know about the runs.
 fn note(results: &[MethodResult]) -> String {
     let of = |seeds: Seeds| -> Option<String> {
@@ -192,6 +205,7 @@ fn note(results: &[MethodResult]) -> String {
         (!names.is_empty()).then_some(names)
     };
     let mut words = vec!["Every method flies the same traffic.".to_string()];
+    words.extend(shielded(results));
     if of(Seeds::Decide).is_some() {
         words.push("Means over runs, with their 95 % intervals.".into());
     }
@@ -245,5 +259,17 @@ mod tests {
         let [pc, none] = &table.rows[..] else { panic!("two rows: {table:?}") };
         assert!(pc[0] == "pc" && pc[1].starts_with("3/3"), "{pc:?}");
         assert!(none[0] == "none" && none[1].starts_with("0/3"), "{none:?}");
+        assert!(!table.note.contains("shield"), "{}", table.note);
+    }
+
+    #[test]
+    fn what_the_shield_did_is_not_taken_for_a_methods_own() {
+        let text = "format = 1\nworld = \"airspace\"\n\
+                    [airspace.generator]\nkind = \"superconflict\"\nn = 4\n";
+        let source = Source::new("four", text, "");
+        let found = compare(&source, &[Method::None], (1, 2), 2, &mut |_, _| ()).expect("valid");
+        assert_eq!(found[0].loss_free, 2);
+        let note = table("t", &found).note;
+        assert!(note.contains("The shield changed commands of none:"), "{note}");
     }
 }

@@ -49,7 +49,7 @@ impl Source {
         Some(found)
     }
 
-    /// Creates an error at a key; without a position where the key is not in the text.
+    /// Creates an error at a key; with the key alone where it is not in the text.
     pub fn error_at(
         &self,
         path: &str,
@@ -60,7 +60,10 @@ impl Source {
             let (span, root) = (root.span(), DeValue::Table(root.into_inner()));
             find(&Spanned::new(span, root), path).map(|(key, _)| key)
         });
-        self.error(span, cause, remedy)
+        match span {
+            Some(span) => self.error(span, cause, remedy),
+            None => self.error(None, cause, remedy).with_key(path),
+        }
     }
 
     /// Creates the error for a key that is given and does nothing; `because` completes the

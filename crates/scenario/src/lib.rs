@@ -14,6 +14,7 @@ mod explain;
 pub mod file;
 mod keys;
 pub mod kind;
+mod locate;
 mod meaning;
 mod overrides;
 mod remark;

@@ -1,6 +1,7 @@
 //! The text of a scenario, and its parser.
 
 use super::explain::explain;
+use super::locate::{locate, path};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use sidestep_kernel::InputError;
@@ -108,8 +109,18 @@ impl Source {
         let (cause, remedy) = explain(error, also, self.example());
         let told = InputError::new(&self.place, cause, remedy);
         match error.span() {
-            Some(span) => told.in_text(&self.text, span.start),
+            Some(span) => self.told_at(told, span),
             None => told,
+        }
+    }
+
+    /// Adds a place of the text to an error: position, end and key.
+    fn told_at(&self, error: InputError, span: Range<usize>) -> InputError {
+        let way = locate(&self.text, &span);
+        let error = error.over(&self.text, span);
+        match way {
+            Some(way) => error.with_key(path(&way)),
+            None => error,
         }
     }
 
@@ -145,8 +156,8 @@ impl Source {
         is_sweep.then(|| self.error(None, "this is a sweep, not a scenario", remedy))
     }
 
-    /// Creates an error in the text, at a span if one is given. The empty span of a default counts
-    /// as none.
+    /// Creates an error in the text, at a span if one is given, with the innermost key whose name or
+    /// value contains it. The empty span of a default counts as none.
     pub fn error(
         &self,
         span: impl Into<Option<Range<usize>>>,
@@ -155,7 +166,7 @@ impl Source {
     ) -> InputError {
         let error = InputError::new(&self.place, cause, remedy);
         match span.into().filter(|span| *span != (0..0)) {
-            Some(span) => error.in_text(&self.text, span.start),
+            Some(span) => self.told_at(error, span),
             None => error,
         }
     }
@@ -219,6 +230,9 @@ mod tests {
             let error = read(&format!("format = 1\nworld = \"w\"\n{line}\n")).expect_err(line);
             assert_eq!(error.position(), Some(at), "{error}");
             assert!(error.remedy().contains(remedy), "{error}");
+            // What is no TOML has no keys.
+            let key = line.split_once(' ').map(|(key, _)| key).filter(|_| !line.contains("= ="));
+            assert_eq!(error.key(), key, "{error}");
         }
         assert!(read("n = 1\nworld = \"w\"").expect_err("no format").cause().contains("format"));
     }
@@ -227,7 +241,9 @@ mod tests {
     fn the_place_of_a_default_is_nowhere() {
         let source = Source::new("s.toml", "a = 1", "");
         assert_eq!(source.error(0..0, "c", "r").position(), None);
-        assert_eq!(source.error(4..5, "c", "r").position(), Some((1, 5)));
+        let error = source.error(4..5, "c", "r");
+        assert_eq!((error.position(), error.end()), (Some((1, 5)), Some((1, 6))));
+        assert_eq!(error.key(), Some("a"));
         let part = InputError::new("part", "is wrong", "mend it");
         assert_eq!(source.error_of(4..5, &part).cause(), "part: is wrong");
     }

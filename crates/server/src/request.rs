@@ -16,15 +16,15 @@ struct Numbered {
 ///
 /// # Errors
 /// With the number of the request, 0 if it cannot be found, and what is wrong.
-pub fn decode(text: &str) -> Result<Request, (u32, Problem)> {
+pub fn decode(text: &str) -> Result<Request, Box<(u32, Problem)>> {
     if text.len() > MOST_REQUEST_BYTES {
         let cause = format!("it has more than {MOST_REQUEST_BYTES} bytes");
-        return Err((0, Problem::new("request", cause, "send less at a time")));
+        return Err(Box::new((0, Problem::new("request", cause, "send less at a time"))));
     }
     serde_json::from_str(text).map_err(|error| {
         let id = serde_json::from_str(text).map_or(0, |Numbered { id }| id);
         let cause = format!("it cannot be read: {error}");
-        (id, Problem::new("request", cause, "send JSON as the protocol has it"))
+        Box::new((id, Problem::new("request", cause, "send JSON as the protocol has it")))
     })
 }
 
@@ -92,9 +92,9 @@ mod tests {
             (r#"{"id":6,"call":{"do":"pause","session":1,"more":1}}"#, 6),
             (r#"{"id":7,"call":{"do":"seek","session":1,"cycle":-3}}"#, 7),
         ] {
-            assert_eq!(decode(text).map_err(|(id, _)| id), Err(id), "{text}");
+            assert_eq!(decode(text).map_err(|unread| unread.0), Err(id), "{text}");
         }
-        let (_, problem) = decode(&" ".repeat(MOST_REQUEST_BYTES + 1)).expect_err("too long");
+        let (_, problem) = *decode(&" ".repeat(MOST_REQUEST_BYTES + 1)).expect_err("too long");
         assert!(problem.cause.contains("bytes"));
     }
 

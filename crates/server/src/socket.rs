@@ -111,7 +111,10 @@ impl Desk {
     fn take(&mut self, text: &str) {
         self.outbox.expect_reply();
         match decode(text) {
-            Err((id, problem)) => refuse(&self.outbox, id, problem),
+            Err(unread) => {
+                let (id, problem) = *unread;
+                refuse(&self.outbox, id, problem);
+            }
             Ok(request) => {
                 let id = request.id;
                 let outbox = self.outbox.clone();

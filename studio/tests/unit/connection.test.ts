@@ -88,7 +88,7 @@ test("replies find their calls, also out of order", async () => {
 test("a refusal carries place, cause and remedy", async () => {
   sockets[0]!.onopen!();
   const call = connection.ask({ do: "pause", session: 9 });
-  const problem = { place: "session 9", line: null, column: null, cause: "none such", remedy: "open it", is_warning: false };
+  const problem = { place: "session 9", line: null, column: null, end_line: null, end_column: null, key: null, cause: "none such", remedy: "open it", is_warning: false };
   sockets[0]!.onmessage!({ data: JSON.stringify({ id: 1, problem }) });
   await expect(call).rejects.toMatchObject({ problem });
 });

@@ -1,6 +1,6 @@
 //! `sidestep learn`: error distributions of a real robot, from its logs.
 
-use crate::console::Console;
+use crate::console::{Console, LINE_COLS, wrapped};
 use crate::exit::{ExitCode, Failure};
 use clap::{Args, Subcommand};
 use serde::Serialize;
@@ -9,7 +9,7 @@ use sidestep::kernel::InputError;
 use sidestep::learn::EstimateOptions;
 use sidestep::learn::effector::{self, EffectorModel};
 use sidestep::learn::profile;
-use sidestep::learn::sensor::{self, Scanner, SensorModel, SensorOptions};
+use sidestep::learn::sensor::{self, Scanner, SensorModel, SensorOptions, SensorProfile};
 use sidestep::scenario::file::read_text;
 use sidestep_session::{csv_table, replace};
 use std::fmt::Display;
@@ -265,29 +265,65 @@ pub(crate) fn learn(args: &LearnArgs, console: Console) -> Result<ExitCode, Fail
             let add = |place: &str, text: &str, name: &str| {
                 profile::with_sensor(place, text, name, &model)
             };
-            tell(&model.report, &args.target.add("sensors", add)?, console);
+            let assumed = || [assumptions(&model.profile), smoothing(&args.estimate)].concat();
+            tell(&model.report, &args.target.add("sensors", add)?, assumed, console);
         }
         What::Effector(args) => {
             let model = learn_effector(args, console)?;
             let add = |place: &str, text: &str, name: &str| {
                 profile::with_effector(place, text, name, &model)
             };
-            tell(&model.report, &args.target.add("effectors", add)?, console);
+            let assumed = || smoothing(&args.estimate);
+            tell(&model.report, &args.target.add("effectors", add)?, assumed, console);
         }
     }
     Ok(ExitCode::Done)
 }
 
-/// Prints what was learned and `written`, the line about the profile; if quiet, that line alone.
-fn tell(report: &(impl Serialize + Display), written: &str, console: Console) {
+/// Prints what was learned and `written`, the line about the profile, with what the profile takes for granted; if
+/// quiet, that line alone.
+fn tell(
+    report: &(impl Serialize + Display),
+    written: &str,
+    assumed: impl FnOnce() -> String,
+    console: Console,
+) {
     console.result_or_short(
         report,
         || written.to_owned(),
         || match written {
             "" => report.to_string(),
-            _ => format!("{report}\n{written}"),
+            _ => format!("{report}\n{written}{}", assumed()),
         },
     );
+}
+
+/// Returns what the log does not tell about a sensor, and the profile must say.
+fn assumptions(profile: &SensorProfile) -> String {
+    let bearings: Vec<String> = profile.bearings_deg.iter().map(f64::to_string).collect();
+    let (bearings, range_m) = (bearings.join(", "), profile.range_m);
+    let beams =
+        format!("Its beams look at {bearings} degrees, {range_m} m far (--bearings, --range).");
+    let other =
+        |(kind, seen): &(String, String)| format!("It sees a {kind} as `{seen}` (designates).");
+    let lines = std::iter::once(beams).chain(profile.designates.iter().map(other));
+    lines.map(|line| indented(&line)).collect()
+}
+
+/// Returns the line on how probabilities of the profile differ from shares of counts.
+fn smoothing(estimate: &EstimateArgs) -> String {
+    let alpha = estimate.alpha;
+    let words = format!(
+        "Its probabilities are of counts with {alpha} added to each (--alpha), so that nothing is impossible."
+    );
+    match alpha > 0.0 {
+        true => indented(&words),
+        false => String::new(),
+    }
+}
+
+fn indented(words: &str) -> String {
+    format!("  {}\n", wrapped(words, LINE_COLS - 2).join("\n  "))
 }
 
 fn learn_sensor(args: &SensorArgs) -> Result<SensorModel, InputError> {

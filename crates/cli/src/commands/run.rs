@@ -2,7 +2,7 @@
 
 use super::finish::travel;
 use super::sweep::many_runs;
-use crate::console::Console;
+use crate::console::{Console, LINE_COLS, wrapped};
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::plan::{ScenarioArgs, WorkersArg};
@@ -10,6 +10,7 @@ use crate::sweep::ManyArgs;
 use crate::worlds;
 use clap::{ArgGroup, Args};
 use sidestep::kernel::{Cycle, InputError};
+use sidestep::scenario::{Remark, Severity};
 use sidestep_session::{Journey, Keep};
 use std::path::PathBuf;
 
@@ -77,6 +78,7 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
     }
     args.many.check_one_run()?;
     let (source, compiled) = args.scenario.compile()?;
+    warn_of(&compiled.remarks(), console);
     let told = worlds().translate(&args.scenario.file)?;
     let workers = args.workers.count();
     let keep = Keep {
@@ -86,4 +88,11 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
     };
     interrupt::listen()?;
     travel(Journey::start(compiled.as_ref(), &source, workers, keep, told)?, console)
+}
+
+/// Prints the warnings that `sidestep check` gives, too: hardly anybody wants a run that they are about.
+fn warn_of(remarks: &[Remark], console: Console) {
+    for remark in remarks.iter().filter(|remark| remark.severity == Severity::Warning) {
+        console.warn(wrapped(&format!("{}: {}", remark.key, remark.words), LINE_COLS).join("\n  "));
+    }
 }

@@ -61,6 +61,8 @@ fn check_says_what_will_surprise() {
     );
     let told = place.run(&["check", "s.toml"]).out();
     assert!(told.contains("\nwarning: robots.0.effector\n") && told.contains("60 %"), "{told}");
+    let run = place.run(&["run", "s.toml", "--cycles", "2"]);
+    assert!(run.err().contains("warning: robots.0.effector: "), "{}", run.err());
 }
 
 #[test]

@@ -30,4 +30,5 @@ mod study;
 mod support;
 mod sweep;
 mod sweep_faults;
+mod tables;
 mod turned_maps;

@@ -57,7 +57,7 @@ pub(super) fn inserted(
         return Err(refusal("a section of a list is a table", "give a table"));
     };
     let block = section_text(layout, list, members, true)?;
-    let element = |number| [list, &[Step::Number(number)]].concat();
+    let element = |number| [list, &[Step::Index(number)]].concat();
     if let Some(run) = layout.runs(&element(at)).first() {
         return Ok(vec![set_before(layout, layout.lines(run).start, &block)]);
     }
@@ -74,7 +74,7 @@ pub(super) fn set_before(layout: &Layout<'_>, start: usize, block: &str) -> Spli
 
 /// Moves a section to another number of its list, which has so many.
 pub(super) fn moved(layout: &Layout<'_>, list: &[Step], order: &[usize]) -> Vec<Splice> {
-    let runs_of = |number| layout.runs(&[list, &[Step::Number(number)]].concat());
+    let runs_of = |number| layout.runs(&[list, &[Step::Index(number)]].concat());
     let text_of = |number: usize| {
         let runs = runs_of(number);
         let texts: Vec<&str> = runs.iter().map(|run| &layout.text[layout.lines(run)]).collect();

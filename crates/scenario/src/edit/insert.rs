@@ -94,7 +94,7 @@ pub(super) fn relocate(
     to: usize,
 ) -> Result<Vec<Splice>, Refusal> {
     let path = layout.find(key)?.path;
-    let Some((Step::Number(from), list)) = path.split_last() else {
+    let Some((Step::Index(from), list)) = path.split_last() else {
         let remedy = "name an element by its number, e.g. robots.1";
         return Err(refusal("it is no element of an array", remedy));
     };

@@ -2,17 +2,9 @@
 
 use super::path::{Part, keys_at};
 use super::{Refusal, refusal};
+pub(super) use crate::locate::Part as Step;
 use std::ops::Range;
 use toml_edit::{Document, Item, Table, TomlError};
-
-/// A step from a table or an array into what it holds.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Step {
-    /// The value of a key.
-    Name(String),
-    /// The element of an array.
-    Number(usize),
-}
 
 /// A header of a section, or a key with its value, on lines of its own.
 #[derive(Debug)]
@@ -83,7 +75,7 @@ impl<'t> Layout<'t> {
         path.iter().fold(self.document.as_item(), |item, step| {
             let found = match step {
                 Step::Name(name) => item.get(name.as_str()),
-                Step::Number(number) => item.get(*number),
+                Step::Index(number) => item.get(*number),
             };
             found.unwrap_or(item)
         })
@@ -138,7 +130,7 @@ fn step(reach: &mut Reach<'_>, part: &Part) -> Result<(), Refusal> {
             let cause = format!("there is no element {number}, as there are {count}");
             refusal(cause, "count from 0")
         })?;
-        reach.path.push(Step::Number(number));
+        reach.path.push(Step::Index(number));
         reach.item = element;
         if part.number().is_some() {
             return Ok(());
@@ -197,7 +189,7 @@ fn collect(text: &str, table: &Table, path: &mut Vec<Step>, found: &mut Vec<Stat
             Item::Table(inner) => section(text, inner, path, found),
             Item::ArrayOfTables(many) => {
                 for (number, inner) in many.iter().enumerate() {
-                    path.push(Step::Number(number));
+                    path.push(Step::Index(number));
                     section(text, inner, path, found);
                     path.pop();
                 }

@@ -154,7 +154,8 @@ impl Source {
         let mut source = self.clone();
         for edit in edits {
             let told = |r: Refusal| {
-                InputError::new(format!("{} ({})", self.place, edit.key()), r.cause, r.remedy)
+                let place = format!("{} ({})", self.place, edit.key());
+                InputError::new(place, r.cause, r.remedy).with_key(edit.key())
             };
             if let Edit::Set { key, value } = edit {
                 source.change(|layout| set::headed(layout, &parts(key)?, value), told)?;

@@ -24,7 +24,7 @@ pub(super) fn are_sections(items: &[Json]) -> bool {
 pub(super) fn names_of(path: &[Step]) -> Vec<String> {
     let names = path.iter().filter_map(|step| match step {
         Step::Name(name) => Some(name.clone()),
-        Step::Number(_) => None,
+        Step::Index(_) => None,
     });
     names.collect()
 }

@@ -54,7 +54,7 @@ pub(super) fn remove(layout: &Layout<'_>, key: &[Part]) -> Result<Vec<Splice>, R
 pub(super) fn removed(layout: &Layout<'_>, path: &[Step]) -> Vec<Splice> {
     let Some((last, parent)) = path.split_last() else { return Vec::new() };
     match (layout.item(parent), last) {
-        (Item::Value(Value::Array(array)), Step::Number(number)) => {
+        (Item::Value(Value::Array(array)), Step::Index(number)) => {
             without(layout.text, array, *number)
         }
         (Item::Value(Value::InlineTable(_)), _) => match enclosing(layout, parent) {
@@ -180,7 +180,7 @@ fn set_sections(
     if elements.len() + count > MOST_KEYS {
         return Err(refusal("the list has too many sections", "set them one by one"));
     }
-    let at = |number| [path, &[Step::Number(number)]].concat();
+    let at = |number| [path, &[Step::Index(number)]].concat();
     let mut splices = Vec::new();
     for (number, element) in elements.iter().enumerate() {
         splices.extend(match item.get(number) {

@@ -296,6 +296,7 @@ fn an_edit_that_does_not_fit_says_so_and_changes_nothing() {
         let error = source.edited(&edits).expect_err("it does not fit");
         assert!(error.cause().contains(cause), "{edit:?}: {error}");
         assert!(error.remedy().contains(remedy), "{edit:?}: {error}");
+        assert_eq!(error.key(), Some(edit.key()));
     }
     let error = Source::new("s.toml", "a = = 1", "").edited(&[remove("a")]).expect_err("no TOML");
     assert_eq!((error.position(), error.remedy()), (Some((1, 5)), "write valid TOML"));

@@ -115,11 +115,15 @@ pub(crate) fn body(who: &Who) -> Option<view::Who> {
 /// Returns an error of the program's own.
 pub(crate) fn problem(error: &InputError) -> Problem {
     let (line, column) = error.position().unzip();
+    let (end_line, end_column) = error.end().unzip();
     let number = |n: Option<usize>| n.and_then(|n| u32::try_from(n).ok());
     Problem {
         place: error.place().into(),
         line: number(line),
         column: number(column),
+        end_line: number(end_line),
+        end_column: number(end_column),
+        key: error.key().map(Into::into),
         cause: error.cause().into(),
         remedy: error.remedy().into(),
         is_warning: false,

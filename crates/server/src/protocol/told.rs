@@ -18,7 +18,6 @@ pub struct Reply {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]
-#[expect(clippy::large_enum_variant, reason = "there is one at a time, for an instant")]
 pub enum Outcome {
     /// The answer.
     Answer(Answer),
@@ -122,10 +121,16 @@ pub struct Problem {
     pub line: Option<u32>,
     /// Its column, from 1.
     pub column: Option<u32>,
+    /// Line of its end, from 1.
+    pub end_line: Option<u32>,
+    /// Column behind its end, from 1.
+    pub end_column: Option<u32>,
+    /// Key of the scenario that is wrong, as `--set` names it: `robots.1.at.0`.
+    pub key: Option<Box<str>>,
     /// The cause.
     pub cause: String,
     /// The remedy: the right way to write or to do it.
-    pub remedy: String,
+    pub remedy: Box<str>,
     /// Whether the text is valid all the same.
     pub is_warning: bool,
 }
@@ -135,11 +140,19 @@ impl Problem {
     pub fn new(
         place: impl Into<String>,
         cause: impl Into<String>,
-        remedy: impl Into<String>,
+        remedy: impl Into<Box<str>>,
     ) -> Self {
-        let (line, column) = (None, None);
-        let (place, cause, remedy) = (place.into(), cause.into(), remedy.into());
-        Self { place, line, column, cause, remedy, is_warning: false }
+        Self {
+            place: place.into(),
+            line: None,
+            column: None,
+            end_line: None,
+            end_column: None,
+            key: None,
+            cause: cause.into(),
+            remedy: remedy.into(),
+            is_warning: false,
+        }
     }
 }
 

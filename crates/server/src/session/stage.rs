@@ -159,6 +159,7 @@ pub(crate) fn checked(
             let remarks = compiled.remarks().into_iter();
             let told = remarks.map(|remark| Problem {
                 is_warning: true,
+                key: Some(remark.key.as_str().into()),
                 ..Problem::new(remark.key, remark.words, "")
             });
             told.collect()
@@ -199,7 +200,7 @@ fn fixed(place: &str) -> Problem {
 fn stopped(error: &Error) -> Problem {
     match error {
         Error::Input(error) => problem(error),
-        Error::Stopped { cause, remedy } => Problem::new("", cause, remedy),
+        Error::Stopped { cause, remedy } => Problem::new("", cause, remedy.as_str()),
         other => Problem::new("", other.to_string(), "check the file, and the space on the disk"),
     }
 }

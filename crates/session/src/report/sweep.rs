@@ -58,11 +58,16 @@ fn lead(plan: &Plan, table: &RunTable) -> Text {
     let (runs, variants) = (table.runs() as u64, plan.variants.len() as u64);
     Text::marked(&format!(
         "{} runs of {} variants in the world `{}`. Replicate k of every variant has seed {} + k, so \
-         variants are compared seed by seed. Intervals are 95 %.",
+         variants are compared seed by seed. {}",
         count(runs),
         count(variants),
         plan.world,
         plan.first_seed,
+        // A single run has no interval, whether another seed would change it or not.
+        match runs > variants {
+            true => "Intervals are 95 %.",
+            false => "No variant has two runs, so there are no intervals.",
+        },
     ))
 }
 

@@ -1,0 +1,129 @@
+//! The key at a place of a text: from spans of bytes to keys as `--set` names them.
+
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// A part of the way to a key.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// The name of a key in a table.
+    Name(String),
+    /// The number of an element of an array, from 0.
+    Index(usize),
+}
+
+/// Returns a way as `--set` names it: `robots.1.at.0`. Names that are no bare keys are quoted as in
+/// TOML.
+pub(crate) fn path(way: &[Part]) -> String {
+    let words: Vec<String> = way
+        .iter()
+        .map(|part| match part {
+            Part::Name(name) => toml_edit::Key::new(name).display_repr().into_owned(),
+            Part::Index(index) => index.to_string(),
+        })
+        .collect();
+    words.join(".")
+}
+
+/// Returns the way to the innermost key (or element of an array) whose key or value contains a span
+/// of a text; `None` for what stands in no key. A text with errors of syntax is read as far as it
+/// goes.
+pub(crate) fn locate(text: &str, span: &Range<usize>) -> Option<Vec<Part>> {
+    let (root, _) = DeTable::parse_recoverable(text);
+    let mut search = Search { span, way: Vec::new(), best: None };
+    search.table(root.get_ref());
+    search.best.map(|best| best.way)
+}
+
+/// The smallest place found so far.
+struct Best {
+    bytes: usize,
+    way: Vec<Part>,
+}
+
+struct Search<'a> {
+    span: &'a Range<usize>,
+    way: Vec<Part>,
+    best: Option<Best>,
+}
+
+impl Search<'_> {
+    fn table(&mut self, table: &DeTable<'_>) {
+        for (key, value) in table.iter() {
+            self.way.push(Part::Name(key.get_ref().to_string()));
+            self.offer(&key.span());
+            self.value(value);
+            self.way.pop();
+        }
+    }
+
+    /// Looks into a value, even one that does not contain the span: a table with a header has the
+    /// span of the header alone.
+    fn value(&mut self, value: &Spanned<DeValue<'_>>) {
+        self.offer(&value.span());
+        match value.get_ref() {
+            DeValue::Table(table) => self.table(table),
+            DeValue::Array(many) => {
+                for (index, one) in many.iter().enumerate() {
+                    self.way.push(Part::Index(index));
+                    self.value(one);
+                    self.way.pop();
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Takes the present way if this is its place; of two places of one size the inner one, which
+    /// comes later.
+    fn offer(&mut self, place: &Range<usize>) {
+        let contains = place.start <= self.span.start && self.span.end <= place.end;
+        let bytes = place.len();
+        if contains && bytes > 0 && self.best.as_ref().is_none_or(|best| bytes <= best.bytes) {
+            self.best = Some(Best { bytes, way: self.way.clone() });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "a = 1\nx.y = 2\n[one]\nb = { c = 3, \"d.e\" = [[4], [5, 6]] }\n\
+                        [[many]]\nn = 1\n[[many.tasks]]\nkind = \"rest\"\n[[many]]\n";
+
+    fn key_of(part: &str) -> Option<String> {
+        let start = TEXT.find(part).expect(part);
+        locate(TEXT, &(start..start + part.len())).map(|way| path(&way))
+    }
+
+    #[test]
+    fn the_innermost_key_is_found_by_its_name_or_in_its_value() {
+        for (part, key) in [
+            ("a", "a"),
+            ("1", "a"),
+            ("2", "x.y"),
+            ("[one]", "one"),
+            ("c = 3,", "one.b"),
+            ("3", "one.b.c"),
+            ("\"d.e\"", "one.b.\"d.e\""),
+            ("[5, 6]", "one.b.\"d.e\".1"),
+            ("5", "one.b.\"d.e\".1.0"),
+            ("[[many]]", "many.0"),
+            ("[[many.tasks]]", "many.0.tasks.0"),
+            ("\"rest\"", "many.0.tasks.0.kind"),
+        ] {
+            assert_eq!(key_of(part).as_deref(), Some(key), "{part}");
+        }
+        let last = TEXT.rfind("[[many]]").expect("the second");
+        assert_eq!(locate(TEXT, &(last..last + 8)).map(|way| path(&way)), Some("many.1".into()));
+    }
+
+    #[test]
+    fn what_stands_in_no_key_has_none() {
+        assert_eq!(locate(TEXT, &(0..TEXT.len())), None);
+        assert_eq!(locate("# a = 1\n", &(2..3)), None);
+        assert_eq!(locate("", &(0..0)), None);
+    }
+}
