@@ -211,7 +211,7 @@ fn divided(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<Named>) {
 }
 
 fn input(problem: &Problem) -> InputError {
-    InputError::new(&problem.place, &problem.cause, &*problem.remedy)
+    InputError::new(&problem.place, &*problem.cause, &*problem.remedy)
 }
 
 #[cfg(test)]

@@ -14,8 +14,8 @@ export const HANDLE_PX = 6;
 export interface Sketch {
   board: Board | null;
   ground: Ground | null;
-  /** What the picture shows of each box, if it shows a floor of the same size. */
-  shown: Uint8Array | null;
+  /** Boxes of the text that the picture does not show yet, as while the text is not valid. */
+  changed: readonly Cell[];
   items: readonly Item[];
   chosen: Item | null;
   /** Items with problems. */
@@ -45,7 +45,7 @@ export class Sketcher {
   draw(sketch: Sketch, width_px: number, height_px: number): void {
     this.#pen.clearRect(0, 0, width_px, height_px);
     const { ground, board } = sketch;
-    if (board && ground) this.#changed(board, ground, sketch.shown);
+    if (board && ground) this.#changed(board, ground, sketch.changed);
     if (board && ground) this.#lines(ground, width_px, height_px);
     if (ground) this.#cells(ground, sketch.cells, sketch.mark);
     for (const item of sketch.items) this.#item(item, item === sketch.chosen, sketch.wrong.has(item), [0, 0, 0]);
@@ -75,15 +75,10 @@ export class Sketcher {
     return mark === "." ? this.#palette.free : this.#palette.unknown;
   }
 
-  /** Boxes of the text that the picture does not show yet, as while the text is not valid. */
-  #changed(board: Board, ground: Ground, shown: Uint8Array | null): void {
-    for (let row = 0; row < board.height; row++) {
-      for (let column = 0; column < board.width; column++) {
-        const mark = board.markAt([column, row]);
-        const now = shown?.[row * board.width + column];
-        const isShown = now !== undefined && (mark === "?" || (now === 1) === (mark === "#"));
-        if (mark !== undefined && !isShown) this.#fill(this.#corners(ground, [column, row]), css(this.#colorOf(mark)));
-      }
+  #changed(board: Board, ground: Ground, cells: readonly Cell[]): void {
+    for (const cell of cells) {
+      const mark = board.markAt(cell);
+      if (mark !== undefined) this.#fill(this.#corners(ground, cell), css(this.#colorOf(mark)));
     }
   }
 
@@ -194,6 +189,21 @@ export class Sketcher {
       pen.stroke();
     }
   }
+}
+
+/** Boxes that differ from what the picture shows: codes of a floor of the same size, if it shows one. */
+export function changedCells(board: Board, shown: Uint8Array | null): Cell[] {
+  const cells: Cell[] = [];
+  for (let row = 0; row < board.height; row++) {
+    for (let column = 0; column < board.width; column++) {
+      const mark = board.markAt([column, row]);
+      const now = shown?.[row * board.width + column];
+      // What unknown boxes come to is the scenario's choice.
+      const isShown = now !== undefined && (mark === "?" || (now === 1) === (mark === "#"));
+      if (!isShown) cells.push([column, row]);
+    }
+  }
+  return cells;
 }
 
 /** The item at a point of the canvas: handles first, then what lies under it. */

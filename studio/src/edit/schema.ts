@@ -103,6 +103,14 @@ export class World {
     return [...new Set(all)];
   }
 
+  /** What a table has under names of one's own, if it may have any. */
+  namedOf(schema: Schema): Schema | null {
+    for (const one of this.#alternatives(this.resolved(schema))) {
+      if (isTable(one["additionalProperties"])) return this.resolved(one["additionalProperties"]);
+    }
+    return null;
+  }
+
   /** What can stand there; between alternatives the present value decides. */
   shapeOf(given: Schema, value: Json | undefined): Shape {
     const schema = this.resolved(given);

@@ -110,10 +110,10 @@ export class FakeServer {
   port = 0;
   /** What the command line would have asked to open. */
   open: Subject[] = [];
-  /** What the way in answers; anything but 204 refuses sockets, too. */
-  entrance = 204;
   /** The text that a file would have by now, if somebody else had changed it. */
   theirs: string | null = null;
+  /** What the way in answers; anything but 204 refuses sockets, too. */
+  entrance = 204;
   readonly #dist: string;
   #http: Server | null = null;
   #sockets: WebSocketServer | null = null;

@@ -1,5 +1,6 @@
 import { describe, expect, test } from "vitest";
 import { blank, Board, cellOf, placeOf, type Ground } from "../../src/edit/board";
+import { changedCells } from "../../src/edit/paint";
 import { brushed, floodCells, lineCells, rectangleCells, type Cell } from "../../src/edit/cells";
 
 const sorted = (cells: Cell[]): string[] => cells.map((cell) => cell.join()).sort();
@@ -64,6 +65,13 @@ describe("a drawn map", () => {
       }
     }
     expect(placeOf({ ...turned, yaw_rad: 0, origin_m: [0, 0] }, 4, 2)).toEqual([1, 0.5, 0]);
+  });
+
+  test("boxes that the picture does not show yet are told, and all where it has another floor", () => {
+    const board = new Board("#.?\n..#\n", 1);
+    expect(changedCells(board, Uint8Array.from([0, 0, 1, 1, 0, 1]))).toEqual([]);
+    expect(changedCells(board, Uint8Array.from([1, 0, 1, 0, 0, 0]))).toEqual([[0, 0], [0, 1]]);
+    expect(changedCells(board, null).length).toBe(6);
   });
 
   test("an empty board is as large as asked for", () => {

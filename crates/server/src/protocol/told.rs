@@ -18,6 +18,7 @@ pub struct Reply {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]
+#[expect(clippy::large_enum_variant, reason = "there is one at a time, for an instant")]
 pub enum Outcome {
     /// The answer.
     Answer(Answer),
@@ -132,7 +133,7 @@ pub enum Answer {
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Problem {
     /// The file, option or request that is wrong.
-    pub place: String,
+    pub place: Box<str>,
     /// Its line, from 1.
     pub line: Option<u32>,
     /// Its column, from 1.
@@ -144,7 +145,7 @@ pub struct Problem {
     /// Key of the scenario that is wrong, as `--set` names it: `robots.1.at.0`.
     pub key: Option<Box<str>>,
     /// The cause.
-    pub cause: String,
+    pub cause: Box<str>,
     /// The remedy: the right way to write or to do it.
     pub remedy: Box<str>,
     /// Whether the text is valid all the same.
@@ -154,8 +155,8 @@ pub struct Problem {
 impl Problem {
     /// Returns a problem without a line.
     pub fn new(
-        place: impl Into<String>,
-        cause: impl Into<String>,
+        place: impl Into<Box<str>>,
+        cause: impl Into<Box<str>>,
         remedy: impl Into<Box<str>>,
     ) -> Self {
         Self {

@@ -53,7 +53,11 @@ impl Stage {
             Subject::New { world } => {
                 let kind = means.worlds.named(world).ok_or_else(|| {
                     let names = means.worlds.names().join(", ");
-                    Problem::new(world, "no such world is known", format!("name one of {names}"))
+                    Problem::new(
+                        world.as_str(),
+                        "no such world is known",
+                        format!("name one of {names}"),
+                    )
                 })?;
                 let folder = means.files.first_folder();
                 let source = Source::new(format!("{world}.toml"), kind.default_scenario(), folder);
@@ -192,7 +196,7 @@ pub(crate) fn checked(
 fn other_text(means: &Means, source: &Source, text: String) -> Result<Source, Problem> {
     if means.read_only {
         let remedy = "change the file, or start the studio without --read-only";
-        return Err(Problem::new(&source.place, "texts are not taken here", remedy));
+        return Err(Problem::new(source.place.as_str(), "texts are not taken here", remedy));
     }
     let other = Source { text, ..source.clone() };
     means.files.check_text(&other)?;
@@ -219,7 +223,7 @@ fn fixed(place: &str) -> Problem {
 pub(crate) fn stopped(error: &Error) -> Problem {
     match error {
         Error::Input(error) => problem(error),
-        Error::Stopped { cause, remedy } => Problem::new("", cause, remedy.as_str()),
+        Error::Stopped { cause, remedy } => Problem::new("", cause.as_str(), remedy.as_str()),
         other => Problem::new("", other.to_string(), "check the file, and the space on the disk"),
     }
 }

@@ -196,7 +196,7 @@ fn a_body_is_inspected_as_by_the_library_and_the_digest_stays() {
                     "{told}"
                 );
             }
-            Err(problem) => assert_eq!(told["problem"]["cause"], problem.cause.as_str()),
+            Err(problem) => assert_eq!(told["problem"]["cause"], *problem.cause),
         }
         assert_eq!((page.digest_at(20), page.digest_at(40)), (digest, plain(text, 40)));
         let who = json!({ "kind": "no such kind", "number": 1, "part": null });
