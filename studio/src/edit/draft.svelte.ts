@@ -125,7 +125,7 @@ export class Draft {
    */
   edit(edits: readonly Edit[] | (() => readonly Edit[])): Promise<boolean> {
     const done = this.#queue.then(() => this.#edit(edits));
-    this.#queue = done;
+    this.#queue = done.catch(() => undefined);
     return done;
   }
 

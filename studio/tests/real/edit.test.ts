@@ -160,7 +160,8 @@ describe.skipIf(BINARY === "")("the real program", () => {
     const undo = page.getByRole("button", { name: "Undo" });
     for (let size = 1; size <= 2; size++) {
       await page.getByRole("button", { name: "robots 1", exact: true }).click();
-      await page.getByText(/more keys/).click();
+      const more = page.getByText(/more keys/);
+      if ((await more.count()) > 0) await more.click();
       await page.getByLabel("period", { exact: true }).fill(String(size + 1));
       await page.keyboard.press("Enter");
       await checked();
