@@ -32,6 +32,8 @@ export class Draft {
   chosen = $state.raw<Path | null>(null);
   /** The text of the file, where it was changed by somebody else. */
   theirs = $state<string | null>(null);
+  /** The section that the forms show. */
+  open = $state.raw<Path>([]);
   /** A problem that the open view is to bring into sight. */
   goal = $state.raw<{ problem: Problem } | null>(null);
   /** Whether the text has a file of its own by now. */
