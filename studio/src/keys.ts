@@ -1,7 +1,7 @@
 /** What keys do, in one table that the help shows too. */
 
 export type Action =
-  | "play" | "next" | "back" | "next-ten" | "back-ten" | "slower" | "faster"
+  | "play" | "play-back" | "next" | "back" | "next-ten" | "back-ten" | "slower" | "faster"
   | "next-event" | "previous-event" | "filter" | "fit" | "center" | "trails"
   | "left" | "right" | "up" | "down" | "nearer" | "farther" | "deselect" | "edit" | "help" | "session";
 
@@ -16,6 +16,7 @@ interface Key {
 
 export const KEYS: readonly Key[] = [
   { action: "play", keys: [" "], shown: ["Space"], words: "play or pause" },
+  { action: "play-back", keys: ["b"], shown: ["b"], words: "play backwards or pause" },
   { action: "next-ten", keys: ["ArrowRight"], shift: true, shown: ["Shift →"], words: "ten cycles on" },
   { action: "back-ten", keys: ["ArrowLeft"], shift: true, shown: ["Shift ←"], words: "ten cycles back" },
   { action: "next", keys: ["ArrowRight"], shown: ["→"], words: "one cycle on" },

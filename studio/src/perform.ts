@@ -28,7 +28,8 @@ function goTo(index: number, studio: Studio): boolean {
 function transport(action: Action, studio: Studio): boolean {
   const active = studio.active!;
   switch (action) {
-    case "play": active.isPlaying ? studio.pause() : studio.play(); return true;
+    case "play": studio.toggle(); return true;
+    case "play-back": studio.toggleBack(); return true;
     case "next": studio.step(1); return true;
     case "back": studio.step(-1); return true;
     case "next-ten": studio.step(10); return true;

@@ -153,11 +153,12 @@ export class Stage {
     this.#frame = null;
   }
 
-  frame(frame: Frame): void {
+  /** Takes a frame; one that was sought need not follow the one before. */
+  frame(frame: Frame, isSought = false): void {
     if (frame === this.#frame || !this.#bodies) return;
     const isFirst = this.#frame === null;
     this.#frame = frame;
-    this.#trails?.push(frame.cycle, frame.places_m);
+    this.#trails?.push(frame.cycle, frame.places_m, isSought);
     if (isFirst) this.#extent = extentOf(this.#scene, this.#bodies, frame);
     if (isFirst && !this.#isFitted) this.fit();
     this.#bodiesChanged = this.#marksChanged = true;
@@ -216,6 +217,20 @@ export class Stage {
     if (index === this.#hovered) return;
     this.#hovered = index;
     this.changed();
+  }
+
+  /** The picture as it is seen, with its words. */
+  snapshot(): Promise<Blob | null> {
+    // What was drawn before is gone once the browser has shown it.
+    cancelAnimationFrame(this.#request);
+    this.#draw();
+    const { domElement: picture } = this.#renderer;
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = [picture.width, picture.height];
+    const pen = canvas.getContext("2d")!;
+    pen.drawImage(picture, 0, 0);
+    pen.drawImage(this.#overlay.canvas, 0, 0, canvas.width, canvas.height);
+    return new Promise((then) => canvas.toBlob(then, "image/png"));
   }
 
   /** Where a body appears, for tests and for keeping it in sight. */
