@@ -6,12 +6,13 @@
 //! request.rs   text -> requests      protocol/    all words and frames    outbox.rs  what waits to be sent
 //! session/     one thread per run    keyframes.rs checkpoints for seeking
 //! encode/      frames as bytes       samples.rs   metrics against time    chronicle.rs   events
-//! files.rs     what may be read
+//! files.rs     what may be read    beside.rs      what a scenario can name    write.rs  what may be written
 //! ```
 //! A session is a thread that owns a `Simulation`. Sockets pass requests to it by a channel and take replies, states
 //! and frames from an outbox into which sessions put without waiting. So nothing that a page does or leaves undone
 //! reaches a result, and a slow page loses frames, never the run. Whoever starts the server hands the worlds in.
 
+mod beside;
 mod chronicle;
 mod encode;
 mod files;
@@ -27,6 +28,7 @@ mod request;
 mod samples;
 mod session;
 mod socket;
+mod write;
 
 pub use encode::Encoder;
 pub use request::{MOST_REQUEST_BYTES, decode};
@@ -68,7 +70,7 @@ pub struct Options {
     pub host: String,
     /// The port; 0 for any free one, `None` for the first free one of some.
     pub port: Option<u16>,
-    /// Whether texts of pages are refused.
+    /// Whether texts of pages are refused, and nothing is written.
     pub read_only: bool,
     /// The number of worker threads of each session.
     pub workers: usize,

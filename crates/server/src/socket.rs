@@ -4,8 +4,9 @@ use crate::house::House;
 use crate::outbox::{Mail, Outbox};
 use crate::protocol::{Answer, Call, Outcome, Problem, Reply, SessionId, Subject};
 use crate::request::decode;
-use crate::session::{Opening, Session, checked, ended};
+use crate::session::{Means, Opening, Session, checked, edited, ended, model};
 use axum::extract::ws::{Message, WebSocket};
+use sidestep::scenario::Source;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -146,14 +147,14 @@ impl Desk {
                 self.outbox.clear(session);
                 Some(closed.map(|_| Answer::Done))
             }
-            Call::Check { session, text } => {
-                let source = self.sessions.get(&session).and_then(Session::source);
-                let Some(source) = source else { return Some(Err(ended())) };
-                let means = self.house.means.clone();
-                self.aside(id, move || {
-                    Ok(Answer::Problems { problems: checked(&means, &source, text)? })
-                });
-                None
+            Call::Check { session, text } => self.on_text(id, session, move |means, source| {
+                Ok(Answer::Problems { problems: checked(means, source, text)? })
+            }),
+            Call::Edit { session, text, edits } => {
+                self.on_text(id, session, move |means, source| edited(means, source, text, edits))
+            }
+            Call::Model { session, text } => {
+                self.on_text(id, session, move |means, source| model(means, source, text))
             }
             call => {
                 let session = call.session().and_then(|session| self.sessions.get(&session));
@@ -179,6 +180,21 @@ impl Desk {
         })?;
         self.sessions.insert(session, started);
         Ok(())
+    }
+
+    /// Answers a request on a text that stands for a session's scenario.
+    fn on_text(
+        &self,
+        id: u32,
+        session: SessionId,
+        work: impl FnOnce(&Means, &Source) -> Result<Answer, Problem> + Send + 'static,
+    ) -> Option<Result<Answer, Problem>> {
+        let Some(source) = self.sessions.get(&session).and_then(Session::source) else {
+            return Some(Err(ended()));
+        };
+        let means = self.house.means.clone();
+        self.aside(id, move || work(&means, &source));
+        None
     }
 
     /// Answers a request in a thread of its own, as it may read files.
