@@ -4,6 +4,7 @@ use crate::house::House;
 use crate::outbox::{Mail, Outbox};
 use crate::protocol::{Answer, Call, Outcome, Problem, Reply, SessionId, Subject};
 use crate::request::decode;
+use crate::results::runs;
 use crate::session::{Means, Opening, Session, checked, edited, ended, model};
 use axum::extract::ws::{Message, WebSocket};
 use sidestep::scenario::Source;
@@ -11,6 +12,8 @@ use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::task::spawn_blocking;
 use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
 /// The number of sessions of a socket.
@@ -27,11 +30,11 @@ const PING: Duration = Duration::from_secs(30);
 const SILENCE: Duration = Duration::from_secs(600);
 
 /// Serves a page until it leaves or the server ends. Its sessions end with it.
-pub(crate) async fn serve(mut socket: WebSocket, house: Arc<House>) {
-    let Some(_seat) = house.seat() else { return };
+pub(crate) async fn serve(mut socket: WebSocket, house: Arc<House>, _seat: OwnedSemaphorePermit) {
     let outbox = Arc::new(Outbox::default());
     outbox.notice(&house.hello());
-    let desk = Desk { house: house.clone(), outbox: outbox.clone(), sessions: BTreeMap::new() };
+    let (house_, outbox_, aside) = (house.clone(), outbox.clone(), Arc::new(Semaphore::new(1)));
+    let desk = Desk { house: house_, outbox: outbox_, sessions: BTreeMap::new(), aside };
     tokio::select! {
         () = house.ended() => {}
         () = talk(&mut socket, desk, &outbox) => {}
@@ -105,6 +108,15 @@ struct Desk {
     house: Arc<House>,
     outbox: Arc<Outbox>,
     sessions: BTreeMap<SessionId, Session>,
+    /// One thread for what reads files, so that a page that asks for much of it keeps no other page waiting.
+    aside: Arc<Semaphore>,
+}
+
+impl Drop for Desk {
+    fn drop(&mut self) {
+        // What waits for its turn is wanted no more.
+        self.aside.close();
+    }
 }
 
 impl Desk {
@@ -139,6 +151,11 @@ impl Desk {
                     let entries = means.files.list(folder.as_deref(), means.worlds)?;
                     Ok(Answer::Files { entries })
                 });
+                None
+            }
+            Call::Runs { folder } => {
+                let means = self.house.means.clone();
+                self.aside(id, move || runs(&means.files.find(&folder)?));
                 None
             }
             Call::Open { what, seed } => self.open(id, what, seed).err().map(Err),
@@ -197,10 +214,14 @@ impl Desk {
         None
     }
 
-    /// Answers a request in a thread of its own, as it may read files.
+    /// Answers a request in another thread, one after the other, as it may read files.
     fn aside(&self, id: u32, work: impl FnOnce() -> Result<Answer, Problem> + Send + 'static) {
-        let outbox = self.outbox.clone();
-        tokio::task::spawn_blocking(move || guarded(&outbox, id, || Some(work())));
+        let (outbox, aside) = (self.outbox.clone(), self.aside.clone());
+        tokio::spawn(async move {
+            let Ok(_turn) = aside.acquire().await else { return };
+            // It cannot panic: what it does is guarded.
+            let _ = spawn_blocking(move || guarded(&outbox, id, || Some(work()))).await;
+        });
     }
 }
 

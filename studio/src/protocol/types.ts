@@ -128,7 +128,15 @@ most: number, } | { "do": "source",
 /**
  * The session.
  */
-session: number, } | { "do": "check",
+session: number, } | { "do": "tables",
+/**
+ * Which session.
+ */
+session: number, } | { "do": "runs",
+/**
+ * Its folder, as a listing gave it.
+ */
+folder: string, } | { "do": "check",
 /**
  * The session.
  */
@@ -156,7 +164,11 @@ session: number,
 /**
  * The text.
  */
-text: string, } | { "do": "save",
+text: string, } | { "do": "schema",
+/**
+ * The world's name.
+ */
+world: string, } | { "do": "save",
 /**
  * The session.
  */
@@ -346,7 +358,27 @@ text: string,
 /**
  * Whether it cannot be replaced by another text.
  */
-read_only: boolean, } | { "is": "problems",
+read_only: boolean, } | { "is": "tables",
+/**
+ * The names.
+ */
+names: Array<string>, } | { "is": "runs",
+/**
+ * The sweep's name; may be empty.
+ */
+name: string,
+/**
+ * Whether these are all runs.
+ */
+is_complete: boolean,
+/**
+ * The runs.
+ */
+runs: Array<SweepRun>,
+/**
+ * Number of runs that are not listed.
+ */
+left_out: number, } | { "is": "problems",
 /**
  * Nothing for a valid text without surprises.
  */
@@ -363,7 +395,11 @@ value: unknown,
  * Files that a key of the text can name, as it would name them: those below its folder, and those
  * elsewhere that it names.
  */
-files: Array<string>, } | { "is": "saved",
+files: Array<string>, } | { "is": "schema",
+/**
+ * A JSON Schema.
+ */
+schema: unknown, } | { "is": "saved",
 /**
  * The file, which is the session's place from now on.
  */
@@ -495,7 +531,7 @@ problem: Problem, };
  */
 export type Named = {
 /**
- * `scenario` or `recording`.
+ * `scenario`, `recording` or `sweep`.
  */
 kind: string,
 /**
@@ -755,6 +791,27 @@ names: Array<[number, string]>,
  * The bodies that are agents, which can be inspected.
  */
 is_agent: Array<boolean>, };
+
+/**
+ * A run of a sweep.
+ */
+export type SweepRun = {
+/**
+ * The name of its variant.
+ */
+variant: string,
+/**
+ * Its seed, in decimal digits, as it may be larger than a number of JavaScript can be.
+ */
+seed: string,
+/**
+ * The cause of its failure; empty if it did not fail.
+ */
+failure: string,
+/**
+ * Its recording; or its variant's scenario, which needs the seed.
+ */
+replay: Named, };
 
 /**
  * The text at the end of a frame.

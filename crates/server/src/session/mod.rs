@@ -14,7 +14,7 @@ mod stage;
 mod viewer;
 
 pub(crate) use edit::{edited, model};
-pub(crate) use stage::{Means, checked};
+pub(crate) use stage::{Means, checked, stopped};
 
 use crate::outbox::Outbox;
 use crate::protocol::{Call, Outcome, Problem, Reply, SessionId, Subject};
@@ -33,7 +33,7 @@ use std::time::Duration;
 /// The number of requests that wait for a session.
 const MOST_WAITING: usize = 256;
 /// The longest wait for a request, after which the thread looks around again.
-const LONGEST_WAIT: Duration = Duration::from_secs(3600);
+const LONGEST_WAIT: Duration = Duration::from_secs(5);
 
 /// The first request of a session.
 pub(crate) struct Opening {

@@ -3,11 +3,13 @@
 use super::save::{OwnFile, Shown, own_path, saved};
 use crate::encode::problem;
 use crate::files::Files;
+use crate::keyframes::Budget;
 use crate::protocol::{Answer, Problem, Subject};
 use sidestep::kernel::{Cycle, Simulation};
 use sidestep::scenario::{Meaning, Source, Worlds};
 use sidestep_session::{Error, Recorded, read};
 use std::path::Path;
+use std::sync::Arc;
 
 /// The means that sessions need to begin.
 #[derive(Clone)]
@@ -20,6 +22,8 @@ pub(crate) struct Means {
     pub(crate) workers: usize,
     /// Whether texts of a page are refused.
     pub(crate) read_only: bool,
+    /// The memory that the keyframes of all sessions share.
+    pub(crate) budget: Arc<Budget>,
 }
 
 /// A run, and where it comes from.
@@ -54,7 +58,11 @@ impl Stage {
             Subject::New { world } => {
                 let kind = means.worlds.named(world).ok_or_else(|| {
                     let names = means.worlds.names().join(", ");
-                    Problem::new(world, "no such world is known", format!("name one of {names}"))
+                    Problem::new(
+                        world.as_str(),
+                        "no such world is known",
+                        format!("name one of {names}"),
+                    )
                 })?;
                 let folder = means.files.first_folder();
                 let source = Source::new(format!("{world}.toml"), kind.default_scenario(), folder);
@@ -135,7 +143,11 @@ impl Stage {
     ) -> Result<Answer, Problem> {
         if self.means.read_only {
             let remedy = "start the studio without --read-only";
-            return Err(Problem::new(&self.source.place, "nothing is written here", remedy));
+            return Err(Problem::new(
+                self.source.place.as_str(),
+                "nothing is written here",
+                remedy,
+            ));
         }
         if self.recorded.is_some() {
             return Err(fixed(&self.source.place));
@@ -183,9 +195,23 @@ impl Stage {
         })
     }
 
+    /// Returns the memory that keyframes of all sessions share.
+    pub(crate) fn budget(&self) -> &Arc<Budget> {
+        &self.means.budget
+    }
+
     /// Returns the metrics of its world in words.
     pub(crate) fn meanings(&self) -> &'static [Meaning] {
         self.means.worlds.named(self.run.world()).map_or(&[], |kind| kind.meanings())
+    }
+
+    /// Returns the names of the recorded tables; none of what has no tables.
+    ///
+    /// # Errors
+    /// When the folder can no longer be read.
+    pub(crate) fn tables(&self) -> Result<Vec<String>, Problem> {
+        let recorded = self.recorded.as_ref();
+        recorded.map_or(Ok(Vec::new()), |recorded| recorded.tables().map_err(|e| problem(&e)))
     }
 
     /// Whether its text cannot be replaced.
@@ -229,7 +255,7 @@ pub(crate) fn checked(
 pub(super) fn other_text(means: &Means, source: &Source, text: String) -> Result<Source, Problem> {
     if means.read_only {
         let remedy = "change the file, or start the studio without --read-only";
-        return Err(Problem::new(&source.place, "texts are not taken here", remedy));
+        return Err(Problem::new(source.place.as_str(), "texts are not taken here", remedy));
     }
     let other = Source { text, ..source.clone() };
     means.files.check_text(&other)?;
@@ -252,10 +278,11 @@ fn fixed(place: &str) -> Problem {
     Problem::new(place, "a recording is computed again as it was", remedy)
 }
 
-fn stopped(error: &Error) -> Problem {
+/// Returns an error of a session as it is told.
+pub(crate) fn stopped(error: &Error) -> Problem {
     match error {
         Error::Input(error) => problem(error),
-        Error::Stopped { cause, remedy } => Problem::new("", cause, remedy.as_str()),
+        Error::Stopped { cause, remedy } => Problem::new("", cause.as_str(), remedy.as_str()),
         other => Problem::new("", other.to_string(), "check the file, and the space on the disk"),
     }
 }
