@@ -137,6 +137,8 @@ export class Bench {
 
   choose(item: Item | null): void {
     this.draft.chosen = item?.path ?? null;
+    // What is chosen here is open in the forms.
+    if (item) this.draft.open = item.path;
   }
 
   /** What has become of an item by the changes before. */

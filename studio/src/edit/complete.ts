@@ -28,17 +28,24 @@ function sectionAt(text: string, until: number): { path: string[]; isInText: boo
   return { path, isInText: fence !== null };
 }
 
+/** A place within a line: the keys that lead to it, and what is typed of a key or of a value. */
+interface Within {
+  path: string[];
+  rest: string;
+  isValue: boolean;
+}
+
 /** The keys of inline tables that are open before the cursor, and what is left of the line. */
-function opened(line: string): { path: string[]; rest: string; isValue: boolean } {
+function opened(line: string): Within {
   const path: string[] = [];
   const key = /^\s*((?:[\w-]+|"[^"]*")(?:\s*\.\s*(?:[\w-]+|"[^"]*"))*)\s*=\s*/.exec(line);
   if (!key) return { path, rest: line.trimStart(), isValue: false };
-  const inner = opened.inline(line.slice(key[0].length));
+  const inner = inValue(line.slice(key[0].length));
   return { path: [...partsOf(key[1]!), ...inner.path], rest: inner.rest, isValue: inner.isValue };
 }
 
 /** Of a value that is not finished: the way into its innermost open table. */
-opened.inline = (value: string): { path: string[]; rest: string; isValue: boolean } => {
+function inValue(value: string): Within {
   const ways: { path: string[]; from: number }[] = [];
   let quote = false;
   for (let i = 0; i < value.length; i++) {
@@ -56,7 +63,7 @@ opened.inline = (value: string): { path: string[]; rest: string; isValue: boolea
   if (!inTable) return { path, rest: rest.trimStart(), isValue: true };
   const deeper = /^\s*([\w-]+)\s*=\s*(.*)$/.exec(rest);
   return deeper ? { path: [...path, deeper[1]!], rest: deeper[2]!, isValue: true } : { path, rest: rest.trimStart(), isValue: false };
-};
+}
 
 /** Where the innermost bracket that is still open stands. */
 function lastOpen(value: string): number {

@@ -32,6 +32,8 @@ export class Draft {
   chosen = $state.raw<Path | null>(null);
   /** The text of the file, where it was changed by somebody else. */
   theirs = $state<string | null>(null);
+  /** The section that the forms show. */
+  open = $state.raw<Path>([]);
   /** A problem that the open view is to bring into sight. */
   goal = $state.raw<{ problem: Problem } | null>(null);
   /** Whether the text has a file of its own by now. */
@@ -125,7 +127,7 @@ export class Draft {
    */
   edit(edits: readonly Edit[] | (() => readonly Edit[])): Promise<boolean> {
     const done = this.#queue.then(() => this.#edit(edits));
-    this.#queue = done;
+    this.#queue = done.catch(() => undefined);
     return done;
   }
 

@@ -119,7 +119,7 @@ export function columnsOf(model: Table | null, path: Path, count: number): strin
 
 /** Whether the rows at a path are probabilities. */
 export function areShares(path: Path): boolean {
-  return path.some((part) => /confusion|transitions|weights_sum/.test(String(part)));
+  return path.some((part) => /confusion|transitions/.test(String(part)));
 }
 
 // Sections.

@@ -11,6 +11,7 @@ import { Metrics } from "./metrics.svelte";
 import { Missed } from "./missed";
 import { cyclesBack_per_s, Rewind } from "./rewind.svelte";
 import { Seeker } from "./seeker";
+import { Waiting } from "./waiting";
 
 type DistributiveOmit<T, K extends PropertyKey> = T extends unknown ? Omit<T, K> : never;
 /** A call to a session, which adds its own number. */
@@ -79,8 +80,8 @@ export class Session {
   readonly #missed = new Missed();
   /** Counts what the page asked of the run: a way that was given up for something newer is no problem. */
   #orders = 0;
-  /** Who waits for a state or a frame; each says whether it has what it waits for. */
-  readonly #waiting = new Set<(isCutOff: boolean) => boolean>();
+  /** Who waits for a state or a frame. */
+  readonly #waiting = new Waiting();
   #regrantTimer: ReturnType<typeof setTimeout> | null = null;
   /** Where it was when the connection was lost, until it is there again. */
   #kept: { cycle: number; isPlaying: boolean; seed: number | null } | null = null;
@@ -105,7 +106,7 @@ export class Session {
   cutOff(): void {
     this.id = 0;
     this.#rewind.stop();
-    this.#tellWaiting(true);
+    this.#waiting.over();
     const { cycle } = this.shown;
     // Lost once more on the way back: where it was in the end is where it was in the beginning.
     this.#kept ??= { cycle, isPlaying: this.isPlaying, seed: this.#ownSeed };
@@ -218,36 +219,20 @@ export class Session {
     this.shown = { cycle: frame.cycle, time_s: frame.time_s, leftOut: this.#missed.count(frame.leftOut, this.#isWatched) };
     if (frame.text.events.length > 0) this.events.add(frame.text.events);
     for (const tell of this.#onFrame) tell();
-    this.#tellWaiting(false);
+    this.#waiting.changed();
     this.#inspectSoon();
   }
 
   takeStatus(status: Status): void {
     this.status = status;
-    this.#tellWaiting(false);
-  }
-
-  #tellWaiting(isCutOff: boolean): void {
-    for (const isDone of this.#waiting) if (isDone(isCutOff)) this.#waiting.delete(isDone);
-  }
-
-  /** Waits for what a state or a frame has; `null` when the connection or the session is lost meanwhile. */
-  #waitFor<T>(find: () => T | null): Promise<T | null> {
-    return new Promise((resolve) => {
-      const isDone = (isCutOff: boolean): boolean => {
-        const found = isCutOff ? null : find();
-        if (found !== null || isCutOff) resolve(found);
-        return found !== null || isCutOff;
-      };
-      if (!isDone(this.id === 0 || this.ended !== null)) this.#waiting.add(isDone);
-    });
+    this.#waiting.changed();
   }
 
   /** Goes to a cycle; returns the digest of the state there, and the cycle, which is less where the run is over before. */
   async digestAt(cycle: number): Promise<{ cycle: number; digest: string } | null> {
     this.#rewind.stop();
     if (!(await this.#seeker.to(cycle))) return null;
-    return this.#waitFor(() => {
+    return this.#waiting.for(() => {
       const { state, digest, cycle: at } = this.status;
       const isThere = at === cycle || (state === "over" && at < cycle);
       return digest !== null && isThere ? { cycle: at, digest } : null;
@@ -256,14 +241,15 @@ export class Session {
 
   /** The frame of a cycle where the run stands, once it has come. */
   frameAt(cycle: number): Promise<Frame | null> {
-    return this.#waitFor(() => (this.frame?.cycle === cycle ? this.frame : null));
+    if (this.id === 0 || this.ended) return Promise.resolve(null);
+    return this.#waiting.for(() => (this.frame?.cycle === cycle ? this.frame : null));
   }
 
   takeEnd(problem: Problem): void {
     this.ended = problem;
     this.status = { ...this.status, state: "failed" };
     this.#rewind.stop();
-    this.#tellWaiting(true);
+    this.#waiting.over();
   }
 
   /** Fetches events and samples; called regularly while the session is shown. */

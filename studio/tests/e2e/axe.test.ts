@@ -90,6 +90,10 @@ for (const [width, isDark] of [[1280, false], [1280, true], [400, false], [400, 
     expect(await findings(page)).toEqual([]);
     await page.keyboard.press("Escape");
     await page.getByRole("button", { name: "Edit", exact: true }).click();
+    await page.getByRole("button", { name: "Export…" }).click();
+    await page.getByRole("dialog", { name: /^Export/ }).waitFor();
+    expect(await findings(page)).toEqual([]);
+    await page.keyboard.press("Escape");
     await page.getByRole("button", { name: "Help" }).click();
     expect(await findings(page)).toEqual([]);
     await page.context().close();

@@ -313,6 +313,9 @@ describe("saving", () => {
     await page.getByRole("button", { name: "Close Made-up hall" }).click();
     expect(await asked).toBe("confirm");
     expect(await page.locator("canvas.layer").count()).toBe(1);
+    const left = new Promise<string>((told) => page.once("dialog", (one) => void one.dismiss().then(() => told(one.type()))));
+    await page.close({ runBeforeUnload: true });
+    expect(await left).toBe("beforeunload");
   });
 
   test("a file that was changed meanwhile is shown, and mine or theirs stays", async () => {

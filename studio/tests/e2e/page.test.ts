@@ -315,6 +315,7 @@ describe("results", () => {
     await frame.getByRole("heading", { name: "Report of robots.run" }).waitFor();
     await frame.getByText("origin null").waitFor();
     await expect.poll(() => page.frames()[1]!.title(), { timeout: 20_000 }).toBe("kept in");
+    await page.getByText("figures (1)").click();
     await page.getByRole("link", { name: "01-speed" }).waitFor();
     const kept = page.waitForEvent("download");
     await page.getByRole("link", { name: "Markdown" }).click();
@@ -329,7 +330,7 @@ describe("results", () => {
     await page.getByRole("slider", { name: "Cycle" }).fill("50");
     await cycleIs(50);
     await page.getByRole("button", { name: "Export…" }).click();
-    const dialog = page.getByRole("dialog", { name: /^Keep of/ });
+    const dialog = page.getByRole("dialog", { name: /^Export/ });
     const picture = page.waitForEvent("download");
     await dialog.getByRole("button", { name: "Picture (PNG)" }).click();
     const file = await picture;

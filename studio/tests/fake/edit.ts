@@ -82,6 +82,7 @@ export const SCHEMA: Table = {
         count: { anyOf: [{ type: "integer", minimum: 0 }, { type: "null" }], description: "Placed by draw." },
         at: { type: "array", description: "Places.", items: { type: "array", items: { type: "integer" } } },
         size: { type: "integer", description: "Boxes a side.", minimum: 1, maximum: 64, default: 1 },
+        period: { type: "integer", description: "Acts every so many cycles.", minimum: 1, default: 1 },
         sensors: { type: "array", items: { type: "string", "x-names": "sensors", examples: ["sonar-ring"] } },
         regime: { description: "Whose errors are on.", oneOf: [{ const: "reliable", type: "string", description: "Nobody's." }, { const: "both", type: "string" }] },
         region: { type: "array", items: { type: "integer" } },
