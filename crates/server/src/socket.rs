@@ -6,6 +6,7 @@ use crate::protocol::{Answer, Call, Outcome, Problem, Reply, SessionId, Subject}
 use crate::request::decode;
 use crate::session::{Opening, Session, checked, ended};
 use axum::extract::ws::{Message, WebSocket};
+use sidestep::scenario::Worlds;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -155,6 +156,11 @@ impl Desk {
                 });
                 None
             }
+            Call::Schema { world } => {
+                let worlds = self.house.means.worlds;
+                self.aside(id, move || schema(worlds, &world));
+                None
+            }
             call => {
                 let session = call.session().and_then(|session| self.sessions.get(&session));
                 let Some(session) = session else { return Some(Err(ended())) };
@@ -186,6 +192,18 @@ impl Desk {
         let outbox = self.outbox.clone();
         tokio::task::spawn_blocking(move || guarded(&outbox, id, || Some(work())));
     }
+}
+
+/// Returns the schema of a world's scenarios.
+///
+/// # Errors
+/// When there is no such world.
+fn schema(worlds: Worlds, world: &str) -> Result<Answer, Problem> {
+    let schema = worlds.schema(Some(world)).ok_or_else(|| {
+        let names = worlds.names().join(", ");
+        Problem::new(world, "no such world is known", format!("name one of {names}"))
+    })?;
+    Ok(Answer::Schema { schema })
 }
 
 /// Answers a request with what `work` returns, if it returns anything, and with a problem if it panics.
