@@ -7,7 +7,7 @@ use crate::request::decode;
 use crate::results::runs;
 use crate::session::{Means, Opening, Session, checked, edited, ended, model};
 use axum::extract::ws::{Message, WebSocket};
-use sidestep::scenario::Source;
+use sidestep::scenario::{Source, Worlds};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -173,6 +173,11 @@ impl Desk {
             Call::Model { session, text } => {
                 self.on_text(id, session, move |means, source| model(means, source, text))
             }
+            Call::Schema { world } => {
+                let worlds = self.house.means.worlds;
+                self.aside(id, move || schema(worlds, &world));
+                None
+            }
             call => {
                 let session = call.session().and_then(|session| self.sessions.get(&session));
                 let Some(session) = session else { return Some(Err(ended())) };
@@ -223,6 +228,18 @@ impl Desk {
             let _ = spawn_blocking(move || guarded(&outbox, id, || Some(work()))).await;
         });
     }
+}
+
+/// Returns the schema of a world's scenarios.
+///
+/// # Errors
+/// When there is no such world.
+fn schema(worlds: Worlds, world: &str) -> Result<Answer, Problem> {
+    let schema = worlds.schema(Some(world)).ok_or_else(|| {
+        let names = worlds.names().join(", ");
+        Problem::new(world, "no such world is known", format!("name one of {names}"))
+    })?;
+    Ok(Answer::Schema { schema })
 }
 
 /// Answers a request with what `work` returns, if it returns anything, and with a problem if it panics.
