@@ -2,11 +2,12 @@
 
 use super::game::Game;
 use super::player::{Choice, Player, Update, Utility};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::interrupt;
 
 /// The estimator of `E[G | x_i]`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", tag = "kind")]
 pub enum Estimator {
     /// From blocks of joint samples, as in the paper.
@@ -21,7 +22,7 @@ pub enum Estimator {
 }
 
 /// The order in which the players update.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
     /// All at once, on the distributions of the round before.

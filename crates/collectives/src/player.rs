@@ -1,5 +1,6 @@
 //! One player: its distribution over strategies, its estimates, and its updates.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
@@ -9,7 +10,7 @@ const LEAST: f64 = 1e-9;
 const COLDEST: f64 = 1e-12;
 
 /// The step of a distribution towards the minimum of eq. 7.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", tag = "kind")]
 pub enum Update {
     /// `q <- q - s q [ (E[G|x] - E_q G) / T + S(q) + ln q ]`, clipped and scaled to sum 1: a
@@ -26,7 +27,7 @@ pub enum Update {
 }
 
 /// The cost that a player learns from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Utility {
     /// The cost of all players, as in the paper.
@@ -37,7 +38,7 @@ pub enum Utility {
 }
 
 /// The choice of the final strategy from the distribution.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Choice {
     /// The most probable strategy; among equals the first.

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::view::{Floor, Occupancy, Plane};
@@ -23,7 +24,7 @@ pub enum Cell {
 }
 
 /// The treatment of boxes that nobody has mapped.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum UnknownPolicy {
     /// Unknown boxes are walls, because a path must not lead through unmapped space.

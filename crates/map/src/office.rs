@@ -13,13 +13,14 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 
 use crate::{Cell, GridMap, MAX_BOXES, Rect, check_box_count, check_box_size};
 
 /// The dimensions of the building. Lengths are rounded to whole boxes.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct OfficeSpec {
     /// Floors side by side, at least 1.

@@ -23,6 +23,7 @@
 
 use serde::de::{Error, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
+use serde_json::{Value, json};
 use std::fmt;
 use std::marker::PhantomData;
 
@@ -33,6 +34,9 @@ pub trait Rule {
 
     /// Returns the valid numbers in words that follow "give", e.g. "a number above 0".
     fn words() -> String;
+
+    /// Returns the valid numbers as a JSON Schema has them, e.g. `{ "exclusiveMinimum": 0 }`.
+    fn limits() -> Value;
 
     /// Returns the valid points in words that follow "give".
     fn words_of_point(dimensions: usize) -> String {
@@ -52,6 +56,10 @@ impl Rule for Any {
     fn words() -> String {
         "a finite number".into()
     }
+
+    fn limits() -> Value {
+        json!({})
+    }
 }
 
 /// Finite numbers above 0.
@@ -66,6 +74,10 @@ impl Rule for AboveZero {
     fn words() -> String {
         "a number above 0".into()
     }
+
+    fn limits() -> Value {
+        json!({ "exclusiveMinimum": 0 })
+    }
 }
 
 /// Finite numbers from 0 on.
@@ -79,6 +91,10 @@ impl Rule for FromZero {
 
     fn words() -> String {
         "a number of at least 0".into()
+    }
+
+    fn limits() -> Value {
+        json!({ "minimum": 0 })
     }
 }
 
@@ -113,6 +129,12 @@ impl<const LEAST: i64, const MOST: i64, const HAS_LEAST: bool, const HAS_MOST: b
             (true, false) => format!("{least} or more and less than {most}"),
             (false, false) => format!("more than {least} and less than {most}"),
         }
+    }
+
+    fn limits() -> Value {
+        let least = if HAS_LEAST { "minimum" } else { "exclusiveMinimum" };
+        let most = if HAS_MOST { "maximum" } else { "exclusiveMaximum" };
+        json!({ least: LEAST, most: MOST })
     }
 }
 

@@ -21,6 +21,12 @@ pub trait Kind: Sync {
     /// A commented scenario with every key.
     fn default_scenario(&self) -> &'static str;
 
+    /// Returns the JSON Schema of its sections, without the keys that all worlds share: see
+    /// [`crate::schema`]. Without one, all keys are taken.
+    fn sections(&self) -> serde_json::Value {
+        serde_json::json!({ "additionalProperties": true })
+    }
+
     /// Its metrics in words. Reports split the names of those that are not listed.
     fn meanings(&self) -> &'static [Meaning] {
         &[]

@@ -5,7 +5,8 @@
 //! through the files: [`Source`] reads the text and applies overrides (`overrides.rs`) and edits (`edit/`), serde turns
 //! it into sections ([`Sections`]) whose numbers check themselves ([`Number`], [`Whole`],
 //! [`Point`]), errors of the TOML reader get cause and remedy (`explain.rs`), and a [`Bundle`]
-//! gathers a scenario with all the files that it names.
+//! gathers a scenario with all the files that it names. The same sections give JSON Schemas for
+//! editors and forms ([`schema`]).
 
 mod bundle;
 mod checked;
@@ -18,8 +19,10 @@ mod locate;
 mod meaning;
 mod overrides;
 mod remark;
+pub mod schema;
 mod sections;
 mod source;
+mod spanned;
 
 pub use bundle::{Bundle, Resolved};
 pub use checked::{
@@ -34,3 +37,4 @@ pub use meaning::{Meaning, Told, told};
 pub use remark::{Remark, Severity};
 pub use sections::Sections;
 pub use source::{FORMAT, Head, Preamble, Source};
+pub use spanned::Spanned;

@@ -1,7 +1,9 @@
 //! Sections that occur once or several times.
 
+use crate::Spanned;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
-use toml::Spanned;
+use std::borrow::Cow;
 
 /// One table or an array of tables under one key, `[robots]` or `[[robots]]`; each keeps its
 /// position in the file.
@@ -22,6 +24,21 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Sections<T> {
             OneOrEach::One(one) => vec![Spanned::new(span, one)],
             OneOrEach::Each(many) => many,
         }))
+    }
+}
+
+impl<T: JsonSchema> JsonSchema for Sections<T> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        format!("Sections_of_{}", T::schema_name()).into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let one = generator.subschema_for::<T>();
+        json_schema!({ "oneOf": [one, { "type": "array", "items": one }] })
     }
 }
 

@@ -2,12 +2,13 @@
 
 use super::explain::explain;
 use super::locate::{locate, path};
+use crate::Spanned;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use sidestep_kernel::InputError;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use toml::Spanned;
 use toml::de::{DeTable, Deserializer};
 
 /// Version of the scenario format that this program reads.
@@ -36,15 +37,20 @@ pub struct Preamble {
     pub world: Spanned<String>,
 }
 
+/// Words in errors about what may go on over many lines.
+const OPEN: [&str; 4] = ["array", "inline table", "multi-line", "string"];
+
 /// Keys of [`Head`].
 const HEAD: [&str; 5] = ["format", "world", "name", "seed", "cycles"];
 
 /// The keys that all worlds share.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Head {
+    /// Version of the file's format.
     #[serde(rename = "format")]
     _format: u32,
+    /// Name of the world.
     #[serde(rename = "world")]
     _world: String,
     /// Name of the scenario; may be empty.
@@ -101,8 +107,27 @@ impl Source {
         // Two tables instead of a flattened field, which would lose the places of its entries.
         let (head, own): (DeTable<'_>, DeTable<'_>) =
             table.into_inner().into_iter().partition(|(key, _)| HEAD.contains(&&**key.get_ref()));
-        let part = |table| Deserializer::from(Spanned::new(span.clone(), table));
+        let part = |table| Deserializer::from(toml::Spanned::new(span.clone(), table));
         Ok((Head::deserialize(part(head)).map_err(told)?, T::deserialize(part(own)).map_err(told)?))
+    }
+
+    /// Returns what is no TOML: one error for each line, and none that only follows from an array, a
+    /// table or a text without an end.
+    pub fn syntax_errors(&self) -> Vec<InputError> {
+        let (_, errors) = DeTable::parse_recoverable(&self.text);
+        let mut told: Vec<InputError> = Vec::new();
+        for error in errors {
+            let error = self.explained(&error, &[]);
+            let line = |error: &InputError| error.position().map(|(line, _)| line);
+            if told.last().is_none_or(|last| line(last) != line(&error)) {
+                let is_open = OPEN.iter().any(|word| error.cause().contains(word));
+                told.push(error);
+                if is_open {
+                    break;
+                }
+            }
+        }
+        told
     }
 
     fn explained(&self, error: &toml::de::Error, also: &[&str]) -> InputError {
@@ -235,6 +260,17 @@ mod tests {
             assert_eq!(error.key(), key, "{error}");
         }
         assert!(read("n = 1\nworld = \"w\"").expect_err("no format").cause().contains("format"));
+    }
+
+    #[test]
+    fn all_lines_that_are_no_toml_are_told_and_nothing_that_follows_from_an_open_end() {
+        let lines = |text: &str| {
+            let errors = Source::new("s.toml", text, "").syntax_errors();
+            errors.iter().map(|e| e.position().expect("a place").0).collect::<Vec<_>>()
+        };
+        assert_eq!(lines("a = 1\n[b]\nc = \"d\"\n"), [0; 0]);
+        assert_eq!(lines("a = = 1\nb = 2\nc\n[d\ne = 3\n"), [1, 3, 4]);
+        assert_eq!(lines("a = 1 2\nb = [1,\n[c]\nd = 2\ne = 3\n").len(), 2);
     }
 
     #[test]

@@ -7,12 +7,14 @@
 //! session/     one thread per run    keyframes.rs checkpoints for seeking
 //! serve.rs     connections           doors.rs     how many of them
 //! encode/      frames as bytes       samples.rs   metrics against time    chronicle.rs   events
-//! files.rs     what may be read      results/     reports, exports   zip.rs       answers made small
+//! files.rs     what may be read      write.rs     what may be written     beside.rs      what a text can name
+//! results/     reports, exports      zip.rs       answers made small
 //! ```
 //! A session is a thread that owns a `Simulation`. Sockets pass requests to it by a channel and take replies, states
 //! and frames from an outbox into which sessions put without waiting. So nothing that a page does or leaves undone
 //! reaches a result, and a slow page loses frames, never the run. Whoever starts the server hands the worlds in.
 
+mod beside;
 mod chronicle;
 mod doors;
 mod encode;
@@ -31,6 +33,7 @@ mod samples;
 mod serve;
 mod session;
 mod socket;
+mod write;
 mod zip;
 
 pub use encode::Encoder;
@@ -77,7 +80,7 @@ pub struct Options {
     pub host: String,
     /// The port; 0 for any free one, `None` for the first free one of some.
     pub port: Option<u16>,
-    /// Whether texts of pages are refused.
+    /// Whether texts of pages are refused, and nothing is written.
     pub read_only: bool,
     /// The number of worker threads of each session.
     pub workers: usize,

@@ -32,7 +32,9 @@ impl Call {
     /// Returns the session that is asked, if it is one.
     pub(crate) fn session(&self) -> Option<SessionId> {
         match *self {
-            Self::Files { .. } | Self::Open { .. } | Self::Runs { .. } => None,
+            Self::Files { .. } | Self::Open { .. } | Self::Runs { .. } | Self::Schema { .. } => {
+                None
+            }
             Self::Close { session }
             | Self::Play { session, .. }
             | Self::Pause { session }

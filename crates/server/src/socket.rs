@@ -5,8 +5,9 @@ use crate::outbox::{Mail, Outbox};
 use crate::protocol::{Answer, Call, Outcome, Problem, Reply, SessionId, Subject};
 use crate::request::decode;
 use crate::results::runs;
-use crate::session::{Opening, Session, checked, ended};
+use crate::session::{Means, Opening, Session, checked, edited, ended, model};
 use axum::extract::ws::{Message, WebSocket};
+use sidestep::scenario::{Source, Worlds};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -163,13 +164,18 @@ impl Desk {
                 self.outbox.clear(session);
                 Some(closed.map(|_| Answer::Done))
             }
-            Call::Check { session, text } => {
-                let source = self.sessions.get(&session).and_then(Session::source);
-                let Some(source) = source else { return Some(Err(ended())) };
-                let means = self.house.means.clone();
-                self.aside(id, move || {
-                    Ok(Answer::Problems { problems: checked(&means, &source, text)? })
-                });
+            Call::Check { session, text } => self.on_text(id, session, move |means, source| {
+                Ok(Answer::Problems { problems: checked(means, source, text)? })
+            }),
+            Call::Edit { session, text, edits } => {
+                self.on_text(id, session, move |means, source| edited(means, source, text, edits))
+            }
+            Call::Model { session, text } => {
+                self.on_text(id, session, move |means, source| model(means, source, text))
+            }
+            Call::Schema { world } => {
+                let worlds = self.house.means.worlds;
+                self.aside(id, move || schema(worlds, &world));
                 None
             }
             call => {
@@ -198,6 +204,21 @@ impl Desk {
         Ok(())
     }
 
+    /// Answers a request on a text that stands for a session's scenario.
+    fn on_text(
+        &self,
+        id: u32,
+        session: SessionId,
+        work: impl FnOnce(&Means, &Source) -> Result<Answer, Problem> + Send + 'static,
+    ) -> Option<Result<Answer, Problem>> {
+        let Some(source) = self.sessions.get(&session).and_then(Session::source) else {
+            return Some(Err(ended()));
+        };
+        let means = self.house.means.clone();
+        self.aside(id, move || work(&means, &source));
+        None
+    }
+
     /// Answers a request in another thread, one after the other, as it may read files.
     fn aside(&self, id: u32, work: impl FnOnce() -> Result<Answer, Problem> + Send + 'static) {
         let (outbox, aside) = (self.outbox.clone(), self.aside.clone());
@@ -207,6 +228,18 @@ impl Desk {
             let _ = spawn_blocking(move || guarded(&outbox, id, || Some(work()))).await;
         });
     }
+}
+
+/// Returns the schema of a world's scenarios.
+///
+/// # Errors
+/// When there is no such world.
+fn schema(worlds: Worlds, world: &str) -> Result<Answer, Problem> {
+    let schema = worlds.schema(Some(world)).ok_or_else(|| {
+        let names = worlds.names().join(", ");
+        Problem::new(world, "no such world is known", format!("name one of {names}"))
+    })?;
+    Ok(Answer::Schema { schema })
 }
 
 /// Answers a request with what `work` returns, if it returns anything, and with a problem if it panics.

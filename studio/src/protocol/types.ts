@@ -184,7 +184,11 @@ to: string | null,
 /**
  * Whether a file is replaced that holds something else than this session has read or written.
  */
-over: boolean, };
+over: boolean, } | { "do": "schema",
+/**
+ * The world's name.
+ */
+world: string, };
 
 /**
  * A change of a text. Keys are those of `--set`: `robots.1.at.0`; elements count from 0, and a section that stands
@@ -407,7 +411,11 @@ place: string, } | { "is": "differs",
 /**
  * The content of the file.
  */
-text: string, };
+text: string, } | { "is": "schema",
+/**
+ * JSON Schema, draft 2020-12.
+ */
+schema: unknown, };
 
 /**
  * An error as people read it: where, what, remedy.

@@ -19,6 +19,7 @@ mod report;
 mod reproduce;
 mod resume;
 mod run;
+mod schema;
 mod studio;
 mod sweep;
 
@@ -28,7 +29,7 @@ use clap::Subcommand;
 
 /// The commands by what people do with them, in the order in which they meet them.
 pub(crate) const GROUPS: &[(&str, &[&str])] = &[
-    ("Prepare", &["new", "check", "map", "learn"]),
+    ("Prepare", &["new", "check", "schema", "map", "learn"]),
     ("Run and look at it", &["run", "studio", "resume", "replay", "report", "export"]),
     ("Study", &["sweep", "compare", "exact", "reproduce"]),
     ("Robot arms", &["fk", "ik"]),
@@ -46,6 +47,8 @@ pub(crate) enum Command {
     Check(check::CheckArgs),
     /// Create a commented scenario as a starting point
     New(new::NewArgs),
+    /// Write the keys of scenarios as JSON Schema, for editors
+    Schema(schema::SchemaArgs),
     /// Show a map as the simulator sees it, in the terminal or as PNG
     Map(map::MapArgs),
     /// Learn error models of sensors and wheels from a robot's logs
@@ -86,6 +89,7 @@ pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, F
         Command::Studio(args) => studio::studio(&args, *console),
         Command::Check(args) => check::check(&args, *console),
         Command::New(args) => new::new(&args, *console),
+        Command::Schema(args) => schema::schema(&args, *console),
         Command::Map(args) => map::map(&args, *console),
         Command::Learn(args) => learn::learn(&args, *console),
         Command::Exact(args) => exact::exact(&args, *console),

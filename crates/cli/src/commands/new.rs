@@ -31,7 +31,7 @@ pub(crate) struct NewArgs {
 }
 
 /// The names of the worlds, each with a description.
-fn names() -> PossibleValuesParser {
+pub(crate) fn names() -> PossibleValuesParser {
     let named = |kind: &&dyn Kind| PossibleValue::new(kind.name()).help(kind.about());
     PossibleValuesParser::new(worlds().0.iter().map(named))
 }

@@ -10,13 +10,13 @@ use tungstenite::client::IntoClientRequest;
 use tungstenite::{Message, WebSocket};
 
 /// The command while it runs.
-struct Studio {
+pub(crate) struct Studio {
     child: Child,
     url: String,
 }
 
 impl Studio {
-    fn start(place: &Place, args: &[&str]) -> Self {
+    pub(crate) fn start(place: &Place, args: &[&str]) -> Self {
         let all = [&["studio", "--no-open", "--port", "0", "--quiet"], args].concat();
         let mut child = place.start(&all);
         let out = child.stdout.take().expect("its output");
@@ -53,7 +53,7 @@ impl Studio {
         }
     }
 
-    fn page(&self) -> Page {
+    pub(crate) fn page(&self) -> Page {
         let origin = format!("http://{}", self.host());
         self.socket(&[("origin", &origin)]).expect("its own page")
     }
@@ -85,7 +85,7 @@ impl Drop for Studio {
 }
 
 /// A page that speaks with it.
-struct Page {
+pub(crate) struct Page {
     socket: WebSocket<TcpStream>,
     id: u32,
     notices: Vec<Value>,
@@ -110,7 +110,7 @@ impl Page {
     }
 
     /// Asks and waits for the reply.
-    fn reply(&mut self, call: Value) -> Value {
+    pub(crate) fn reply(&mut self, call: Value) -> Value {
         self.id += 1;
         let id = self.id;
         self.send(json!({ "id": id, "call": call }).to_string());
@@ -127,13 +127,13 @@ impl Page {
         }
     }
 
-    fn ask(&mut self, call: Value) -> Value {
+    pub(crate) fn ask(&mut self, call: Value) -> Value {
         let reply = self.reply(call.clone());
         assert!(reply.get("problem").is_none(), "{call}: {reply}");
         reply["answer"].clone()
     }
 
-    fn open(&mut self, path: &str) -> Value {
+    pub(crate) fn open(&mut self, path: &str) -> Value {
         self.ask(
             json!({ "do": "open", "what": { "kind": "scenario", "path": path }, "seed": null }),
         )

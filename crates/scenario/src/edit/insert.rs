@@ -19,6 +19,9 @@ pub(super) fn insert(
     value: &Json,
 ) -> Result<Vec<Splice>, Refusal> {
     let Reach { path, item, rest } = layout.reach(key)?;
+    if rest.is_empty() && matches!(path.last(), Some(Step::Index(_))) && item.is_table_like() {
+        return Err(refusal("it is an element of an array itself", "name the array"));
+    }
     let is_there = rest.is_empty() && !path.is_empty();
     let count = match item {
         _ if !is_there => 0,

@@ -35,7 +35,7 @@ pub(super) fn headed(
     let (Some(table), Json::Object(members), true) = (table, value, rest.is_empty()) else {
         return Ok(Vec::new());
     };
-    match members.keys().all(|name| table.contains_key(name)) {
+    match path.is_empty() || members.keys().all(|name| table.contains_key(name)) {
         true => Ok(Vec::new()),
         false => Ok(vec![before(layout, &path, "")]),
     }

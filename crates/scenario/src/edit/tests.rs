@@ -79,6 +79,7 @@ fn keys_and_the_tables_on_the_way_are_made() {
             (insert("map.sides", Some(0), json!("n")), &format!("{TEXT}sides = [\"n\"]\n")),
         ],
     );
+    assert_edits("a = 1\nc = 3\n", &[(set("0", json!({ "a": 1, "b": 2 })), "a = 1\nb = 2\n")]);
     assert_edits("", &[(set("a", json!(1)), "a = 1\n"), (set("a.b", json!(1)), "[a]\nb = 1\n")]);
     assert_edits("a.b = 1\nc = 2", &[(set("a.d.e", json!(1)), "a.b = 1\na.d.e = 1\nc = 2")]);
     assert_edits("t = {}\n", &[(set("t.a.b", json!(1)), "t = {a.b = 1}\n")]);
@@ -283,6 +284,7 @@ fn an_edit_that_does_not_fit_says_so_and_changes_nothing() {
         (insert("seed", None, json!(1)), "neither an array", "array"),
         (insert("at", Some(3), json!(1)), "no place 3", "count from 0"),
         (insert("robots", None, json!(1)), "is a table", "give a table"),
+        (insert("robots.1", None, json!({})), "an element", "name the array"),
         (remove("sede"), "no key `sede`", "`seed`"),
         (remove("robots.2"), "no element 2", "count from 0"),
         (relocate("robots.0", 2), "no place 2", "count from 0"),

@@ -162,6 +162,11 @@ pub enum Call {
         /// Whether a file is replaced that holds something else than this session has read or written.
         over: bool,
     },
+    /// Asks for the JSON Schema of a world's scenarios.
+    Schema {
+        /// The world's name.
+        world: String,
+    },
 }
 
 /// A thing that can be opened.

@@ -126,6 +126,12 @@ pub enum Answer {
         /// The content of the file.
         text: String,
     },
+    /// The keys of a world's scenarios.
+    Schema {
+        /// JSON Schema, draft 2020-12.
+        #[cfg_attr(test, ts(type = "unknown"))]
+        schema: serde_json::Value,
+    },
 }
 
 /// An error as people read it: where, what, remedy.

@@ -188,6 +188,7 @@ impl Player {
                 let (place, text) = (source.place.clone(), source.text.clone());
                 Ok(Answer::Source { place, text, read_only: self.stage.is_fixed() })
             }
+            Call::Save { text, to, over, .. } => self.stage.save(text, to, over),
             Call::Tables { .. } => self.stage.tables().map(|names| Answer::Tables { names }),
             _ => Err(Problem::new("request", "it is not for a session", "report this as a bug")),
         }

@@ -3,10 +3,10 @@
 
 use super::flight::{FlightOrder, MAX_ORDERS, Task, Track, TrackPoint};
 use super::scenario::{Measure, TurnRate, Turns};
+use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::{InputError, math};
-use sidestep_scenario::{AboveTo, FromTo, Number, Point, Source};
-use toml::Spanned;
+use sidestep_scenario::{AboveTo, FromTo, Number, Point, Source, Spanned};
 
 /// Rate at which levels are changed when an order does not give one: 1500 ft/min.
 pub(super) const CLIMB_M_S: f64 = 7.62;
@@ -16,36 +16,52 @@ type Value = Number<FromTo<-1_000_000_000, 1_000_000_000>>;
 type Time = Number<FromTo<0, 1_000_000_000>>;
 type Place = Point<2, FromTo<-1_000_000_000, 1_000_000_000>>;
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct AirplaneSection {
     callsign: Option<Spanned<String>>,
+    /// Place at the start.
     pub(super) at_m: Option<Place>,
+    /// Heading at the start, counter-clockwise from east.
     pub(super) heading_deg: Option<Value>,
+    /// Places to fly to, one after the other.
     way_points_m: Option<Vec<Place>>,
     pub(super) altitude_m: Option<Value>,
     pub(super) appears_s: Option<Time>,
+    /// Recorded track: [t_s, x_m, y_m, altitude_m], ...
     track: Option<Spanned<Vec<[f64; 4]>>>,
     #[serde(default)]
     orders: Vec<Spanned<OrderSection>>,
+    /// Speed, if not that of all.
     pub(super) v_m_s: Option<Measure>,
+    /// Greatest turn rate, if not that of all.
     pub(super) omega_max_deg_s: Option<Number<TurnRate>>,
+    /// Distance that others have to keep, if not that of all.
     pub(super) separation_m: Option<Measure>,
+    /// Number of turn rates to choose from, if not that of all.
     pub(super) turns: Option<Turns>,
     #[serde(default)]
     pub(super) intruder: bool,
 }
 
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 struct OrderSection {
+    /// Time of the order.
     at_s: Option<Time>,
+    /// Heading to fly until sent to a way-point.
     heading_deg: Option<Value>,
+    /// Speed to fly with.
     speed_m_s: Option<Measure>,
+    /// Level to go to.
     altitude_m: Option<Value>,
+    /// Rate of the change of level.
     climb_m_s: Option<Number<AboveTo<0, 1_000_000_000>>>,
+    /// Way-points instead of those it has.
     way_points_m: Option<Vec<Place>>,
+    /// Whether it goes on to its next way-point.
     proceeds: Option<bool>,
+    /// Whether it leaves the airspace.
     leaves: Option<bool>,
 }
 

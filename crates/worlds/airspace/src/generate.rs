@@ -2,6 +2,7 @@
 
 use super::flight::{Airplane, Model, Point, Pose, distance_m};
 use super::purpose;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::stream::{Draws, Streams};
 use sidestep_kernel::{interrupt, math};
@@ -12,7 +13,7 @@ use std::f64::consts::TAU;
 const TRIES: usize = 2_000;
 
 /// Kinds of generated traffic.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum GeneratorKind {
     /// On a circle, each to the opposite point.

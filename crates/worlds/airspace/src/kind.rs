@@ -29,6 +29,10 @@ impl Kind for Airspace {
         include_str!("default.toml")
     }
 
+    fn sections(&self) -> serde_json::Value {
+        super::scenario::sections()
+    }
+
     fn meanings(&self) -> &'static [Meaning] {
         super::meanings::MEANINGS
     }

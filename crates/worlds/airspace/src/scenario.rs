@@ -15,13 +15,14 @@ use super::world::{AirspaceWorld, Method};
 use airplanes::{GeneratorSection, ModelSection};
 use compile::Compiler;
 use network::NetworkSection;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 use settings::{LegsSection, ReactiveSection, Switch, Times};
 use sidestep_collectives::{Choice, Estimator, Order, Update, Utility};
 use sidestep_kernel::InputError;
-use sidestep_scenario::{FromTo, Number, Point, Rule, Sections, Seeds, Source};
+use sidestep_scenario::{FromTo, Number, Point, Rule, Sections, Seeds, Source, Spanned, schema};
 use std::sync::Arc;
-use toml::Spanned;
 use values::{
     Cooling, Decision, Fading, Gibibytes, HeadingNoise, Inflation, LevelGap, LookAhead, Rounds,
     Step, Tolerance, Weight,
@@ -29,7 +30,7 @@ use values::{
 pub(super) use values::{Measure, TurnRate, Turns};
 
 /// Sets of parameters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Preset {
     /// The safe set: exact expectations, hardly any weight on deviations, a margin on the
@@ -40,7 +41,7 @@ pub enum Preset {
     Paper,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct AirspaceFile {
     #[serde(default)]
@@ -52,7 +53,7 @@ struct AirspaceFile {
     record: RecordSection,
 }
 
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 struct AirspaceSection {
     preset: Preset,
@@ -65,6 +66,7 @@ struct AirspaceSection {
     dtau_s: Option<Spanned<Number<Step>>>,
     horizon_s: Option<Spanned<Number<LookAhead>>>,
     /// The former key, which counted points; only its error is left.
+    #[schemars(skip)]
     horizon: Option<Spanned<toml::Value>>,
     tolerance_m: Option<Number<Tolerance>>,
     alpha: Option<Number<Weight>>,
@@ -95,6 +97,11 @@ struct AirspaceSection {
     error_sigmas: Option<Number<FromTo<0, 100>>>,
 }
 
+/// Returns the JSON Schema of a scenario's sections.
+pub(super) fn sections() -> Value {
+    schema::of::<AirspaceFile>()
+}
+
 /// The times until which tracks may be replayed, infinity included.
 #[derive(Debug, Clone, Copy)]
 struct UntilWhen;
@@ -107,10 +114,14 @@ impl Rule for UntilWhen {
     fn words() -> String {
         "seconds after the start, 0 to fly all anew, or inf to replay all".into()
     }
+
+    fn limits() -> Value {
+        schema::or_infinite(json!({ "minimum": 0 }))
+    }
 }
 
 /// The tables that a run keeps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordSection {
     /// A row per airplane and cycle.

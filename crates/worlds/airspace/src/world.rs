@@ -10,13 +10,14 @@ use super::flight::{
 use super::intruder::Intruder;
 use super::objective::{Objective, Options};
 use super::shield::{Bounds, Side, common_rates};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, Order, Settings};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId, Slot, interrupt};
 
 /// The methods by which airplanes choose their actions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// Probability collectives.

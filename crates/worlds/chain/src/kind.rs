@@ -28,6 +28,10 @@ impl Kind for Chains {
         include_str!("default.toml")
     }
 
+    fn sections(&self) -> serde_json::Value {
+        super::scenario::sections()
+    }
+
     fn meanings(&self) -> &'static [Meaning] {
         super::meanings::MEANINGS
     }

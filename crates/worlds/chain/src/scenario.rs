@@ -17,13 +17,17 @@ use super::rods::rules::{Rotation, Rules};
 use super::world::{ChainSpec, ChainWorld};
 use chains::ChainSection;
 use obstacles::{FieldSection, GroundSection, ObstacleSection, fitted};
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
+use serde_json::{Value, json};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
-use sidestep_scenario::{AboveTo, Head, Number, Rule, Sections, Source, Whole, refused};
+use sidestep_scenario::{
+    AboveTo, Head, Number, Rule, Sections, Source, Spanned, Whole, refused, schema,
+};
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
-use toml::Spanned;
 
 /// Largest length, time or coordinate of a scenario.
 const MOST: f64 = 1e6;
@@ -48,6 +52,10 @@ impl Rule for Coordinate {
         "-1e6 to 1e6".into()
     }
 
+    fn limits() -> Value {
+        json!({ "minimum": -MOST, "maximum": MOST })
+    }
+
     fn words_of_point(dimensions: usize) -> String {
         format!("{dimensions} finite numbers, up to 1e6; chain.dimensions is {dimensions}")
     }
@@ -65,6 +73,10 @@ impl Rule for Unbounded {
     fn words() -> String {
         "a number above 0, or inf".into()
     }
+
+    fn limits() -> Value {
+        schema::or_infinite(json!({ "exclusiveMinimum": 0 }))
+    }
 }
 
 /// Numbers above 0 up to 1e6.
@@ -78,6 +90,10 @@ impl Rule for StepMost {
 
     fn words() -> String {
         "a number above 0 and at most 1e6, or inf".into()
+    }
+
+    fn limits() -> Value {
+        schema::or_infinite(json!({ "exclusiveMinimum": 0, "maximum": MOST }))
     }
 }
 
@@ -98,6 +114,24 @@ impl<'de, const D: usize> Deserialize<'de> for Room<D> {
     }
 }
 
+impl<const D: usize> JsonSchema for Room<D> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Room".into()
+    }
+
+    fn schema_id() -> Cow<'static, str> {
+        format!("Room_{D}").into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        <[Place<D>; 2]>::json_schema(generator)
+    }
+}
+
 impl<const D: usize> Room<D> {
     /// Returns the floor of the box.
     fn in_the_plane(&self) -> Bounds<2> {
@@ -106,19 +140,20 @@ impl<const D: usize> Room<D> {
 }
 
 /// The part of a scenario that says how its points are to be read.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 struct Shape {
     #[serde(default)]
     chain: ShapeSection,
 }
 
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Default, Deserialize, JsonSchema)]
 struct ShapeSection {
     dimensions: Option<Spanned<usize>>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "ChainFile")]
 struct ChainFile<const D: usize> {
     #[serde(default)]
     chain: RulesSection,
@@ -134,8 +169,13 @@ struct ChainFile<const D: usize> {
     record: RecordSection,
 }
 
+/// Returns the JSON Schema of a scenario's sections, with places in the plane and in space.
+pub(super) fn sections() -> Value {
+    schema::widened(&schema::of::<ChainFile<2>>(), &schema::of::<ChainFile<3>>())
+}
+
 /// The behavior of a rod that hits an obstacle, by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum RotationWord {
     #[default]
@@ -144,10 +184,11 @@ enum RotationWord {
     Never,
 }
 
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 struct RulesSection {
     #[serde(rename = "dimensions")]
+    #[schemars(range(min = 2, max = 3))]
     _dimensions: Option<usize>,
     dt_s: Option<Measure>,
     rotation: RotationWord,
@@ -165,7 +206,7 @@ struct RulesSection {
 }
 
 /// The time at which chains get out of the way of moving obstacles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum EscapeWord {
     /// Before they are touched.
@@ -178,7 +219,7 @@ enum EscapeWord {
 }
 
 /// The tables that a run records.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordSection {
     /// One row per connector and recorded cycle.
@@ -191,6 +232,7 @@ pub struct RecordSection {
     pub events: bool,
     /// One cycle in this many is recorded; events are recorded in all.
     #[serde(deserialize_with = "Whole::<1>::read")]
+    #[schemars(with = "Whole<1>")]
     pub every: u64,
     /// Cycles between two checkpoints; 0 for none.
     pub checkpoint_every: u64,

@@ -3,6 +3,7 @@
 //! Source: the paper's action modeling (a set of transitions with probabilities per agent type and
 //! action, learned in free space) and its adaptation to places with obstacles.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::distr::{Categorical, RowError};
 
@@ -123,7 +124,7 @@ impl EffectorModel {
 }
 
 /// The rule for a transition whose path meets an obstacle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum ObstacleRule {
     /// The path is cut at the first box that is not free.

@@ -48,6 +48,10 @@ impl Kind for Robots {
         include_str!("default.toml")
     }
 
+    fn sections(&self) -> serde_json::Value {
+        super::scenario::sections(&self.own)
+    }
+
     fn meanings(&self) -> &'static [Meaning] {
         super::meanings::MEANINGS
     }

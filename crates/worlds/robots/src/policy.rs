@@ -1,9 +1,10 @@
 //! The order in which the bodies of a conflict group act.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The order within a conflict group.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ConflictPolicy {
     /// A fair draw per body and cycle.

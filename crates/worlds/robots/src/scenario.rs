@@ -6,27 +6,31 @@ mod located;
 mod parts;
 mod placing;
 mod random;
+mod schema;
 mod tables;
 
 pub use crate::world::StorageOrder;
 pub use compile::{Behaviours, Compiled, presets};
+pub(super) use schema::sections;
 
 use super::effector::ObstacleRule;
 use super::policy::ConflictPolicy;
 use super::world::Regime;
 use parts::{BoxSide, Period, Placing, QuarterTurns, Side, Steps};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use sidestep_map::UnknownPolicy;
 use sidestep_map::office::OfficeSpec;
-use sidestep_scenario::{AboveBelow, AboveTo, Number, Positive, Sections, Share};
+use sidestep_scenario::{AboveBelow, AboveTo, Number, Positive, Sections, Share, Spanned};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use toml::Spanned;
 
 /// A whole robots scenario. Every key is described in `scenarios/robots/default.toml`.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RobotsFile {
+    /// A sentence about the scenario.
     #[serde(default, rename = "description")]
     _description: String,
     #[serde(default)]
@@ -40,10 +44,13 @@ pub(super) struct RobotsFile {
     #[serde(default)]
     pub(super) profiles: Vec<Spanned<PathBuf>>,
     pub(super) map: Spanned<MapSection>,
+    /// Kinds of bodies beside wall, door, person and robot.
     #[serde(default)]
     pub(super) kinds: BTreeMap<Spanned<String>, KindSection>,
+    /// Sensors by name.
     #[serde(default)]
     pub(super) sensors: BTreeMap<String, Spanned<SensorSection>>,
+    /// Effectors by name.
     #[serde(default)]
     pub(super) effectors: BTreeMap<String, Spanned<EffectorSection>>,
     #[serde(default)]
@@ -58,7 +65,7 @@ pub(super) struct RobotsFile {
 }
 
 /// A file with sensors and effectors only: a learned profile, or the presets.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ProfileFile {
     pub(super) format: Spanned<u32>,
@@ -70,7 +77,7 @@ pub(super) struct ProfileFile {
     pub(super) effectors: BTreeMap<String, Spanned<EffectorSection>>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct MapSection {
     pub(super) file: Option<PathBuf>,
@@ -82,30 +89,36 @@ pub(super) struct MapSection {
     pub(super) unknown: UnknownPolicy,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct KindSection {
+    /// Name of what sensors take it for; its own name by default.
     pub(super) observation: Option<Spanned<String>>,
 }
 
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SensorSection {
     pub(super) bearings_deg: Spanned<Vec<f64>>,
+    /// Length of the beams.
     pub(super) range_m: Number<AboveTo<0, 10_000>>,
     pub(super) observations: Spanned<Vec<String>>,
     #[serde(default)]
     pub(super) designates: BTreeMap<Spanned<String>, Spanned<String>>,
+    /// Probability of each report, one row for each true observation.
     pub(super) confusion: Spanned<Rows>,
     #[serde(default)]
     pub(super) confusion_by_class: BTreeMap<Spanned<String>, Spanned<Rows>>,
     #[serde(default)]
     pub(super) distance_edges_m: Option<Spanned<Vec<f64>>>,
+    /// Names of the distance classes, one more than there are edges.
     #[serde(default)]
     pub(super) distance_classes: Option<Spanned<Vec<String>>>,
     #[serde(default)]
     pub(super) distance_confusion: Option<Spanned<Rows>>,
+    /// Counts and sources of a learned table; nothing depends on them.
     #[serde(default, rename = "evidence")]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     _evidence: toml::Table,
 }
 
@@ -150,26 +163,56 @@ impl<'de> Deserialize<'de> for EffectorSection {
     }
 }
 
-#[derive(Debug, Clone, Deserialize)]
+impl JsonSchema for EffectorSection {
+    fn schema_name() -> Cow<'static, str> {
+        "EffectorSection".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let action = generator.subschema_for::<Vec<TransitionSection>>();
+        let mut box_m = Positive::json_schema(generator);
+        let words = "Side of the boxes that its tables were learned for.";
+        box_m.insert("description".into(), words.into());
+        let words = "Counts and sources of learned tables; nothing depends on them.";
+        json_schema!({
+            "type": "object",
+            "properties": {
+                "box_m": box_m,
+                "evidence": { "type": "object", "description": words },
+            },
+            "additionalProperties": action,
+            "required": ["forward"],
+        })
+    }
+}
+
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TransitionSection {
+    /// Probability of this end of the action.
     pub(super) p: f64,
+    /// Steps: F ahead, L to the left, B back, R to the right.
     #[serde(default)]
     pub(super) path: Steps,
+    /// Turn after the steps, in degrees, positive to the left.
     #[serde(default)]
     pub(super) turn: QuarterTurns,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RobotSection {
+    /// A name for people.
     #[serde(default, rename = "name")]
     _name: String,
+    /// Kind of the robots.
     #[serde(default = "robot_kind")]
     pub(super) kind: Spanned<String>,
     pub(super) count: Option<Spanned<u32>>,
+    /// Places: [column, row] or [column, row, heading].
     #[serde(default)]
     pub(super) at: Vec<Spanned<Placing>>,
+    /// Rectangle in which places are drawn.
     pub(super) region: Option<Spanned<[u32; 4]>>,
     pub(super) scen: Option<Spanned<PathBuf>>,
     pub(super) size: Option<Side>,
@@ -181,29 +224,43 @@ pub(super) struct RobotSection {
     pub(super) behaviour: Option<Spanned<BehaviourSection>>,
 }
 
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct BehaviourSection {
+    /// Name of the behavior.
     pub(super) kind: String,
+    /// Mean number of actions between turns of one who wanders.
     pub(super) turn_every: Option<u32>,
+    /// One end of a shuttle: [column, row, width, height].
     pub(super) a: Option<[u32; 4]>,
+    /// The other end of a shuttle: [column, row, width, height].
     pub(super) b: Option<[u32; 4]>,
+    /// Boxes to go to, one after the other: [[column, row], ...].
     pub(super) goals: Option<Vec<(u32, u32)>>,
+    /// Actions to replay, by name.
     pub(super) actions: Option<Vec<String>>,
+    /// Whether goals or actions begin anew at their end.
     pub(super) repeat: Option<bool>,
+    /// Way past what stands in the way.
     pub(super) avoidance: Option<AvoidanceSection>,
+    /// Weight of each action, by name.
     pub(super) weights: Option<BTreeMap<String, f64>>,
+    /// Weight of each action after a contact, by name.
     pub(super) weights_after_contact: Option<BTreeMap<String, f64>>,
 }
 
 /// The way of robots that go somewhere past obstacles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum AvoidanceSection {
+    /// Plans a way round what is sensed, and makes room for others.
     #[default]
     Plan,
+    /// Sidesteps from near things.
     Avoid,
+    /// Sidesteps from what was reported twice.
     Filter,
+    /// Turns after contacts.
     Touch,
 }
 
@@ -237,26 +294,32 @@ impl BehaviourSection {
     }
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct MoverSection {
+    /// A name for people.
     #[serde(default, rename = "name")]
     _name: String,
+    /// Kind of the bodies.
     #[serde(default = "person_kind")]
     pub(super) kind: Spanned<String>,
     pub(super) count: Option<Spanned<u32>>,
+    /// Places: [column, row].
     #[serde(default)]
     pub(super) at: Vec<Spanned<Placing>>,
+    /// Rectangle in which places are drawn.
     pub(super) region: Option<Spanned<[u32; 4]>>,
     pub(super) size: Option<[Side; 2]>,
     pub(super) period: Option<Period>,
+    /// Cycle of the period in which they act.
     pub(super) phase: Option<u32>,
     pub(super) p_straight: Option<Share>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct DoorSection {
+    /// Kind of the doors.
     #[serde(default = "door_kind")]
     pub(super) kind: Spanned<String>,
     #[serde(default)]
@@ -268,22 +331,27 @@ pub(super) struct DoorSection {
     pub(super) random: Option<RandomSection>,
 }
 
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PeriodicSection {
+    /// Cycles in which it is open.
     pub(super) open: u64,
+    /// Cycles in which it is closed.
     pub(super) closed: u64,
+    /// Cycles of the period that are over at the start.
     pub(super) phase: Option<u64>,
 }
 
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RandomSection {
+    /// Chance per cycle that a closed door opens.
     pub(super) p_open: Share,
+    /// Chance per cycle that an open door closes.
     pub(super) p_close: Share,
 }
 
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RadioSection {
     pub(super) range_m: Number<AboveBelow<0, 1_000_000>>,
@@ -291,7 +359,7 @@ pub(super) struct RadioSection {
 }
 
 /// The tables that a run keeps in addition to its summary.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordSection {
     /// Pose of every body at every cycle.

@@ -5,6 +5,7 @@ use super::effector::{Action, EffectorModel, ObstacleRule};
 use super::policy::ConflictPolicy;
 use super::ray::{Crossing, EPSILON, crossings, turn_crossing};
 use super::sensor::{Reading, ReadingTable, Row, SensorModel};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::distr::{Chance, RowError};
@@ -46,7 +47,7 @@ impl StorageOrder {
 }
 
 /// The errors that are switched on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Regime {
     /// Neither sensors nor effectors err.

@@ -1,10 +1,11 @@
 //! The deployments, by their names in scenarios.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, Order, Settings, Utility};
 
 /// A deployment of the optimizer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Deployment {
     /// One process decides for all.

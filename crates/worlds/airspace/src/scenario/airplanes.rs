@@ -8,26 +8,30 @@ use crate::flight::{Model, Pose, Timing};
 use crate::flight_plan::AirplaneSection;
 use crate::generate::GeneratorKind;
 use crate::generate::{Order, generate};
+use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Streams;
-use sidestep_scenario::{AboveBelow, FromBelow, Number, Whole};
-use toml::Spanned;
+use sidestep_scenario::{AboveBelow, FromBelow, Number, Spanned, Whole};
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GeneratorSection {
     kind: GeneratorKind,
+    /// Number of airplanes.
     n: Whole<1, 1_000_000>,
     radius_m: Option<Number<AboveBelow<0, 1_000_000_000>>>,
     jitter_m: Option<Number<FromBelow<0, 1_000_000>>>,
 }
 
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct ModelSection {
+    /// Speed.
     v_m_s: Option<Measure>,
+    /// Greatest turn rate.
     omega_max_deg_s: Option<Number<TurnRate>>,
+    /// Distance that all keep from each other.
     separation_m: Option<Measure>,
     turns: Option<Turns>,
 }

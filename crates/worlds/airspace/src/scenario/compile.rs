@@ -13,9 +13,8 @@ use crate::state::AirspaceState;
 use crate::world::{AirspaceWorld, Disturbance, Method};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
-use sidestep_scenario::{Head, Seeds, Source};
+use sidestep_scenario::{Head, Seeds, Source, Spanned};
 use std::sync::Arc;
-use toml::Spanned;
 
 /// Meters by which levels that are far enough apart may seem nearer because they were rounded.
 const ROUNDED_M: f64 = 1e-6;

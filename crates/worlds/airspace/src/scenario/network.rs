@@ -6,13 +6,14 @@ use crate::deploy::Deployment;
 use crate::flight::Airplane;
 use crate::flight::Timing;
 use crate::flight::{FlightOrder, Task};
+use schemars::JsonSchema;
 use serde::Deserialize;
+use serde_json::{Value, json};
 use sidestep_kernel::{EntityId, InputError};
-use sidestep_scenario::{FromBelow, NonNegative, Number, Positive, Rule, Share};
+use sidestep_scenario::{FromBelow, NonNegative, Number, Positive, Rule, Share, Spanned, schema};
 use std::ops::Range;
-use toml::Spanned;
 
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct NetworkSection {
     loss: Option<Chance>,
@@ -29,11 +30,14 @@ pub(super) struct NetworkSection {
     one_way: Vec<Spanned<OneWay>>,
 }
 
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct BurstsSection {
+    /// Probability of a loss within a burst.
     loss: Share,
+    /// Mean length of a burst.
     lasts_s: Positive,
+    /// Mean time between two bursts.
     every_s: Positive,
 }
 
@@ -59,6 +63,10 @@ impl Rule for Latency {
     fn words() -> String {
         "at least 1e-6 s".into()
     }
+
+    fn limits() -> Value {
+        json!({ "minimum": 1e-6 })
+    }
 }
 
 /// A bandwidth that carries a message in the time of a flight.
@@ -72,6 +80,10 @@ impl Rule for Bandwidth {
 
     fn words() -> String {
         "at least 1 bit/s".into()
+    }
+
+    fn limits() -> Value {
+        schema::or_infinite(json!({ "minimum": 1 }))
     }
 }
 

@@ -5,10 +5,12 @@ use super::values::Held;
 use crate::baseline::Reactive;
 use crate::flight::Legs;
 use crate::objective::Objective;
+use schemars::JsonSchema;
 use serde::Deserialize;
+use serde_json::json;
 use sidestep_collectives::{Choice, Estimator, Order, Settings, Stop, Update, Utility};
 use sidestep_kernel::{InputError, math};
-use sidestep_scenario::{AboveTo, FromTo, Number, Rule as _, refused};
+use sidestep_scenario::{AboveTo, FromTo, Number, Rule as _, refused, schema_by_hand};
 
 /// Largest number of samples of a block.
 const MOST_SAMPLES: usize = 10_000;
@@ -30,18 +32,28 @@ impl<'de> Deserialize<'de> for Times {
     }
 }
 
-#[derive(Debug, Default, Deserialize)]
+schema_by_hand!(Times, {
+    let mut time = Held::limits();
+    time["type"] = "number".into();
+    json!({ "type": "array", "items": time, "maxItems": MOST_TIMES })
+});
+
+#[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct LegsSection {
+    /// Times for which an airplane turns.
     turns_s: Times,
+    /// Times until which it then flies straight on.
     until_s: Times,
 }
 
 /// The settings of a method that looks ahead anew in every step.
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct ReactiveSection {
+    /// Time within which conflicts are seen.
     look_ahead_s: Option<Number<LookAhead>>,
+    /// Factor on the separation that is kept.
     margin: Option<Number<Margin>>,
 }
 
@@ -80,6 +92,8 @@ impl<'de> Deserialize<'de> for Switch {
         }
     }
 }
+
+schema_by_hand!(Switch, json!({ "enum": ["on", "off"], "default": "on" }));
 
 impl Compiler<'_> {
     /// Returns the objective. Its sums are over points, and the scenario's weights are per second:

@@ -1,7 +1,8 @@
 //! Values of airplanes that check themselves on reading.
 
 use serde::Deserialize;
-use sidestep_scenario::{AboveBelow, Number, Rule, refused};
+use serde_json::{Value, json};
+use sidestep_scenario::{AboveBelow, Number, Rule, refused, schema_by_hand};
 
 /// A speed or a separation.
 pub(crate) type Measure = Number<AboveBelow<0, 1_000_000>>;
@@ -20,6 +21,10 @@ macro_rules! bounds {
 
             fn words() -> String {
                 concat!($words, ": ", $reason).into()
+            }
+
+            fn limits() -> Value {
+                json!({ "minimum": $least, "maximum": $most })
             }
         }
     )*};
@@ -56,6 +61,8 @@ impl<'de> Deserialize<'de> for Rounds {
     }
 }
 
+schema_by_hand!(Rounds, json!({ "type": "integer", "minimum": 1, "maximum": 10_000 }));
+
 /// A number of turns to choose from.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Turns(pub(super) usize);
@@ -70,3 +77,8 @@ impl<'de> Deserialize<'de> for Turns {
         Ok(Self(turns as usize))
     }
 }
+
+schema_by_hand!(Turns, {
+    let odd: Vec<u32> = (3..=99).step_by(2).collect();
+    json!({ "type": "integer", "enum": odd })
+});

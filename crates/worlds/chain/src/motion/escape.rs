@@ -22,6 +22,7 @@ use crate::rods::obstacle::{Obstacle, Obstacles};
 use crate::rods::propagate::Propagator;
 use crate::rods::veto::Veto;
 use literal::Literal;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
 use simultaneous::Simultaneous;
@@ -29,7 +30,7 @@ pub use simultaneous::WayOut;
 pub(crate) use threat::Part;
 
 /// The method by which a chain gets out of the way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// All constraints of a tick are solved at once; who is caught is led out.

@@ -3,21 +3,28 @@
 use super::super::arms::arm::Arm;
 use super::super::arms::kinematics::SerialChain;
 use super::Compiler;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_import::urdf::Model;
 use sidestep_import::urdf::srdf::Semantics;
 use sidestep_kernel::InputError;
+use sidestep_scenario::Spanned;
 use std::ops::Range;
-use toml::Spanned;
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ArmSection {
+    /// File of the arm (URDF).
     urdf: String,
+    /// Link that stands still; the root by default.
     base: Option<String>,
+    /// Link that is the tip.
     tip: Option<String>,
+    /// File of postures (SRDF).
     srdf: Option<String>,
+    /// Name of the posture at the start.
     posture: Option<String>,
+    /// Values of the joints at the start, in radians or meters.
     joints: Option<Vec<f64>>,
 }
 

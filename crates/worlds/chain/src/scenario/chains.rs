@@ -16,12 +16,12 @@ use super::navigators::RobotsSection;
 use super::obstacles::fitted;
 use super::tasks::TaskSection;
 use super::{Compiler, Place, Room};
+use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::{InputError, Seed, math};
-use sidestep_scenario::{Limits, Sections};
+use sidestep_scenario::{Limits, Sections, Spanned};
 use std::ops::Range;
 use std::sync::Arc;
-use toml::Spanned;
 
 /// Room around the parts of a chain that starts anywhere, as a multiple of its radius.
 const ROOM: f64 = 1.2;
@@ -32,9 +32,11 @@ const MAX_STEPS: f64 = 1e5;
 /// Most connectors of all chains together: some 3 GB.
 const MAX_CONNECTORS: usize = 10_000_000;
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "ChainSection")]
 pub(super) struct ChainSection<const D: usize> {
+    /// A name for people.
     #[serde(default)]
     name: String,
     #[serde(default = "one_chain")]
@@ -67,13 +69,18 @@ fn one_chain() -> usize {
 }
 
 /// Limits of one connector.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "LimitSection")]
 pub(super) struct LimitSection<const D: usize> {
+    /// Number of the connector, from 0.
     connector: usize,
     mobility: Option<MobilitySection<D>>,
+    /// Greatest angle between its two rods.
     max_bend_deg: Option<f64>,
+    /// Its radius.
     radius_m: Option<f64>,
+    /// Whether it has failed and stands still.
     failed: Option<bool>,
 }
 

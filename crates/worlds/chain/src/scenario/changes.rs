@@ -5,13 +5,13 @@ use super::super::rods::rebuild::MayCome;
 use super::super::world::{Change, What};
 use super::mobility::MobilitySection;
 use super::{Compiler, Measure, Place};
+use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
-use sidestep_scenario::{AboveBelow, NonNegative, Number};
+use sidestep_scenario::{AboveBelow, NonNegative, Number, Spanned};
 use std::ops::Range;
-use toml::Spanned;
 
-#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum MayComeWord {
     #[default]
@@ -21,19 +21,25 @@ enum MayComeWord {
 }
 
 /// One change: exactly one of the keys beside the time.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "ChangeSection")]
 pub(super) struct ChangeSection<const D: usize> {
+    /// Time of the change.
     at_s: NonNegative,
+    /// Number of the connector that changes, from 0.
     connector: Option<usize>,
     failed: Option<bool>,
+    /// Greatest angle between its two rods from then on.
     max_bend_deg: Option<f64>,
+    /// Places where it may be from then on.
     mobility: Option<MobilitySection<D>>,
     scatter: Option<[usize; 2]>,
     by_m: Option<Number<AboveBelow<0, 10_000>>>,
     apart_m: Option<Place<D>>,
     reform: Option<bool>,
     may_come: Option<MayComeWord>,
+    /// Speed at which they come back.
     speed_m_s: Option<Measure>,
 }
 

@@ -2,16 +2,23 @@
 
 use super::super::rods::chain::Mobility;
 use super::Place;
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// The places where a connector may be.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[schemars(rename = "MobilitySection")]
 pub(super) enum MobilitySection<const D: usize> {
+    /// Anywhere.
     Free,
+    /// Where it is.
     Fixed,
+    /// On the line between two points.
     OnSegment([Place<D>; 2]),
+    /// On a line or a plane, given by its normal and its distance from the origin.
     OnPlane { normal: Place<D>, offset_m: f64 },
+    /// In a box, given by its lower and its upper corner.
     InBox([Place<D>; 2]),
 }
 

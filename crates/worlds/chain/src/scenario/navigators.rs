@@ -7,11 +7,12 @@ use super::super::swarm::follower::Follower;
 use super::super::swarm::laser::Laser;
 use super::super::swarm::leader::{Leader, LeaveRule, Leaving, TargetSense, Turning};
 use super::{Compiler, MOST, Unbounded};
+use schemars::JsonSchema;
 use serde::Deserialize;
+use serde_json::{Value, json};
 use sidestep_kernel::InputError;
-use sidestep_scenario::{Number, Point, Rule};
+use sidestep_scenario::{Number, Point, Rule, Spanned};
 use std::f64::consts::PI;
-use toml::Spanned;
 
 /// Distance between points of a corridor's middle, meters.
 const LINE_STEP_M: f64 = 0.1;
@@ -34,9 +35,13 @@ impl Rule for OfARobot {
     fn words() -> String {
         "a number from 1e-6 to 1e6".into()
     }
+
+    fn limits() -> Value {
+        json!({ "minimum": 1e-6, "maximum": MOST })
+    }
 }
 
-#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum LeavingWord {
     #[default]
@@ -45,7 +50,7 @@ enum LeavingWord {
     Level,
 }
 
-#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum TurningWord {
     #[default]
@@ -53,37 +58,55 @@ enum TurningWord {
     OnTheSpotWhereBlocked,
 }
 
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct NavigatorSection {
+    /// Distance at which a wall is close.
     near_m: Option<f64>,
+    /// Distance at which a wall is far.
     far_m: Option<f64>,
+    /// Distance at which a wall is lost.
     lost_m: Option<f64>,
+    /// Sector of the laser that looks at the wall.
     sector_deg: Option<[f64; 2]>,
+    /// Rule by which a wall is left.
     leaving: LeavingWord,
+    /// Whether walls are left at all.
     leave_rule: Option<bool>,
+    /// Way to turn.
     turning: TurningWord,
+    /// Number of beams of the laser.
     beams: Option<usize>,
+    /// Length of the beams.
     range_m: Option<Size>,
+    /// Field of view of the laser.
     field_deg: Option<f64>,
+    /// Standard deviation of its distances.
     noise_m: Option<f64>,
+    /// Distance between the wheels.
     wheelbase_m: Option<Size>,
+    /// Place to go to; the end of the corridor by default.
     target_m: Option<Point<2>>,
+    /// Distance at which the target counts as reached.
     tolerance_m: Option<Number<Unbounded>>,
+    /// Distance from which the target is seen.
     detects_from_m: Option<f64>,
+    /// Whether walls hide the target.
     needs_line_of_sight: bool,
 }
 
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct RobotsSection {
     radius_m: Option<Size>,
     pub(super) margin_m: Option<f64>,
+    /// Distance between the wheels.
     wheelbase_m: Option<Size>,
     wheel_speed_m_s: Option<Size>,
     sensors_m: Option<Size>,
     lag_limit_m: Option<Number<Unbounded>>,
     gain_per_s: Option<Size>,
+    /// Turn rate per angle to the way.
     turn_gain_per_s: Option<Size>,
 }
 

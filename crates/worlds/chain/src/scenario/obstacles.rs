@@ -7,18 +7,18 @@ use super::super::rods::geometry::{Bounds, Core, Cuboid, Point};
 use super::super::rods::obstacle::{Obstacle, Obstacles, outline};
 use super::super::world::ChainSpec;
 use super::{Compiler, MOST, Measure, Place};
+use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_import::{rosmap, stage};
 use sidestep_kernel::{InputError, Seed, math};
 use sidestep_map::UnknownPolicy;
-use sidestep_scenario::Limits;
+use sidestep_scenario::{Limits, Spanned};
 use std::ops::{Range, RangeInclusive};
-use toml::Spanned;
 
 /// Default distance of generated obstacles from chains at the start, meters.
 const KEEP_M: f64 = 0.1;
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GroundSection {
     corridor: Option<Spanned<CorridorSection>>,
@@ -31,7 +31,7 @@ pub(super) struct GroundSection {
 }
 
 /// The meaning of a map's unknown pixels.
-#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum UnknownWord {
     #[default]
@@ -39,15 +39,17 @@ enum UnknownWord {
     Free,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct CorridorSection {
+    /// Its width.
     width_m: f64,
+    /// Its legs, one after the other.
     legs: Option<Vec<LegSection>>,
 }
 
 /// `{ straight_m = 8 }` or `{ radius_m = 2, turn_deg = 90 }`.
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(untagged, deny_unknown_fields)]
 enum LegSection {
     Straight { straight_m: f64 },
@@ -56,34 +58,49 @@ enum LegSection {
 
 /// One obstacle: a ball (`at_m`, `radius_m`), a capsule or a thin wall (`ends_m`), a box
 /// (`at_m`, `size_m`) or the outline of a polygon (`corners_m`).
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "ObstacleSection")]
 pub(super) struct ObstacleSection<const D: usize> {
+    /// Center of a ball or a box.
     at_m: Option<Place<D>>,
+    /// Ends of a capsule or of a thin wall.
     ends_m: Option<[Place<D>; 2]>,
+    /// Size of a box.
     size_m: Option<Place<D>>,
+    /// Corners of a polygon, whose walls stand.
     corners_m: Option<Vec<Place<D>>>,
     #[serde(default)]
     radius_m: f64,
     turn_deg: Option<f64>,
+    /// Velocity of one that moves straight on.
     velocity_m_s: Option<Place<D>>,
     bounces_m: Option<[Place<D>; 2]>,
+    /// Way-points of one that goes from one to the next.
     patrol_m: Option<Vec<Place<D>>>,
     closed: Option<bool>,
+    /// Speed along them.
     speed_m_s: Option<Measure>,
 }
 
 /// Obstacles at random.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "FieldSection")]
 pub(super) struct FieldSection<const D: usize> {
+    /// Lower corner of the field.
     lo_m: Place<D>,
+    /// Upper corner of the field.
     hi_m: Place<D>,
     part: Option<f64>,
+    /// Number of balls that move.
     n: Option<u32>,
+    /// Radius, or the least and the greatest.
     radius_m: Limits,
     length_m: Option<f64>,
+    /// Speed, or the least and the greatest.
     speed_m_s: Option<Limits>,
+    /// Distance from chains at the start.
     keep_m: Option<f64>,
 }
 

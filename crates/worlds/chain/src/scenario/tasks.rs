@@ -5,11 +5,12 @@ use super::super::script::{Motion, Script, Turtle};
 use super::navigators::NavigatorSection;
 use super::{Compiler, MOST, Measure, Place, Room};
 use crate::rods::chain::{Chain, Mobility};
+use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
+use sidestep_scenario::Spanned;
 use std::ops::Range;
 use std::sync::Arc;
-use toml::Spanned;
 
 /// Speed of initiators, unless it is given.
 const SPEED_M_S: f64 = 0.5;
@@ -18,18 +19,23 @@ const TOLERANCE_M: f64 = 1e-3;
 /// Time without coming nearer to a target after which a way is planned, s.
 const PLANS_AFTER_S: f64 = 0.5;
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum Kind {
+    /// Nothing, but to get out of the way.
     Rest,
+    /// Anywhere, at random.
     Wander,
+    /// An operator's orders, one after the other.
     Script,
+    /// To places, one after the other.
     Targets,
+    /// On wheels, with a laser, along walls.
     Navigate,
 }
 
 /// The planner of ways among obstacles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum PlannerWord {
     /// Local rules only.
@@ -38,8 +44,9 @@ enum PlannerWord {
     RrtConnect,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "TaskSection")]
 pub(super) struct TaskSection<const D: usize> {
     kind: Kind,
     #[serde(default)]
@@ -48,9 +55,12 @@ pub(super) struct TaskSection<const D: usize> {
     lasts_s: Option<Measure>,
     patience_s: Option<Measure>,
     turn_deg: Option<Measure>,
+    /// Box to stay in: its lower and its upper corner.
     within_m: Option<Room<D>>,
+    /// An operator's orders.
     script: Option<String>,
     script_file: Option<String>,
+    /// Places to go to, one after the other.
     targets_m: Option<Vec<Place<D>>>,
     tolerance_m: Option<Measure>,
     navigator: Option<Spanned<NavigatorSection>>,

@@ -1,7 +1,7 @@
 //! From a scenario's text to an immutable world and everybody's start.
 
 mod bodies;
-mod idle;
+pub(super) mod idle;
 mod map;
 mod people_and_doors;
 mod remarks;
@@ -36,11 +36,10 @@ use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{EntityId, InputError, Seed};
 use sidestep_map::planning::{FlowField, FreeSpace};
 use sidestep_map::{Cell, GridMap, Rect};
-use sidestep_scenario::{Head, Remark, Source, nearest};
+use sidestep_scenario::{Head, Remark, Source, Spanned, nearest};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
-use toml::Spanned;
 
 /// Largest number of bodies of a scenario.
 const MAX_BODIES: u64 = 10_000_000;

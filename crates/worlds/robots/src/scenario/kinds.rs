@@ -3,13 +3,12 @@
 use super::located::Located;
 use super::{RobotsFile, SensorSection};
 use sidestep_kernel::InputError;
-use sidestep_scenario::{Source, nearest};
+use sidestep_scenario::{Source, Spanned, nearest};
 use std::ops::Range;
 use std::sync::Arc;
-use toml::Spanned;
 
 /// Names by number: those that are built in, before the scenario's own.
-const BUILT_IN: [&str; 5] = ["free", "wall", "door", "person", "robot"];
+pub(super) const BUILT_IN: [&str; 5] = ["free", "wall", "door", "person", "robot"];
 const WALL: usize = 1;
 
 /// All kinds, by number.

@@ -1,10 +1,9 @@
 //! Sections of sensors and effectors, which stand in scenarios, profiles and presets.
 
 use sidestep_kernel::InputError;
-use sidestep_scenario::Source;
+use sidestep_scenario::{Source, Spanned};
 use std::ops::Range;
 use std::sync::Arc;
-use toml::Spanned;
 
 /// A section and the text it stands in (scenario, profile or presets).
 #[derive(Debug, Clone)]

@@ -2,7 +2,8 @@
 
 use crate::effector::{self, MAX_PATH};
 use serde::{Deserialize, Deserializer};
-use sidestep_scenario::{Rule, Whole, refused};
+use serde_json::{Value, json};
+use sidestep_scenario::{Rule, Whole, refused, schema_by_hand};
 
 /// Number of boxes of a body's side.
 pub(crate) type Side = Whole<1, 64>;
@@ -20,6 +21,10 @@ impl Rule for BoxSide {
 
     fn words() -> String {
         "a side above 0 m, typically 0.1 to 0.5".into()
+    }
+
+    fn limits() -> Value {
+        json!({ "exclusiveMinimum": 0, "maximum": 1000 })
     }
 }
 
@@ -47,6 +52,15 @@ impl<'de> Deserialize<'de> for Placing {
     }
 }
 
+schema_by_hand!(Placing, {
+    let whole = json!({ "type": "integer", "minimum": 0, "maximum": u32::MAX });
+    let heading = json!({ "type": "integer", "minimum": 0, "maximum": 3 });
+    json!({
+        "type": "array", "prefixItems": [whole, whole, heading], "items": false,
+        "minItems": 2, "maxItems": 3
+    })
+});
+
 /// Steps of an action: letters F, L, B, R.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Steps(pub(crate) Vec<effector::Side>);
@@ -60,6 +74,8 @@ impl<'de> Deserialize<'de> for Steps {
         steps.map(Self).ok_or_else(|| refused(format_args!("{text:?}"), remedy))
     }
 }
+
+schema_by_hand!(Steps, json!({ "type": "string", "pattern": "^[FLBR]*$", "maxLength": MAX_PATH }));
 
 /// Quarters of a full turn to the left, given in degrees.
 #[derive(Debug, Clone, Copy, Default)]
@@ -77,3 +93,5 @@ impl<'de> Deserialize<'de> for QuarterTurns {
         }
     }
 }
+
+schema_by_hand!(QuarterTurns, json!({ "type": "integer", "multipleOf": 90 }));

@@ -7,9 +7,8 @@ use crate::effector::{EffectorModel, STANDARD_ACTIONS, Transition};
 use crate::sensor::SensorModel;
 use sidestep_kernel::InputError;
 use sidestep_kernel::distr::check_row;
-use sidestep_scenario::nearest;
+use sidestep_scenario::{Spanned, nearest};
 use std::collections::BTreeMap;
-use toml::Spanned;
 
 /// Largest number of beams, observations, classes and actions, because readings name them with a
 /// byte.

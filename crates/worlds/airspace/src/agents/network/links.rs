@@ -2,6 +2,7 @@
 //! losses.
 
 use crate::purpose;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
 use sidestep_kernel::distr::Chance;
@@ -11,7 +12,7 @@ use sidestep_kernel::stream::Streams;
 const STEPS_PER_MEAN: f64 = 10.0;
 
 /// A while in which an airplane's radio is dead: it sends nothing, hears nothing, and knows it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Silence {
     /// Id of the airplane.
@@ -26,7 +27,7 @@ pub struct Silence {
 
 /// A while in which no message gets from one side to another. Airplanes on no side hear all, and
 /// are heard by all.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Partition {
     /// Ids of the airplanes on each side.
@@ -40,7 +41,7 @@ pub struct Partition {
 }
 
 /// A while in which a link works one way only.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OneWay {
     /// Id of the airplane that is heard by the other.

@@ -5,7 +5,7 @@ use super::super::{DoorSection, MoverSection, RobotSection, RobotsFile};
 use super::*;
 
 /// The built-in behaviors, and the keys of each.
-pub(super) const BEHAVIOURS: [(&str, &[&str]); 7] = [
+pub(in crate::scenario) const BEHAVIOURS: [(&str, &[&str]); 7] = [
     ("wander", &["turn_every"]),
     ("announce", &["turn_every"]),
     ("shuttle", &["a", "b", "avoidance"]),

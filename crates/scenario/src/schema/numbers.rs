@@ -1,0 +1,81 @@
+//! Numbers that check themselves, as a JSON Schema has them.
+
+use crate::{Limits, Number, Point, Rule, Whole};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde_json::{Value, json};
+use std::borrow::Cow;
+
+/// Returns a schema of numbers with further conditions.
+fn numbers(conditions: Value) -> Schema {
+    let mut schema = json_schema!({ "type": "number" });
+    if let Value::Object(conditions) = conditions {
+        schema.ensure_object().extend(conditions);
+    }
+    schema
+}
+
+/// Implements what all have in common: they have no definition of their own.
+macro_rules! inline {
+    ($name:literal) => {
+        fn inline_schema() -> bool {
+            true
+        }
+
+        fn schema_name() -> Cow<'static, str> {
+            $name.into()
+        }
+    };
+}
+
+impl<R: Rule> JsonSchema for Number<R> {
+    inline!("Number");
+
+    fn schema_id() -> Cow<'static, str> {
+        std::any::type_name::<Self>().into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        numbers(R::limits())
+    }
+}
+
+impl<const LEAST: u64, const MOST: u64> JsonSchema for Whole<LEAST, MOST> {
+    inline!("Whole");
+
+    fn schema_id() -> Cow<'static, str> {
+        format!("Whole_{LEAST}_{MOST}").into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let mut schema = json_schema!({ "type": "integer", "minimum": LEAST });
+        // TOML has no larger integers.
+        if MOST < i64::MAX as u64 {
+            schema.insert("maximum".into(), MOST.into());
+        }
+        schema
+    }
+}
+
+impl<const D: usize, R: Rule> JsonSchema for Point<D, R> {
+    inline!("Point");
+
+    fn schema_id() -> Cow<'static, str> {
+        std::any::type_name::<Self>().into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let items = numbers(R::limits());
+        json_schema!({ "type": "array", "items": items, "minItems": D, "maxItems": D })
+    }
+}
+
+impl JsonSchema for Limits {
+    inline!("Limits");
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let number = json!({ "type": "number" });
+        json_schema!({
+            "oneOf": [number, { "type": "array", "items": number, "minItems": 2, "maxItems": 2 }]
+        })
+    }
+}

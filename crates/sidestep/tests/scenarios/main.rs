@@ -1,0 +1,5 @@
+//! All scenarios of the repository, and what is told of them: schemas and problems.
+
+mod schema;
+mod shipped;
+mod valid;

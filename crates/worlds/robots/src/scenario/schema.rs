@@ -1,0 +1,27 @@
+//! The JSON Schema of the sections.
+
+use super::compile::idle::BEHAVIOURS;
+use super::kinds::BUILT_IN;
+use super::{Behaviours, ProfileFile, RobotsFile, presets};
+use serde_json::Value;
+use sidestep_scenario::{Source, schema};
+
+/// Returns the schema of a scenario's sections; `own` are behaviors beside the built-in ones.
+pub(crate) fn sections(own: &Behaviours) -> Value {
+    let mut sections = schema::of::<RobotsFile>();
+    let profile = Source::new("presets", presets(), "").parse::<ProfileFile>();
+    let profile = profile.expect("the presets are read in a test");
+    let sensors: Vec<&str> = profile.sensors.keys().map(String::as_str).collect();
+    let effectors = profile.effectors.keys().map(String::as_str);
+    let effectors: Vec<&str> = effectors.collect();
+    schema::names(&mut sections, "robots.sensors", "sensors", &sensors);
+    schema::names(&mut sections, "robots.effector", "effectors", &effectors);
+    for bodies in ["robots", "people", "doors"] {
+        schema::names(&mut sections, &format!("{bodies}.kind"), "kinds", &BUILT_IN[1..]);
+    }
+    schema::names(&mut sections, "kind_order", "kinds", &BUILT_IN[1..]);
+    let own = own.keys().map(String::as_str);
+    let behaviours: Vec<&str> = BEHAVIOURS.iter().map(|(kind, _)| *kind).chain(own).collect();
+    sections["$defs"]["BehaviourSection"]["properties"]["kind"]["enum"] = behaviours.into();
+    sections
+}
