@@ -7,6 +7,8 @@ const server = process.env.STUDIO_SERVER ?? "http://127.0.0.1:7800";
 const proxy = {
   "/socket": { target: server, ws: true, changeOrigin: true, rewriteWsOrigin: true },
   "/enter": { target: server, changeOrigin: true },
+  "/report": { target: server, changeOrigin: true },
+  "/export": { target: server, changeOrigin: true },
 };
 
 export default defineConfig({

@@ -17,6 +17,7 @@ use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
 use sidestep_record::sweep::read_journal;
 use sidestep_record::{McapRun, RunView, read_table};
+use sidestep_server::protocol::Edit;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -24,9 +25,10 @@ use std::sync::LazyLock;
 /// A reader of text or bytes, by its name. A folder of the same name in `seeds` has inputs to begin with.
 type Target = (&'static str, fn(&[u8]));
 
-const TARGETS: [Target; 28] = [
+const TARGETS: [Target; 29] = [
     ("scenario", |data| text(data, scenario)),
     ("override", |data| text(data, overridden)),
+    ("edit", |data| text(data, edited)),
     ("script", |data| text(data, script)),
     ("sweep", |data| text(data, |t| drop(Sweep::parse(&Source::new("f", t, ""))))),
     ("ascii_map", |data| text(data, |t| drop(ascii::parse("f", t, 0.25)))),
@@ -99,6 +101,16 @@ fn overridden(setting: &str) {
         drop(
             source.with(&[setting.to_string()]).and_then(|source| kind.compile(&source).map(drop)),
         );
+    }
+}
+
+/// Edits a text: the JSON of the edits is the first line, the text the rest. What was TOML stays TOML.
+fn edited(input: &str) {
+    let Some((edits, text)) = input.split_once('\n') else { return };
+    let Ok(edits) = serde_json::from_str::<Vec<Edit>>(edits) else { return };
+    let edits: Vec<_> = edits.into_iter().map(Into::into).collect();
+    if let Ok(edited) = Source::new("f", text, "").edited(&edits) {
+        assert!(edits.is_empty() || edited.parse::<serde_json::Value>().is_ok(), "{}", edited.text);
     }
 }
 

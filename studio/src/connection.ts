@@ -44,7 +44,8 @@ interface Waiting {
   reject(reason: Refused): void;
 }
 
-const LOST = problemOf("connection", "the connection to the server was lost", "the page connects again by itself");
+/** The problem of calls whose connection went; the banner tells it for all of them. */
+export const LOST = problemOf("connection", "the connection to the server was lost", "the page connects again by itself");
 
 /** Clock and sockets, which tests replace. */
 export interface Surroundings {

@@ -1,9 +1,9 @@
 /** What keys do, in one table that the help shows too. */
 
 export type Action =
-  | "play" | "next" | "back" | "next-ten" | "back-ten" | "slower" | "faster"
+  | "play" | "play-back" | "next" | "back" | "next-ten" | "back-ten" | "slower" | "faster"
   | "next-event" | "previous-event" | "filter" | "fit" | "center" | "trails"
-  | "left" | "right" | "up" | "down" | "nearer" | "farther" | "deselect" | "help" | "session";
+  | "left" | "right" | "up" | "down" | "nearer" | "farther" | "deselect" | "edit" | "help" | "session";
 
 interface Key {
   action: Action;
@@ -16,6 +16,7 @@ interface Key {
 
 export const KEYS: readonly Key[] = [
   { action: "play", keys: [" "], shown: ["Space"], words: "play or pause" },
+  { action: "play-back", keys: ["b"], shown: ["b"], words: "play backwards or pause" },
   { action: "next-ten", keys: ["ArrowRight"], shift: true, shown: ["Shift →"], words: "ten cycles on" },
   { action: "back-ten", keys: ["ArrowLeft"], shift: true, shown: ["Shift ←"], words: "ten cycles back" },
   { action: "next", keys: ["ArrowRight"], shown: ["→"], words: "one cycle on" },
@@ -35,6 +36,7 @@ export const KEYS: readonly Key[] = [
   { action: "nearer", keys: ["+", "="], shown: ["+"], words: "nearer" },
   { action: "farther", keys: ["-"], shown: ["−"], words: "farther" },
   { action: "session", keys: ["1", "2", "3", "4"], shown: ["1", "…", "4"], words: "go to a session" },
+  { action: "edit", keys: ["e"], shown: ["e"], words: "draw on the picture, or watch it" },
   { action: "deselect", keys: ["Escape"], shown: ["Esc"], words: "deselect" },
   { action: "help", keys: ["?"], shown: ["?"], words: "this help" },
 ];

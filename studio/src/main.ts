@@ -1,7 +1,7 @@
 import "./theme.css";
 import { mount } from "svelte";
 import App from "./App.svelte";
-import { enter } from "./enter";
+import { enter, standing } from "./enter";
 import type { Socket } from "./connection";
 import { Studio } from "./state/studio.svelte";
 
@@ -15,6 +15,7 @@ const studio = new Studio({
   open,
   after: (ms, then) => setTimeout(then, ms),
   cancel: (timer) => clearTimeout(timer as number | undefined),
+  standing,
 });
 
 mount(App, { target: document.getElementById("app")!, props: { studio } });

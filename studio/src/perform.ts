@@ -28,7 +28,8 @@ function goTo(index: number, studio: Studio): boolean {
 function transport(action: Action, studio: Studio): boolean {
   const active = studio.active!;
   switch (action) {
-    case "play": active.isPlaying ? studio.pause() : studio.play(); return true;
+    case "play": studio.toggle(); return true;
+    case "play-back": studio.toggleBack(); return true;
     case "next": studio.step(1); return true;
     case "back": studio.step(-1); return true;
     case "next-ten": studio.step(10); return true;
@@ -51,6 +52,7 @@ function view(action: Action, session: Session): void {
   if (action === "nearer" || action === "farther") stage?.zoom(action === "nearer" ? ZOOM : 1 / ZOOM);
   if (action === "fit") stage?.fit();
   if (action === "trails") session.trails = TRAILS[(TRAILS.indexOf(session.trails) + 1) % TRAILS.length]!;
+  if (action === "edit") page.edits = !page.edits;
   if (action === "deselect") session.select(null);
   if (action === "filter") {
     page.tab = "agents";

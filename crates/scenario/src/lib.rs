@@ -2,7 +2,7 @@
 //! Scenario files: TOML text with overrides -> typed sections, and errors that point.
 //!
 //! This crate knows the file format that all worlds share; each world defines its own keys. The way
-//! through the files: [`Source`] reads the text and applies overrides (`overrides.rs`), serde turns
+//! through the files: [`Source`] reads the text and applies overrides (`overrides.rs`) and edits (`edit/`), serde turns
 //! it into sections ([`Sections`]) whose numbers check themselves ([`Number`], [`Whole`],
 //! [`Point`]), errors of the TOML reader get cause and remedy (`explain.rs`), and a [`Bundle`]
 //! gathers a scenario with all the files that it names. The same sections give JSON Schemas for
@@ -10,6 +10,7 @@
 
 mod bundle;
 mod checked;
+mod edit;
 mod explain;
 pub mod file;
 mod keys;
@@ -28,6 +29,7 @@ pub use checked::{
     AboveBelow, AboveTo, AboveZero, Any, Between, FromBelow, FromTo, FromZero, Limits, NonNegative,
     Number, Point, Positive, Rule, Share, Whole, refused,
 };
+pub use edit::{Cell, Edit};
 pub use explain::nearest;
 pub use keys::Key;
 pub use kind::{Compiled, Foreign, Kind, Seeds, Worlds};

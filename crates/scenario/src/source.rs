@@ -2,7 +2,6 @@
 
 use super::explain::explain;
 use super::locate::{locate, path};
-use super::overrides::set;
 use crate::Spanned;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -11,13 +10,12 @@ use sidestep_kernel::InputError;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::de::{DeTable, Deserializer};
-use toml_edit::DocumentMut;
 
 /// Version of the scenario format that this program reads.
 pub const FORMAT: u32 = 1;
 
 /// The suffix of the place of a scenario with overrides.
-const WITH_OVERRIDES: &str = " (with --set)";
+pub(crate) const WITH_OVERRIDES: &str = " (with --set)";
 
 /// The text of a scenario, where it came from, and the folder its paths are relative to.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -87,31 +85,6 @@ impl Source {
         folder: impl Into<PathBuf>,
     ) -> Self {
         Self { place: place.into(), text: text.into(), folder: folder.into() }
-    }
-
-    /// Applies `key=value` overrides: `seed=3`, `robots.count=20`, `map.file="x.yaml"`. A value
-    /// that is not TOML is taken as text. A table that stands alone in an array needs no index;
-    /// others are counted from 0 (`robots.1.count`).
-    ///
-    /// # Errors
-    /// When the text is not TOML, or a key leads through something that is not a table.
-    pub fn with(mut self, overrides: &[String]) -> Result<Self, InputError> {
-        // Without overrides the text stays as it is, byte for byte.
-        if overrides.is_empty() {
-            return Ok(self);
-        }
-        let mut document: DocumentMut = self.text.parse().map_err(|e: toml_edit::TomlError| {
-            self.error(e.span(), e.message().to_string(), "write valid TOML")
-        })?;
-        for override_text in overrides {
-            set(&mut document, override_text)?;
-        }
-        self.text = document.to_string();
-        // Overrides may be applied in several steps.
-        if !self.place.ends_with(WITH_OVERRIDES) {
-            self.place.push_str(WITH_OVERRIDES);
-        }
-        Ok(self)
     }
 
     /// Parses the text into a type whose fields refuse unknown keys.

@@ -81,8 +81,14 @@ impl Files {
         }
     }
 
-    fn holds(&self, real: &Path) -> bool {
-        self.0.iter().any(|root| real.starts_with(&root.real))
+    /// Whether a path without links is below the folders.
+    pub(crate) fn holds(&self, real: &Path) -> bool {
+        self.below_root(real).is_some()
+    }
+
+    /// Returns a path without links relative to the folder that it is below.
+    pub(crate) fn below_root<'p>(&self, real: &'p Path) -> Option<&'p Path> {
+        self.0.iter().find_map(|root| real.strip_prefix(&root.real).ok())
     }
 
     /// Refuses a text of a page that names a file elsewhere: whatever key it is, a value that is the path of

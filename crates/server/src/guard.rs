@@ -6,12 +6,15 @@
 //! address's fragment, which is never sent, and the page exchanges it for a cookie that no script can read. Browsers
 //! send that cookie to the name that it was got under alone, so there any name of the machine will do.
 
-use axum::http::HeaderMap;
 use axum::http::header::{COOKIE, HOST, ORIGIN};
+use axum::http::{HeaderMap, HeaderValue};
 use std::net::{IpAddr, SocketAddr};
 
 /// The name of the cookie, followed by the port: cookies are shared by all ports of a host.
 const COOKIE_NAME: &str = "sidestep-studio-";
+
+/// The header in which browsers say whose page asks.
+const SEC_FETCH_SITE: &str = "sec-fetch-site";
 
 /// The reason why a request is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,6 +90,20 @@ impl Guard {
         match values.any(|value| is_same(value, token)) {
             true => Ok(()),
             false => Err(Refusal::Token),
+        }
+    }
+
+    /// Checks that a request for something that costs work comes from our own page, also where it has no `Origin`:
+    /// a page of somebody else may make a browser fetch an address, though it never sees what comes.
+    ///
+    /// # Errors
+    /// When it does not.
+    pub(crate) fn trust_fetch(&self, headers: &HeaderMap) -> Result<(), Refusal> {
+        self.trust(headers)?;
+        let is_own = |site: &HeaderValue| site == "same-origin" || site == "none";
+        match headers.get_all(SEC_FETCH_SITE).iter().all(is_own) {
+            true => Ok(()),
+            false => Err(Refusal::Origin),
         }
     }
 
@@ -205,6 +222,20 @@ mod tests {
         for origin in others {
             assert_eq!(admits(origin), Err(Refusal::Origin), "{origin}");
         }
+    }
+
+    #[test]
+    fn results_are_not_made_for_pages_of_others() {
+        let fetches = |site| {
+            local().trust_fetch(&headers(&[("host", "localhost:7800"), (SEC_FETCH_SITE, site)]))
+        };
+        assert_eq!([fetches("same-origin"), fetches("none")], [Ok(()), Ok(())]);
+        for site in ["cross-site", "same-site", ""] {
+            assert_eq!(fetches(site), Err(Refusal::Origin), "{site}");
+        }
+        let without = headers(&[("host", "localhost:7800")]);
+        assert_eq!(local().trust_fetch(&without), Ok(()), "a program that is no browser");
+        assert_eq!(open().trust_fetch(&without), Err(Refusal::Token));
     }
 
     #[test]

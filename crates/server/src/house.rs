@@ -2,6 +2,8 @@
 
 use crate::guard::Guard;
 use crate::protocol::{Named, Notice, Problem, SessionId, VERSION};
+use crate::results::Workshop;
+use crate::serve::ended;
 use crate::session::Means;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -12,6 +14,8 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 const MOST_SESSIONS: u32 = 12;
 /// The number of sockets at a time.
 const MOST_SOCKETS: usize = 16;
+/// The number of threads for what is done aside: one for each socket, and some for results.
+pub(crate) const MOST_ASIDES: usize = MOST_SOCKETS + 4;
 /// The time that sessions have to end with the server.
 const PATIENCE: Duration = Duration::from_secs(2);
 
@@ -21,6 +25,8 @@ pub(crate) struct House {
     pub(crate) means: Means,
     /// The rules of who may ask.
     pub(crate) guard: Guard,
+    /// Where results are made.
+    pub(crate) workshop: Workshop,
     program: String,
     open: Vec<Named>,
     next: AtomicU32,
@@ -40,6 +46,7 @@ impl House {
         Self {
             means,
             guard,
+            workshop: Workshop::default(),
             program,
             open,
             next: AtomicU32::new(1),
@@ -77,10 +84,19 @@ impl House {
         self.sockets.clone().try_acquire_owned().ok()
     }
 
+    /// Whether there is no place for another socket.
+    pub(crate) fn is_full(&self) -> bool {
+        self.sockets.available_permits() == 0
+    }
+
+    /// Returns what tells that the server ends.
+    pub(crate) fn ending(&self) -> watch::Receiver<bool> {
+        self.ending.clone()
+    }
+
     /// Waits until the server ends.
     pub(crate) async fn ended(&self) {
-        // Whoever could end it otherwise is gone: then it ends, too.
-        let _ = self.ending.clone().wait_for(|ends| *ends).await;
+        ended(self.ending()).await;
     }
 
     /// Waits until all sessions have ended, but not for ever.

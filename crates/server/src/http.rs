@@ -3,22 +3,25 @@
 use crate::guard::Refusal;
 use crate::house::House;
 use crate::request::MOST_REQUEST_BYTES;
-use crate::{page, socket};
+use crate::{page, results, socket};
 use axum::Router;
 use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::{DefaultBodyLimit, Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
-use axum::middleware::{Next, from_fn_with_state};
+use axum::middleware::{Next, from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Longest body of a request that is no socket: a token.
 const MOST_BODY_BYTES: usize = 256;
+/// The time for a token to come.
+const LONGEST_ENTRANCE: Duration = Duration::from_secs(10);
 /// Longest message of a socket. Longer ones than a request may be are answered; beyond this the socket is closed.
 const MOST_MESSAGE_BYTES: usize = 8 * MOST_REQUEST_BYTES;
 
-/// Headers of every answer: the page loads nothing from elsewhere, and is shown in no other page.
+/// Headers of every answer that has none of its own: the page loads nothing from elsewhere, and is shown in no other page.
 const HEADERS: [(HeaderName, &str); 6] = [
     (
         header::CONTENT_SECURITY_POLICY,
@@ -35,7 +38,9 @@ const HEADERS: [(HeaderName, &str); 6] = [
 pub(crate) fn routes(house: Arc<House>) -> Router {
     Router::new()
         .route("/socket", get(upgrade))
-        .route("/enter", get(trusted).post(enter))
+        .route("/enter", get(trusted).post(enter).layer(from_fn(hurried)))
+        .route("/report", get(results::report))
+        .route("/export", get(results::export))
         .fallback(get(file))
         .layer(DefaultBodyLimit::max(MOST_BODY_BYTES))
         .layer(from_fn_with_state(house.clone(), guarded))
@@ -49,9 +54,16 @@ async fn guarded(State(house): State<Arc<House>>, request: Request, next: Next) 
         Err(refusal) => refusal.into_response(),
     };
     for (name, value) in HEADERS {
-        response.headers_mut().insert(name, HeaderValue::from_static(value));
+        // A report may do something else than the page.
+        response.headers_mut().entry(name).or_insert(HeaderValue::from_static(value));
     }
     response
+}
+
+/// Gives up a request whose body does not come.
+async fn hurried(request: Request, next: Next) -> Response {
+    let answer = tokio::time::timeout(LONGEST_ENTRANCE, next.run(request)).await;
+    answer.unwrap_or_else(|_| StatusCode::REQUEST_TIMEOUT.into_response())
 }
 
 async fn upgrade(
@@ -63,12 +75,21 @@ async fn upgrade(
         return refusal.into_response();
     }
     let upgrade = upgrade.max_message_size(MOST_MESSAGE_BYTES).max_frame_size(MOST_MESSAGE_BYTES);
-    upgrade.on_upgrade(move |socket| socket::serve(socket, house))
+    let Some(seat) = house.seat() else { return full() };
+    upgrade.on_upgrade(move |socket| socket::serve(socket, house, seat))
 }
 
-/// Tells whether the browser has the cookie.
+/// Refuses another page.
+fn full() -> Response {
+    let words =
+        "So many pages are open that there is no place for another one: close one of them.\n";
+    (StatusCode::SERVICE_UNAVAILABLE, words).into_response()
+}
+
+/// Tells whether the browser has the cookie, and whether there is a place for its page.
 async fn trusted(State(house): State<Arc<House>>, headers: HeaderMap) -> Response {
     match house.guard.trust(&headers) {
+        Ok(()) if house.is_full() => full(),
         Ok(()) => StatusCode::NO_CONTENT.into_response(),
         Err(refusal) => refusal.into_response(),
     }

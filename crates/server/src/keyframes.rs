@@ -5,6 +5,8 @@
 
 use sidestep::kernel::Cycle;
 use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::Duration;
 
 /// The least time of computing between two keyframes, before any thinning.
@@ -12,12 +14,33 @@ const SPACING: Duration = Duration::from_millis(20);
 /// Making a keyframe takes at most one part in so many of the time.
 const COST: u32 = 50;
 
+/// The memory for the keyframes of all runs, which share it evenly.
+#[derive(Debug)]
+pub(crate) struct Budget {
+    used: AtomicUsize,
+    runs: AtomicUsize,
+    most: usize,
+    most_of_one: usize,
+}
+
+impl Budget {
+    /// Returns a budget of so many bytes in all, and at most so many for one run.
+    pub(crate) fn new(most: usize, most_of_one: usize) -> Self {
+        Self { used: AtomicUsize::new(0), runs: AtomicUsize::new(0), most, most_of_one }
+    }
+
+    /// Returns the part of each run.
+    fn share(&self) -> usize {
+        (self.most / self.runs.load(Relaxed).max(1)).min(self.most_of_one)
+    }
+}
+
 /// The keyframes of one run.
 #[derive(Debug)]
 pub(crate) struct Keyframes {
     kept: BTreeMap<Cycle, Vec<u8>>,
     bytes: usize,
-    most_bytes: usize,
+    budget: Arc<Budget>,
     spacing: Duration,
     /// The time that computing took since the last keyframe.
     computed: Duration,
@@ -26,10 +49,11 @@ pub(crate) struct Keyframes {
 }
 
 impl Keyframes {
-    /// Returns a store for so many bytes, without anything in it.
-    pub(crate) fn new(most_bytes: usize) -> Self {
-        let (spacing, zero) = (SPACING, Duration::ZERO);
-        Self { kept: BTreeMap::new(), bytes: 0, most_bytes, spacing, computed: zero, took: zero }
+    /// Returns a store for one run's part of a budget, without anything in it.
+    pub(crate) fn new(budget: &Arc<Budget>) -> Self {
+        budget.runs.fetch_add(1, Relaxed);
+        let (spacing, zero, budget) = (SPACING, Duration::ZERO, budget.clone());
+        Self { kept: BTreeMap::new(), bytes: 0, budget, spacing, computed: zero, took: zero }
     }
 
     /// Notes that computing up to a cycle took a time; returns whether a keyframe of that cycle is wanted.
@@ -45,13 +69,27 @@ impl Keyframes {
     /// Keeps a checkpoint that took a time to make.
     pub(crate) fn keep(&mut self, cycle: Cycle, checkpoint: Vec<u8>, took: Duration) {
         (self.computed, self.took) = (Duration::ZERO, took);
-        self.bytes += checkpoint.len();
-        if let Some(before) = self.kept.insert(cycle, checkpoint) {
-            self.bytes -= before.len();
-        }
-        while self.bytes > self.most_bytes && self.kept.len() > 1 {
+        self.kept.insert(cycle, checkpoint);
+        self.count();
+        // Others may have more than their part for a while: what is missing then is missing here.
+        while self.budget.used.load(Relaxed) > self.budget.most && self.kept.len() > 1 {
             self.thin();
         }
+        self.fit();
+    }
+
+    /// Drops what is more than the run's part, which is less whenever another run begins.
+    pub(crate) fn fit(&mut self) {
+        while self.bytes > self.budget.share() && self.kept.len() > 1 {
+            self.thin();
+        }
+    }
+
+    /// Notes how much is kept.
+    fn count(&mut self) {
+        let bytes = self.kept.values().map(Vec::len).sum();
+        self.budget.used.fetch_add(bytes, Relaxed);
+        self.budget.used.fetch_sub(std::mem::replace(&mut self.bytes, bytes), Relaxed);
     }
 
     /// Drops every second keyframe, but never the first.
@@ -61,13 +99,20 @@ impl Keyframes {
             is_odd = !is_odd;
             !is_odd
         });
-        self.bytes = self.kept.values().map(Vec::len).sum();
+        self.count();
         self.spacing = self.spacing.saturating_mul(2);
     }
 
     /// Returns the last keyframe that is not after a cycle.
     pub(crate) fn before(&self, cycle: Cycle) -> Option<(Cycle, &[u8])> {
         self.kept.range(..=cycle).next_back().map(|(&at, bytes)| (at, bytes.as_slice()))
+    }
+}
+
+impl Drop for Keyframes {
+    fn drop(&mut self) {
+        self.budget.runs.fetch_sub(1, Relaxed);
+        self.budget.used.fetch_sub(self.bytes, Relaxed);
     }
 }
 
@@ -78,9 +123,31 @@ mod tests {
 
     const MS: Duration = Duration::from_millis(1);
 
+    fn alone(most: usize) -> Keyframes {
+        Keyframes::new(&Arc::new(Budget::new(most, most)))
+    }
+
+    #[test]
+    fn runs_share_a_budget_and_give_back_what_another_one_needs() {
+        let budget = Arc::new(Budget::new(1000, 600));
+        let mut first = Keyframes::new(&budget);
+        (0..40).for_each(|cycle| first.keep(cycle, vec![0; 50], MS));
+        assert!(first.bytes > 250 && first.bytes <= 600, "{}", first.bytes);
+        let mut others: Vec<Keyframes> = (0..3).map(|_| Keyframes::new(&budget)).collect();
+        for cycle in 0..40 {
+            others.iter_mut().for_each(|other| other.keep(cycle, vec![0; 50], MS));
+            assert!(budget.used.load(Relaxed) <= 1000 && others[0].before(0).is_some());
+        }
+        first.fit();
+        assert!(first.bytes <= 250 && first.before(0).is_some());
+        assert!(others.iter().all(|other| other.bytes <= 250));
+        drop((first, others));
+        assert_eq!((budget.used.load(Relaxed), budget.runs.load(Relaxed)), (0, 0));
+    }
+
     #[test]
     fn the_first_is_wanted_at_once_and_the_next_ones_after_some_time() {
-        let mut keyframes = Keyframes::new(1000);
+        let mut keyframes = alone(1000);
         assert!(keyframes.is_due(0, Duration::ZERO));
         keyframes.keep(0, vec![0; 10], MS / 100);
         assert!(!keyframes.is_due(10, 19 * MS));
@@ -93,7 +160,7 @@ mod tests {
 
     #[test]
     fn the_nearest_before_is_found_and_nothing_in_an_empty_store() {
-        let mut keyframes = Keyframes::new(1000);
+        let mut keyframes = alone(1000);
         assert_eq!(keyframes.before(5), None);
         for cycle in [0, 10, 20] {
             keyframes.keep(cycle, vec![cycle as u8], MS);
@@ -110,7 +177,7 @@ mod tests {
         fn memory_stays_within_its_bound_and_the_start_is_never_lost(
             sizes in proptest::collection::vec(1_usize..400, 1..200),
         ) {
-            let mut keyframes = Keyframes::new(1000);
+            let mut keyframes = alone(1000);
             for (cycle, size) in (0..).zip(sizes) {
                 keyframes.keep(cycle, vec![0; size], MS);
                 let kept: usize = keyframes.kept.values().map(Vec::len).sum();
@@ -121,7 +188,7 @@ mod tests {
 
         #[test]
         fn what_is_left_stays_evenly_spread(count in 2_u64..3000) {
-            let mut keyframes = Keyframes::new(1600);
+            let mut keyframes = alone(1600);
             let mut cycle = 0;
             while cycle < count {
                 if keyframes.is_due(cycle, SPACING / 2) {

@@ -5,14 +5,18 @@
 //! page.rs      files of the page     socket.rs    one page                house.rs   what all pages share
 //! request.rs   text -> requests      protocol/    all words and frames    outbox.rs  what waits to be sent
 //! session/     one thread per run    keyframes.rs checkpoints for seeking
+//! serve.rs     connections           doors.rs     how many of them
 //! encode/      frames as bytes       samples.rs   metrics against time    chronicle.rs   events
-//! files.rs     what may be read
+//! files.rs     what may be read      write.rs     what may be written     beside.rs      what a text can name
+//! results/     reports, exports      zip.rs       answers made small
 //! ```
 //! A session is a thread that owns a `Simulation`. Sockets pass requests to it by a channel and take replies, states
 //! and frames from an outbox into which sessions put without waiting. So nothing that a page does or leaves undone
 //! reaches a result, and a slow page loses frames, never the run. Whoever starts the server hands the worlds in.
 
+mod beside;
 mod chronicle;
+mod doors;
 mod encode;
 mod files;
 mod guard;
@@ -24,22 +28,28 @@ mod outbox;
 mod page;
 pub mod protocol;
 mod request;
+mod results;
 mod samples;
+mod serve;
 mod session;
 mod socket;
+mod write;
+mod zip;
 
 pub use encode::Encoder;
 pub use request::{MOST_REQUEST_BYTES, decode};
 
 use files::Files;
 use guard::Guard;
-use house::House;
+use house::{House, MOST_ASIDES};
+use keyframes::Budget;
 use protocol::{Named, Problem};
+use serve::Patience;
 use session::Means;
 use sidestep::kernel::InputError;
 use sidestep::scenario::Worlds;
 use sidestep_session::Error;
-use std::net::{SocketAddr, TcpListener};
+use std::net::{IpAddr, SocketAddr, TcpListener};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -52,6 +62,8 @@ use tokio::sync::watch;
 pub const FRAMES_PER_S: u32 = 30;
 /// The bound of memory for the keyframes of a session.
 pub const KEYFRAME_BYTES: usize = 256 << 20;
+/// The bound of memory for the keyframes of all sessions together, which share it evenly.
+pub const ALL_KEYFRAME_BYTES: usize = 1 << 30;
 /// Speeds at which a run can be played, in simulated seconds per second.
 pub const SPEEDS: RangeInclusive<f64> = 0.1..=100.0;
 
@@ -68,7 +80,7 @@ pub struct Options {
     pub host: String,
     /// The port; 0 for any free one, `None` for the first free one of some.
     pub port: Option<u16>,
-    /// Whether texts of pages are refused.
+    /// Whether texts of pages are refused, and nothing is written.
     pub read_only: bool,
     /// The number of worker threads of each session.
     pub workers: usize,
@@ -97,31 +109,44 @@ impl Studio {
                 "end other programs, and try again",
             )
         };
+        listener.set_nonblocking(true).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
         let guard = Guard::new(address, &options.host).map_err(failed)?;
         let token = guard.token().map(String::from);
         let (ending, ends) = watch::channel(false);
         let Options { worlds, workers, read_only, program, .. } = options;
-        let means = Means { worlds, files, workers, read_only };
+        let budget = Arc::new(Budget::new(ALL_KEYFRAME_BYTES, KEYFRAME_BYTES));
+        let means = Means { worlds, files, workers, read_only, budget };
         let house = Arc::new(House::new(means, guard, program, open, ends));
-        let runtime = Builder::new_current_thread().enable_all().max_blocking_threads(4).build();
+        let runtime =
+            Builder::new_current_thread().enable_all().max_blocking_threads(MOST_ASIDES).build();
         let runtime = runtime.map_err(failed)?;
         let thread = std::thread::Builder::new().name("studio".into());
-        let thread = thread.spawn(move || serve(runtime, listener, &house)).map_err(failed)?;
+        let thread = thread.spawn(move || run(runtime, listener, &house)).map_err(failed)?;
         Ok(Self { address, token, ending, thread: Some(thread) })
     }
 
-    /// Returns the page's address, with the token in it where one is needed.
+    /// Returns the page's address, with the token in it where one is needed: one that others can open, too, if they
+    /// can reach it and this machine's address is known.
     pub fn url(&self) -> String {
-        let ip = self.address.ip();
-        // Whoever opens it sits at this machine; others know its name.
-        let host = match (ip.is_unspecified(), ip.is_ipv6()) {
-            (true, _) => "localhost".to_string(),
-            (false, true) => format!("[{ip}]"),
-            (false, false) => ip.to_string(),
+        let host = match self.ip() {
+            None => "localhost".to_string(),
+            Some(ip) if ip.is_ipv6() => format!("[{ip}]"),
+            Some(ip) => ip.to_string(),
         };
         let token = self.token.as_ref().map(|token| format!("#token={token}")).unwrap_or_default();
         format!("http://{host}:{}/{token}", self.address.port())
+    }
+
+    /// Returns the number by which it is reached; `None` where it listens at all of them and none is known.
+    fn ip(&self) -> Option<IpAddr> {
+        let ip = self.address.ip();
+        if ip.is_unspecified() { listen::own_address(ip) } else { Some(ip) }
+    }
+
+    /// Whether its address names this machine in a way that others cannot use.
+    pub fn is_named_for_itself(&self) -> bool {
+        self.ip().is_none_or(|ip| ip.is_loopback())
     }
 
     /// Whether others than this machine can reach it.
@@ -146,18 +171,12 @@ impl Drop for Studio {
 }
 
 /// Answers requests until the server is ended.
-fn serve(runtime: Runtime, listener: TcpListener, house: &Arc<House>) {
+fn run(runtime: Runtime, listener: TcpListener, house: &Arc<House>) {
     runtime.block_on(async {
         // Nothing that is bound and not blocking is refused.
-        let Ok(listener) = listen::Limited::new(listener) else { return };
-        let ended = house.clone();
-        let routes = http::routes(house.clone());
-        let served = axum::serve(listener, routes).with_graceful_shutdown(async move { ended.ended().await });
-        // Connections that are still open after a while are cut.
-        tokio::select! {
-            _ = served => {}
-            () = async { house.ended().await; tokio::time::sleep(Duration::from_secs(1)).await; } => {}
-        }
+        let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
+        let (routes, ending) = (http::routes(house.clone()), house.ending());
+        serve::serve(listener, routes, ending, Patience::default()).await;
         house.emptied().await;
     });
     runtime.shutdown_timeout(Duration::from_millis(100));
@@ -169,8 +188,13 @@ fn divided(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<Named>) {
     for path in named {
         let is_run = path.join("run.json").is_file();
         let is_film = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
-        if !path.is_dir() || is_run {
-            let kind = if is_run || is_film { "recording" } else { "scenario" };
+        let is_sweep = path.join("sweep.json").is_file();
+        if !path.is_dir() || is_run || is_sweep {
+            let kind = match () {
+                () if is_sweep => "sweep",
+                () if is_run || is_film => "recording",
+                () => "scenario",
+            };
             open.push(Named { kind: kind.into(), path: path.display().to_string() });
         }
         // What a scenario names lies beside it.
@@ -190,7 +214,7 @@ fn divided(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<Named>) {
 }
 
 fn input(problem: &Problem) -> InputError {
-    InputError::new(&problem.place, &problem.cause, &*problem.remedy)
+    InputError::new(&problem.place, &*problem.cause, &*problem.remedy)
 }
 
 #[cfg(test)]
@@ -203,13 +227,15 @@ mod tests {
         let path = |name: &str| place.path().join(name);
         std::fs::create_dir_all(path("run")).expect("made");
         std::fs::write(path("run/run.json"), "{}").expect("written");
+        std::fs::create_dir_all(path("sweep")).expect("made");
+        std::fs::write(path("sweep/sweep.json"), "{}").expect("written");
         std::fs::write(path("a.toml"), "").expect("written");
         std::fs::write(path("b.mcap"), "").expect("written");
-        let named = ["run", "a.toml", "b.mcap"].map(path);
+        let named = ["run", "a.toml", "b.mcap", "sweep"].map(path);
         let (folders, open) = divided(&named);
-        assert_eq!(folders, [path("run"), place.path().to_path_buf()]);
+        assert_eq!(folders, [path("run"), place.path().to_path_buf(), path("sweep")]);
         let kinds: Vec<&str> = open.iter().map(|named| named.kind.as_str()).collect();
-        assert_eq!(kinds, ["recording", "scenario", "recording"]);
+        assert_eq!(kinds, ["recording", "scenario", "recording", "sweep"]);
         assert_eq!(divided(&[]), (vec![".".into()], vec![]));
         assert_eq!(divided(&["a.toml".into()]).0, [PathBuf::from("a.toml")], "it is not there");
     }

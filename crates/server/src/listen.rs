@@ -1,22 +1,13 @@
-//! The port: found, bound, and kept from too many connections.
+//! The port: found and bound; and the address by which others reach it.
 
-use axum::serve::Listener;
 use sidestep::kernel::InputError;
 use std::io;
-use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs};
-use std::pin::Pin;
-use std::sync::Arc;
-use std::task::{Context, Poll};
-use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::net::TcpStream;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs, UdpSocket};
 
 /// The first port that is tried where none is asked for.
 const FIRST_PORT: u16 = 7800;
 /// The number of ports that are tried.
 const PORTS: u16 = 100;
-/// The number of connections at a time.
-const MOST_CONNECTIONS: usize = 128;
 
 /// Binds the port that is asked for; the first free one of some where none is.
 ///
@@ -60,74 +51,18 @@ fn unusable(host: &str, error: &io::Error) -> InputError {
     InputError::new(format!("--addr {host}"), error.to_string(), remedy)
 }
 
-/// A listener that takes so many connections at a time; others wait.
-pub(crate) struct Limited {
-    listener: tokio::net::TcpListener,
-    places: Arc<Semaphore>,
-}
-
-impl Limited {
-    /// Takes connections of a bound port.
-    ///
-    /// # Errors
-    /// When the system refuses.
-    pub(crate) fn new(listener: TcpListener) -> io::Result<Self> {
-        listener.set_nonblocking(true)?;
-        let listener = tokio::net::TcpListener::from_std(listener)?;
-        Ok(Self { listener, places: Arc::new(Semaphore::new(MOST_CONNECTIONS)) })
-    }
-}
-
-impl Listener for Limited {
-    type Io = Connection;
-    type Addr = SocketAddr;
-
-    async fn accept(&mut self) -> (Connection, SocketAddr) {
-        // The semaphore is never closed.
-        let place = self.places.clone().acquire_owned().await.ok();
-        let (stream, address) = Listener::accept(&mut self.listener).await;
-        // Frames are sent at once. Without it they are only late.
-        let _ = stream.set_nodelay(true);
-        (Connection { stream, _place: place }, address)
-    }
-
-    fn local_addr(&self) -> io::Result<SocketAddr> {
-        self.listener.local_addr()
-    }
-}
-
-/// A connection, and its place among all.
-pub(crate) struct Connection {
-    stream: TcpStream,
-    _place: Option<OwnedSemaphorePermit>,
-}
-
-impl AsyncRead for Connection {
-    fn poll_read(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-        buffer: &mut ReadBuf<'_>,
-    ) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_read(context, buffer)
-    }
-}
-
-impl AsyncWrite for Connection {
-    fn poll_write(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-        bytes: &[u8],
-    ) -> Poll<io::Result<usize>> {
-        Pin::new(&mut self.stream).poll_write(context, bytes)
-    }
-
-    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_flush(context)
-    }
-
-    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_shutdown(context)
-    }
+/// Returns the address by which others reach this machine, if it has one: that from which it would send to them.
+/// Nothing is sent for it.
+pub(crate) fn own_address(ip: IpAddr) -> Option<IpAddr> {
+    // Addresses of documentation, which lead nowhere, but by the way that all others take.
+    let far: SocketAddr = match ip {
+        IpAddr::V4(_) => ([192, 0, 2, 1], 9).into(),
+        IpAddr::V6(_) => ([0x2001, 0xdb8, 0, 0, 0, 0, 0, 1], 9).into(),
+    };
+    let socket = UdpSocket::bind((ip, 0)).ok()?;
+    socket.connect(far).ok()?;
+    let own = socket.local_addr().ok()?.ip();
+    (!own.is_loopback() && !own.is_unspecified()).then_some(own)
 }
 
 #[cfg(test)]
@@ -150,5 +85,13 @@ mod tests {
             let error = bind(host, None).expect_err(host);
             assert!(error.place().starts_with("--addr"), "{error}");
         }
+    }
+
+    #[test]
+    fn an_own_address_is_one_that_can_be_listened_at() {
+        if let Some(own) = own_address(IpAddr::from([0, 0, 0, 0])) {
+            assert!(bind(&own.to_string(), Some(0)).is_ok(), "{own}");
+        }
+        assert_eq!(own_address(IpAddr::from([127, 0, 0, 1])), None, "others cannot reach it");
     }
 }

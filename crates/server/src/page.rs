@@ -1,8 +1,13 @@
 //! The page: files that `build.rs` has put into the program.
 
-use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE, ETAG, IF_NONE_MATCH};
+use crate::zip;
+use axum::http::header::{
+    CACHE_CONTROL, CONTENT_ENCODING, CONTENT_TYPE, ETAG, IF_NONE_MATCH, VARY,
+};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
 /// A file of the page.
 struct Asset {
@@ -17,6 +22,13 @@ struct Asset {
 
 include!(concat!(env!("OUT_DIR"), "/assets.rs"));
 
+/// Files that are smaller as gzip, made once.
+static ZIPPED: LazyLock<BTreeMap<&str, Vec<u8>>> = LazyLock::new(|| {
+    let zipped = ASSETS.iter().map(|asset| (asset, zip::gzip(asset.bytes)));
+    let smaller = zipped.filter(|(asset, zipped)| zipped.len() < asset.bytes.len());
+    smaller.map(|(asset, zipped)| (asset.path, zipped)).collect()
+});
+
 /// Files in this folder have a digest in their names: what has been loaded once stays right.
 const LASTING: &str = "assets/";
 
@@ -30,10 +42,21 @@ pub(crate) fn answer(path: &str, headers: &HeaderMap) -> Response {
     };
     let is_lasting = asset.path.starts_with(LASTING);
     let cache = if is_lasting { "public, max-age=31536000, immutable" } else { "no-cache" };
-    let about = [(CACHE_CONTROL, cache), (ETAG, asset.tag)];
-    match headers.get(IF_NONE_MATCH).is_some_and(|known| known == asset.tag) {
-        true => (StatusCode::NOT_MODIFIED, about).into_response(),
-        false => (about, [(CONTENT_TYPE, asset.media)], asset.bytes).into_response(),
+    let zipped = ZIPPED.get(asset.path).filter(|_| zip::is_taken(headers));
+    // What is another sequence of bytes has another tag.
+    let tag = match zipped {
+        Some(_) => asset.tag.trim_end_matches('"').to_string() + "-gzip\"",
+        None => asset.tag.to_string(),
+    };
+    let is_known = headers.get(IF_NONE_MATCH).is_some_and(|known| known == tag.as_str());
+    let about = [(CACHE_CONTROL, cache), (ETAG, tag.as_str()), (VARY, "accept-encoding")];
+    let media = [(CONTENT_TYPE, asset.media)];
+    match (is_known, zipped) {
+        (true, _) => (StatusCode::NOT_MODIFIED, about).into_response(),
+        (false, None) => (about, media, asset.bytes).into_response(),
+        (false, Some(zipped)) => {
+            (about, media, [(CONTENT_ENCODING, "gzip")], zipped.as_slice()).into_response()
+        }
     }
 }
 
@@ -50,6 +73,23 @@ mod tests {
         for path in ["/../Cargo.toml", "/assets/../index.html", "/none.js", "/%2e%2e/Cargo.toml"] {
             assert_eq!(status(path), StatusCode::NOT_FOUND, "{path}");
         }
+    }
+
+    #[test]
+    fn a_file_is_small_for_who_takes_gzip_and_says_so() {
+        let mut takes = HeaderMap::new();
+        takes.insert("accept-encoding", "gzip, br".parse().expect("a value"));
+        let (plain, small) = (answer("/", &HeaderMap::new()), answer("/", &takes));
+        assert_eq!(small.headers()[CONTENT_ENCODING], "gzip");
+        assert!(!plain.headers().contains_key(CONTENT_ENCODING));
+        assert_ne!(plain.headers()[ETAG], small.headers()[ETAG]);
+        for answer in [&plain, &small] {
+            assert_eq!(answer.headers()[VARY], "accept-encoding");
+        }
+        takes.insert(IF_NONE_MATCH, small.headers()[ETAG].clone());
+        assert_eq!(answer("/", &takes).status(), StatusCode::NOT_MODIFIED);
+        takes.insert(IF_NONE_MATCH, plain.headers()[ETAG].clone());
+        assert_eq!(answer("/", &takes).status(), StatusCode::OK, "it has other bytes");
     }
 
     #[test]

@@ -32,7 +32,9 @@ impl Call {
     /// Returns the session that is asked, if it is one.
     pub(crate) fn session(&self) -> Option<SessionId> {
         match *self {
-            Self::Files { .. } | Self::Open { .. } | Self::Schema { .. } => None,
+            Self::Files { .. } | Self::Open { .. } | Self::Runs { .. } | Self::Schema { .. } => {
+                None
+            }
             Self::Close { session }
             | Self::Play { session, .. }
             | Self::Pause { session }
@@ -45,6 +47,7 @@ impl Call {
             | Self::Metrics { session, .. }
             | Self::Events { session, .. }
             | Self::Source { session }
+            | Self::Tables { session }
             | Self::Check { session, .. }
             | Self::Edit { session, .. }
             | Self::Model { session, .. }

@@ -4,13 +4,16 @@ use crate::house::House;
 use crate::outbox::{Mail, Outbox};
 use crate::protocol::{Answer, Call, Outcome, Problem, Reply, SessionId, Subject};
 use crate::request::decode;
-use crate::session::{Opening, Session, checked, ended};
+use crate::results::runs;
+use crate::session::{Means, Opening, Session, checked, edited, ended, model};
 use axum::extract::ws::{Message, WebSocket};
-use sidestep::scenario::Worlds;
+use sidestep::scenario::{Source, Worlds};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::task::spawn_blocking;
 use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
 /// The number of sessions of a socket.
@@ -27,11 +30,11 @@ const PING: Duration = Duration::from_secs(30);
 const SILENCE: Duration = Duration::from_secs(600);
 
 /// Serves a page until it leaves or the server ends. Its sessions end with it.
-pub(crate) async fn serve(mut socket: WebSocket, house: Arc<House>) {
-    let Some(_seat) = house.seat() else { return };
+pub(crate) async fn serve(mut socket: WebSocket, house: Arc<House>, _seat: OwnedSemaphorePermit) {
     let outbox = Arc::new(Outbox::default());
     outbox.notice(&house.hello());
-    let desk = Desk { house: house.clone(), outbox: outbox.clone(), sessions: BTreeMap::new() };
+    let (house_, outbox_, aside) = (house.clone(), outbox.clone(), Arc::new(Semaphore::new(1)));
+    let desk = Desk { house: house_, outbox: outbox_, sessions: BTreeMap::new(), aside };
     tokio::select! {
         () = house.ended() => {}
         () = talk(&mut socket, desk, &outbox) => {}
@@ -105,6 +108,15 @@ struct Desk {
     house: Arc<House>,
     outbox: Arc<Outbox>,
     sessions: BTreeMap<SessionId, Session>,
+    /// One thread for what reads files, so that a page that asks for much of it keeps no other page waiting.
+    aside: Arc<Semaphore>,
+}
+
+impl Drop for Desk {
+    fn drop(&mut self) {
+        // What waits for its turn is wanted no more.
+        self.aside.close();
+    }
 }
 
 impl Desk {
@@ -141,20 +153,25 @@ impl Desk {
                 });
                 None
             }
+            Call::Runs { folder } => {
+                let means = self.house.means.clone();
+                self.aside(id, move || runs(&means.files.find(&folder)?));
+                None
+            }
             Call::Open { what, seed } => self.open(id, what, seed).err().map(Err),
             Call::Close { session } => {
                 let closed = self.sessions.remove(&session).ok_or_else(ended);
                 self.outbox.clear(session);
                 Some(closed.map(|_| Answer::Done))
             }
-            Call::Check { session, text } => {
-                let source = self.sessions.get(&session).and_then(Session::source);
-                let Some(source) = source else { return Some(Err(ended())) };
-                let means = self.house.means.clone();
-                self.aside(id, move || {
-                    Ok(Answer::Problems { problems: checked(&means, &source, text)? })
-                });
-                None
+            Call::Check { session, text } => self.on_text(id, session, move |means, source| {
+                Ok(Answer::Problems { problems: checked(means, source, text)? })
+            }),
+            Call::Edit { session, text, edits } => {
+                self.on_text(id, session, move |means, source| edited(means, source, text, edits))
+            }
+            Call::Model { session, text } => {
+                self.on_text(id, session, move |means, source| model(means, source, text))
             }
             Call::Schema { world } => {
                 let worlds = self.house.means.worlds;
@@ -187,10 +204,29 @@ impl Desk {
         Ok(())
     }
 
-    /// Answers a request in a thread of its own, as it may read files.
+    /// Answers a request on a text that stands for a session's scenario.
+    fn on_text(
+        &self,
+        id: u32,
+        session: SessionId,
+        work: impl FnOnce(&Means, &Source) -> Result<Answer, Problem> + Send + 'static,
+    ) -> Option<Result<Answer, Problem>> {
+        let Some(source) = self.sessions.get(&session).and_then(Session::source) else {
+            return Some(Err(ended()));
+        };
+        let means = self.house.means.clone();
+        self.aside(id, move || work(&means, &source));
+        None
+    }
+
+    /// Answers a request in another thread, one after the other, as it may read files.
     fn aside(&self, id: u32, work: impl FnOnce() -> Result<Answer, Problem> + Send + 'static) {
-        let outbox = self.outbox.clone();
-        tokio::task::spawn_blocking(move || guarded(&outbox, id, || Some(work())));
+        let (outbox, aside) = (self.outbox.clone(), self.aside.clone());
+        tokio::spawn(async move {
+            let Ok(_turn) = aside.acquire().await else { return };
+            // It cannot panic: what it does is guarded.
+            let _ = spawn_blocking(move || guarded(&outbox, id, || Some(work()))).await;
+        });
     }
 }
 

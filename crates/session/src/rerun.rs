@@ -8,7 +8,7 @@ use sidestep::kernel::checkpoint::decode_header;
 use sidestep::kernel::{Cycle, InputError};
 use sidestep::scenario::Resolved;
 use sidestep::scenario::{Source, Worlds};
-use sidestep_record::{McapRun, ResumePoint, RunView, Status, is_mcap};
+use sidestep_record::{McapRun, ResumePoint, RunView, Status, is_mcap, tables};
 use std::path::{Path, PathBuf};
 
 /// A recorded run, whatever it was recorded to.
@@ -99,6 +99,14 @@ impl Recorded {
             }
         }
         Ok(Resolved { text: self.source.text.clone(), files })
+    }
+
+    /// Returns the names of the recorded tables; none of a recording for viewers.
+    ///
+    /// # Errors
+    /// When the folder can no longer be read.
+    pub fn tables(&self) -> Result<Vec<String>, InputError> {
+        self.folder.as_ref().map_or(Ok(Vec::new()), |folder| tables(folder))
     }
 
     /// Returns the run at its start.

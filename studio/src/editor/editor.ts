@@ -1,12 +1,16 @@
 /** The text of a scenario in CodeMirror. It lives in a shadow root, since there its styles need no inline element. */
 
-import { defaultKeymap, history, historyKeymap, indentWithTab } from "@codemirror/commands";
+import { autocompletion, completionKeymap, type CompletionContext, type CompletionResult } from "@codemirror/autocomplete";
+import { defaultKeymap, indentWithTab } from "@codemirror/commands";
 import { HighlightStyle, StreamLanguage, syntaxHighlighting } from "@codemirror/language";
 import { toml } from "@codemirror/legacy-modes/mode/toml";
 import { lintGutter, setDiagnostics, type Diagnostic } from "@codemirror/lint";
-import { Compartment, EditorState } from "@codemirror/state";
+import { Annotation, Compartment, EditorState } from "@codemirror/state";
 import { EditorView, highlightActiveLine, keymap, lineNumbers } from "@codemirror/view";
 import { tags } from "@lezer/highlight";
+import { completionAt } from "../edit/complete";
+import type { Table } from "../edit/keypath";
+import type { World } from "../edit/schema";
 import type { Problem } from "../protocol";
 
 const COLORS = EditorView.theme({
@@ -20,6 +24,9 @@ const COLORS = EditorView.theme({
     backgroundColor: "var(--chosen)",
   },
   ".cm-tooltip": { color: "var(--ink)", backgroundColor: "var(--panel)", border: "1px solid var(--strong-line)" },
+  ".cm-tooltip-autocomplete > ul": { fontFamily: "var(--mono)", maxHeight: "14em" },
+  ".cm-tooltip-autocomplete > ul > li[aria-selected]": { color: "var(--ink)", backgroundColor: "var(--chosen)" },
+  ".cm-completionInfo": { maxWidth: "44ch", padding: "4px 8px", fontFamily: "system-ui, sans-serif", whiteSpace: "pre-line" },
   ".cm-diagnostic": { whiteSpace: "pre-line", maxWidth: "60ch" },
 });
 
@@ -33,7 +40,27 @@ const HIGHLIGHT = HighlightStyle.define([
 
 export interface EditorHooks {
   changed(text: string): void;
-  run(): void;
+  undo(): void;
+  redo(): void;
+  /** What is known of the world's keys, once it is. */
+  knows(): { world: World; model: Table | null } | null;
+}
+
+/** Marks changes that come from elsewhere than this view. */
+const FROM_OUTSIDE = Annotation.define<boolean>();
+
+/** Options from the schema; descriptions stand beside them. */
+function completions(hooks: EditorHooks): (context: CompletionContext) => CompletionResult | null {
+  return (context) => {
+    const known = hooks.knows();
+    const found = known && completionAt(context.state.doc.toString(), context.pos, known.world, known.model);
+    if (!found || (found.from === context.pos && !context.explicit)) return null;
+    const options = found.options.map(({ label, words, kind }) => ({
+      label, info: words || undefined, type: kind === "key" ? "property" : kind === "section" ? "namespace" : "constant",
+      apply: kind === "key" ? `${label} = ` : label,
+    }));
+    return { from: found.from, options, validFor: /^"?[\w.-]*$/ };
+  };
 }
 
 export class Editor {
@@ -46,21 +73,28 @@ export class Editor {
     frame.className = "frame";
     frame.style.height = "100%";
     root.replaceChildren(frame);
-    const run = keymap.of([{ key: "Mod-Enter", run: () => (hooks.run(), true) }]);
+    const steps = keymap.of([
+      { key: "Mod-z", run: () => (hooks.undo(), true), preventDefault: true },
+      { key: "Mod-Shift-z", run: () => (hooks.redo(), true), preventDefault: true },
+      { key: "Mod-y", run: () => (hooks.redo(), true), preventDefault: true },
+      // Told to the page, which runs the text.
+      { key: "Mod-Enter", run: () => true },
+    ]);
     const state = EditorState.create({
       extensions: [
-        run,
+        steps,
         lineNumbers(),
         lintGutter(),
-        history(),
+        autocompletion({ override: [completions(hooks)], icons: false }),
         highlightActiveLine(),
         EditorView.lineWrapping,
         StreamLanguage.define(toml),
         syntaxHighlighting(HIGHLIGHT),
-        keymap.of([...defaultKeymap, ...historyKeymap, indentWithTab]),
-        EditorView.contentAttributes.of({ "aria-label": "Text of the scenario" }),
+        keymap.of([...completionKeymap, ...defaultKeymap, indentWithTab]),
+        EditorView.contentAttributes.of({ "aria-label": "Text of the scenario", tabindex: "0" }),
         EditorView.updateListener.of((update) => {
-          if (update.docChanged) hooks.changed(update.state.doc.toString());
+          const isOurs = update.transactions.some((one) => one.docChanged && !one.annotation(FROM_OUTSIDE));
+          if (isOurs) hooks.changed(update.state.doc.toString());
         }),
         this.#locked.of([]),
         COLORS,
@@ -73,30 +107,47 @@ export class Editor {
     return this.#view.state.doc.toString();
   }
 
+  /** Takes a text from elsewhere; only what differs is replaced, and shown if it is not the first. */
   setText(text: string, isLocked: boolean): void {
-    const changes = { from: 0, to: this.#view.state.doc.length, insert: text };
-    const locks = isLocked ? [EditorState.readOnly.of(true)] : [];
-    this.#view.dispatch({ changes, effects: this.#locked.reconfigure(locks) });
+    const before = this.text;
+    const effects = [this.#locked.reconfigure(isLocked ? [EditorState.readOnly.of(true)] : [])];
+    if (text === before) return this.#view.dispatch({ effects });
+    let from = 0;
+    while (from < text.length && from < before.length && text[from] === before[from]) from++;
+    let tail = 0;
+    while (tail < Math.min(text.length, before.length) - from && text.at(-1 - tail) === before.at(-1 - tail)) tail++;
+    const changes = { from, to: before.length - tail, insert: text.slice(from, text.length - tail) };
+    const shows = before === "" ? {} : { selection: { anchor: text.length - tail }, scrollIntoView: true };
+    this.#view.dispatch({ changes, effects, ...shows, annotations: FROM_OUTSIDE.of(true) });
   }
 
-  /** Marks problems where the server sees them; those without a line stand at the first. */
+  /** Marks problems over all that they are about; those without a line stand at the first. */
   mark(problems: readonly Problem[]): void {
     const { doc } = this.#view.state;
     const found = problems.map((problem): Diagnostic => {
-      const line = doc.line(Math.min(doc.lines, Math.max(1, problem.line ?? 1)));
-      const start = Math.min(line.to, line.from + Math.max(0, (problem.column ?? 1) - 1));
-      const word = /^[\w".-]+/.exec(line.text.slice(start - line.from))?.[0].length ?? 0;
-      const to = problem.line === null ? line.to : Math.max(start + word, Math.min(line.to, start + 1));
+      const from = this.#offset(problem.line ?? 1, problem.column ?? 1);
+      const line = doc.lineAt(from);
+      const word = /^[\w".-]+/.exec(line.text.slice(from - line.from))?.[0].length ?? 0;
+      const last = problem.line === null ? line.to : Math.max(from + word, Math.min(line.to, from + 1));
+      const hasEnd = problem.end_line != null && problem.end_column != null;
+      const to = hasEnd ? Math.max(from, this.#offset(problem.end_line!, problem.end_column!)) : last;
       const message = problem.remedy ? `${problem.cause}\nRemedy: ${problem.remedy}` : problem.cause;
-      return { from: start, to, severity: problem.is_warning ? "warning" : "error", message };
+      return { from, to, severity: problem.is_warning ? "warning" : "error", message };
     });
     this.#view.dispatch(setDiagnostics(this.#view.state, found));
   }
 
+  /** Where a line and a column are; both count from 1, columns in letters. */
+  #offset(line: number, column: number): number {
+    const { doc } = this.#view.state;
+    const at = doc.line(Math.min(doc.lines, Math.max(1, line)));
+    const units = [...at.text].slice(0, Math.max(0, column - 1)).join("").length;
+    return Math.min(at.to, at.from + units);
+  }
+
   /** Puts the cursor at a line and shows it. */
   goTo(line: number, column: number): void {
-    const at = this.#view.state.doc.line(Math.min(this.#view.state.doc.lines, Math.max(1, line)));
-    const anchor = Math.min(at.to, at.from + Math.max(0, column - 1));
+    const anchor = this.#offset(line, column);
     this.#view.dispatch({ selection: { anchor }, effects: EditorView.scrollIntoView(anchor, { y: "center" }) });
     this.#view.focus();
   }

@@ -128,7 +128,15 @@ most: number, } | { "do": "source",
 /**
  * The session.
  */
-session: number, } | { "do": "check",
+session: number, } | { "do": "tables",
+/**
+ * Which session.
+ */
+session: number, } | { "do": "runs",
+/**
+ * Its folder, as a listing gave it.
+ */
+folder: string, } | { "do": "check",
 /**
  * The session.
  */
@@ -350,7 +358,27 @@ text: string,
 /**
  * Whether it cannot be replaced by another text.
  */
-read_only: boolean, } | { "is": "problems",
+read_only: boolean, } | { "is": "tables",
+/**
+ * The names.
+ */
+names: Array<string>, } | { "is": "runs",
+/**
+ * The sweep's name; may be empty.
+ */
+name: string,
+/**
+ * Whether these are all runs.
+ */
+is_complete: boolean,
+/**
+ * The runs.
+ */
+runs: Array<SweepRun>,
+/**
+ * Number of runs that are not listed.
+ */
+left_out: number, } | { "is": "problems",
 /**
  * Nothing for a valid text without surprises.
  */
@@ -503,7 +531,7 @@ problem: Problem, };
  */
 export type Named = {
 /**
- * `scenario` or `recording`.
+ * `scenario`, `recording` or `sweep`.
  */
 kind: string,
 /**
@@ -763,6 +791,27 @@ names: Array<[number, string]>,
  * The bodies that are agents, which can be inspected.
  */
 is_agent: Array<boolean>, };
+
+/**
+ * A run of a sweep.
+ */
+export type SweepRun = {
+/**
+ * The name of its variant.
+ */
+variant: string,
+/**
+ * Its seed, in decimal digits, as it may be larger than a number of JavaScript can be.
+ */
+seed: string,
+/**
+ * The cause of its failure; empty if it did not fail.
+ */
+failure: string,
+/**
+ * Its recording; or its variant's scenario, which needs the seed.
+ */
+replay: Named, };
 
 /**
  * The text at the end of a frame.

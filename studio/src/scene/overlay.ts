@@ -18,22 +18,22 @@ export interface Label {
 const FONT = "12px system-ui, 'DejaVu Sans', sans-serif";
 
 export class Overlay {
-  readonly #canvas: HTMLCanvasElement;
+  readonly canvas: HTMLCanvasElement;
   readonly #pen: CanvasRenderingContext2D;
   #width = 1;
   #height = 1;
   #drawn = "";
 
   constructor(canvas: HTMLCanvasElement) {
-    this.#canvas = canvas;
+    this.canvas = canvas;
     this.#pen = canvas.getContext("2d")!;
   }
 
   resize(width_px: number, height_px: number, ratio: number): void {
     [this.#width, this.#height] = [width_px, height_px];
     this.#drawn = "";
-    this.#canvas.width = Math.round(width_px * ratio);
-    this.#canvas.height = Math.round(height_px * ratio);
+    this.canvas.width = Math.round(width_px * ratio);
+    this.canvas.height = Math.round(height_px * ratio);
     this.#pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   }
 

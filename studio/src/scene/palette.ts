@@ -67,6 +67,11 @@ export function packed(look: Look, palette: Palette): number {
   return word([r, g, b], look.opacity);
 }
 
+/** Looks of all groups one after the other, packed: five to a group, one for each condition. */
+export function tintsOf(groups: readonly (readonly Look[])[], palette: Palette): Uint32Array {
+  return Uint32Array.from(groups.flatMap((group) => group.map((look) => packed(look, palette))));
+}
+
 export function word([r, g, b]: Rgb, alpha: number): number {
   return ((Math.round(alpha * 255) << 24) | (b << 16) | (g << 8) | r) >>> 0;
 }

@@ -5,7 +5,7 @@ import type { Frame } from "../decode";
 import type { Scene, Shape } from "../protocol";
 import type { Bodies } from "../state/cast";
 import { BOX, DART, DISC, Glyphs } from "./glyphs";
-import { packed, type Palette } from "./palette";
+import { packed, tintsOf, type Palette } from "./palette";
 import type { Painter } from "./stage";
 
 /** Agents stay visible from afar: least half length in pixels. */
@@ -47,7 +47,7 @@ export class PlanePainter implements Painter {
   #order = new Uint32Array(0);
   #lineOf = new Int32Array(0);
   #forms: Form[] = [];
-  #tints = new Uint32Array(0);
+  #tints: Uint32Array = new Uint32Array(0);
 
   constructor(scene: Scene) {
     this.#scene = scene;
@@ -83,8 +83,7 @@ export class PlanePainter implements Painter {
   }
 
   #colors(palette: Palette): void {
-    const looks = this.#bodies?.cast.looks ?? [];
-    this.#tints = Uint32Array.from(looks.flatMap((group) => group.map((look) => packed(look, palette))));
+    this.#tints = tintsOf(this.#bodies?.cast.looks ?? [], palette);
   }
 
   frame(frame: Frame): void {

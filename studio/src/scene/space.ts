@@ -4,7 +4,7 @@ import { Group } from "three";
 import type { Frame } from "../decode";
 import type { Scene, Shape } from "../protocol";
 import type { Bodies } from "../state/cast";
-import { packed, type Palette } from "./palette";
+import { packed, tintsOf, type Palette } from "./palette";
 import { Solids, turnTo, type SolidKind } from "./solids";
 import type { Painter } from "./stage";
 
@@ -74,7 +74,7 @@ export class SpacePainter implements Painter {
   readonly #moving = new Pair(this.group);
   readonly #scene: Scene;
   #bodies: Bodies | null = null;
-  #tints = new Uint32Array(0);
+  #tints: Uint32Array = new Uint32Array(0);
 
   constructor(scene: Scene) {
     this.#scene = scene;
@@ -97,8 +97,7 @@ export class SpacePainter implements Painter {
   }
 
   #colors(palette: Palette): void {
-    const looks = this.#bodies?.cast.looks ?? [];
-    this.#tints = Uint32Array.from(looks.flatMap((group) => group.map((look) => packed(look, palette))));
+    this.#tints = tintsOf(this.#bodies?.cast.looks ?? [], palette);
   }
 
   frame(frame: Frame): void {

@@ -47,22 +47,36 @@ function rendererOf(canvas: HTMLCanvasElement, isSpace: boolean): WebGLRenderer 
   return new WebGLRenderer({ canvas, context, ...wanted });
 }
 
+/** What draws a scene's bodies, and its floor. */
+function layersOf(scene: Scene): [Painter, FloorLayer | null] {
+  const painter = scene.dimensions === 2 ? new PlanePainter(scene) : new SpacePainter(scene);
+  return [painter, scene.floor ? new FloorLayer(scene.floor) : null];
+}
+
+/** Whether two scenes can be looked at from the same place. */
+function isAlike(a: Scene, b: Scene): boolean {
+  const measure = ({ world, floor }: Scene): string => JSON.stringify([world, floor?.width, floor?.height, floor?.box_m, floor?.origin_m]);
+  return measure(a) === measure(b);
+}
+
 export class Stage {
   readonly eye: Eye;
   /** Called after each picture, with the roles of marks that it shows. */
   onDrawn: (roles: ReadonlySet<Role>) => void = () => undefined;
+  /** Told after each picture too: what is drawn over it follows the camera. */
+  readonly followers = new Set<() => void>();
   /** Pictures drawn so far. */
   pictures = 0;
   readonly #renderer: WebGLRenderer;
   readonly #overlay: Overlay;
   readonly #graph = new Graph();
   readonly #areas = new Group();
-  readonly #painter: Painter;
-  readonly #floor: FloorLayer | null;
+  #painter: Painter;
+  #floor: FloorLayer | null;
   readonly #grid = new Strokes(1);
   readonly #ways = new Strokes(4);
   readonly #marks = new Strokes(8);
-  readonly #scene: Scene;
+  #scene: Scene;
   #palette: Palette;
   #bodies: Bodies | null = null;
   #frame: Frame | null = null;
@@ -87,8 +101,7 @@ export class Stage {
     const isPlane = scene.dimensions === 2;
     this.#isFitted = eye !== undefined && eye instanceof PlaneEye === isPlane;
     this.eye = this.#isFitted ? eye! : isPlane ? new PlaneEye() : new SpaceEye();
-    this.#painter = scene.dimensions === 2 ? new PlanePainter(scene) : new SpacePainter(scene);
-    this.#floor = scene.floor ? new FloorLayer(scene.floor) : null;
+    [this.#painter, this.#floor] = layersOf(scene);
     if (this.#floor) this.#graph.add(this.#floor.mesh);
     for (const strokes of [this.#grid, this.#ways, this.#marks]) this.#graph.add(strokes.quads.mesh);
     this.#graph.add(this.#painter.group, this.#areas);
@@ -104,6 +117,23 @@ export class Stage {
     this.#renderer.setClearColor(new Color().setRGB(back[0] / 255, back[1] / 255, back[2] / 255, SRGBColorSpace));
     this.#bodiesChanged = this.#marksChanged = true;
     this.changed();
+  }
+
+  /** Shows another scene of as many dimensions, as after an edit; what was drawn stays until its first frame. */
+  restage(scene: Scene): void {
+    if (scene === this.#scene) return;
+    if (!isAlike(scene, this.#scene)) this.#isFitted = false;
+    this.#scene = scene;
+    this.#painter.dispose();
+    this.#floor?.dispose();
+    this.#graph.remove(this.#painter.group);
+    if (this.#floor) this.#graph.remove(this.#floor.mesh);
+    [this.#painter, this.#floor] = layersOf(scene);
+    this.#graph.add(this.#painter.group);
+    if (this.#floor) this.#graph.add(this.#floor.mesh);
+    if (this.#bodies) this.#painter.cast(this.#bodies, this.#palette);
+    this.#extent = extentOf(scene, null, null);
+    this.theme(this.#palette.isDark);
   }
 
   resize(width_px: number, height_px: number): void {
@@ -123,11 +153,12 @@ export class Stage {
     this.#frame = null;
   }
 
-  frame(frame: Frame): void {
+  /** Takes a frame; one that was sought need not follow the one before. */
+  frame(frame: Frame, isSought = false): void {
     if (frame === this.#frame || !this.#bodies) return;
     const isFirst = this.#frame === null;
     this.#frame = frame;
-    this.#trails?.push(frame.cycle, frame.places_m);
+    this.#trails?.push(frame.cycle, frame.places_m, isSought);
     if (isFirst) this.#extent = extentOf(this.#scene, this.#bodies, frame);
     if (isFirst && !this.#isFitted) this.fit();
     this.#bodiesChanged = this.#marksChanged = true;
@@ -188,6 +219,20 @@ export class Stage {
     this.changed();
   }
 
+  /** The picture as it is seen, with its words. */
+  snapshot(): Promise<Blob | null> {
+    // What was drawn before is gone once the browser has shown it.
+    cancelAnimationFrame(this.#request);
+    this.#draw();
+    const { domElement: picture } = this.#renderer;
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = [picture.width, picture.height];
+    const pen = canvas.getContext("2d")!;
+    pen.drawImage(picture, 0, 0);
+    pen.drawImage(this.#overlay.canvas, 0, 0, canvas.width, canvas.height);
+    return new Promise((then) => canvas.toBlob(then, "image/png"));
+  }
+
   /** Where a body appears, for tests and for keeping it in sight. */
   placeOf(index: number): Place | null {
     const frame = this.#frame;
@@ -221,6 +266,7 @@ export class Stage {
     this.#overlay.draw(this.eye, this.#extent, this.#labels(), this.#palette);
     this.pictures++;
     this.onDrawn(this.#roles);
+    for (const tell of this.followers) tell();
   }
 
   #drawMarks(): void {

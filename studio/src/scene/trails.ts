@@ -5,6 +5,8 @@ const MOST_PLACES = 240_000;
 const MOST_OF_ONE = 600;
 /** A jump of more cycles than this is no way that was seen. */
 const GAP_CYCLES = 200;
+/** Unless the run goes so fast that frames are far from each other: then it may be so much more than the last one. */
+const GAP_GROWTH = 4;
 
 export class Trails {
   readonly dimensions: 2 | 3;
@@ -16,6 +18,8 @@ export class Trails {
   readonly #begins: Int32Array;
   readonly #counts: Int32Array;
   #last = -Infinity;
+  /** The distance of frames, in cycles; shorter ones let it shrink slowly, as a run that is paused ends on one. */
+  #stride = 0;
 
   constructor(bodies: number, dimensions: 2 | 3) {
     this.bodies = bodies;
@@ -27,10 +31,16 @@ export class Trails {
     this.#counts = new Int32Array(bodies);
   }
 
-  /** Takes the places of a frame. Going back shortens trails, a jump forward begins new ones. */
-  push(cycle: number, places: Float32Array): void {
-    if (cycle < this.#last) this.#cut(cycle);
-    else if (cycle > this.#last + GAP_CYCLES) this.clear();
+  /**
+   * Takes the places of a frame. Going back shortens trails; a jump forward begins new ones, if it was sought or is much
+   * wider than the last one: a run that goes faster makes wider ones, too.
+   */
+  push(cycle: number, places: Float32Array, isSought = false): void {
+    const gap = cycle - this.#last;
+    const widest = isSought ? GAP_CYCLES : Math.max(GAP_CYCLES, GAP_GROWTH * this.#stride);
+    if (gap < 0) this.#cut(cycle);
+    else if (gap > widest) this.clear();
+    if (!isSought && Number.isFinite(gap)) this.#stride = Math.max(gap, this.#stride / 2);
     this.#last = cycle;
     for (let body = 0; body < this.bodies; body++) this.#push(body, cycle, places);
   }

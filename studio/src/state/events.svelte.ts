@@ -71,13 +71,19 @@ export class Events {
   add(entries: Event[]): void {
     if (entries.length === 0) return;
     const from = Math.min(...entries.map((event) => event.cycle));
-    const known = new Set<string>();
     // Where the world tells no kind, its level says at least how bad it is.
     entries = entries.map((event) => (event.kind === "" ? { ...event, kind: event.level } : event));
-    for (let i = this.list.length - 1; i >= 0 && this.list[i]!.cycle >= from; i--) known.add(keyOf(this.list[i]!));
+    // Events may be equal: of each sort there are as many as one answer has, however often it is told.
+    const known = new Map<string, number>();
+    for (let i = this.list.length - 1; i >= 0 && this.list[i]!.cycle >= from; i--) {
+      const key = keyOf(this.list[i]!);
+      known.set(key, (known.get(key) ?? 0) + 1);
+    }
     const fresh = entries.filter((event) => {
       const key = keyOf(event);
-      return !known.has(key) && !!known.add(key);
+      const left = known.get(key) ?? 0;
+      known.set(key, left - 1);
+      return left <= 0;
     });
     if (fresh.length === 0) return;
     const all = [...this.list, ...fresh].sort((a, b) => a.cycle - b.cycle);

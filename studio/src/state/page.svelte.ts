@@ -29,11 +29,15 @@ class Page {
   hasKeys = $state(kept("keys") !== "no");
   showsHelp = $state(false);
   showsOpen = $state(false);
+  showsExports = $state(false);
   /** Width of the inspector. */
   inspector_px = $state(Math.min(720, Math.max(220, Number(kept("inspector") ?? 330))));
   /** The panel below the canvas on narrow screens. */
   tab = $state<"agents" | "events" | "inspector" | "charts">("agents");
-  center = $state<"view" | "text">("view");
+  center = $state<"view" | "forms" | "text" | "report">("view");
+  /** Whether the picture is drawn upon. */
+  edits = $state(false);
+  showsNew = $state(false);
   /** Asked for by keys; the panels listen. */
   wantsFilter = $state(0);
   #systemIsDark = $state(matchMedia("(prefers-color-scheme: dark)").matches);

@@ -2,12 +2,16 @@
 
 import { Credit } from "../credit";
 import { decodeFrame, FrameError, type Frame } from "../decode";
-import { Refused, problemOf } from "../connection";
+import { LOST, Refused, problemOf } from "../connection";
 import { firstSpeed, SPEEDS, whoKey } from "../format";
 import type { Answer, Call, Cast, Event, Inspection, Problem, Scene, Speed, Status, Subject, Who } from "../protocol";
 import { Bodies } from "./cast";
 import { Events } from "./events.svelte";
 import { Metrics } from "./metrics.svelte";
+import { Missed } from "./missed";
+import { cyclesBack_per_s, Rewind } from "./rewind.svelte";
+import { Seeker } from "./seeker";
+import { Waiting } from "./waiting";
 
 type DistributiveOmit<T, K extends PropertyKey> = T extends unknown ? Omit<T, K> : never;
 /** A call to a session, which adds its own number. */
@@ -54,14 +58,16 @@ export class Session {
   eventKinds = $state.raw<ReadonlySet<string>>(new Set());
   /** The text that this run was started with instead of the file's. */
   text = $state.raw<string | null>(null);
-  /** What the text view holds, while it differs from the file. */
-  draft: string | null = null;
+  /** Whether its text was changed and not saved. */
+  isUnsaved = $state(false);
   /** Cycle under the pointer in the timeline or a chart. */
   cursor = $state<number | null>(null);
   /** Counts starts, so that views begin anew. */
   starts = $state(0);
-  /** The newest frame; `frames` tells views that it changed. */
+  /** The newest frame. */
   frame: Frame | null = null;
+  /** Whether the newest frame was asked for, and does not just follow the one before. */
+  isSought = false;
   readonly credit: Credit;
   readonly #line: Line;
   readonly #early = new Map<number, Frame>();
@@ -69,9 +75,16 @@ export class Session {
   #inspectTimer: ReturnType<typeof setTimeout> | null = null;
   #inspectedAt_ms = 0;
   #isInspecting = false;
-  #seekTo: number | null = null;
-  #isSeeking = false;
+  readonly #rewind = new Rewind();
+  readonly #seeker = new Seeker((cycle) => this.#seekNow(cycle));
+  readonly #missed = new Missed();
+  /** Counts what the page asked of the run: a way that was given up for something newer is no problem. */
+  #orders = 0;
+  /** Who waits for a state or a frame. */
+  readonly #waiting = new Waiting();
   #regrantTimer: ReturnType<typeof setTimeout> | null = null;
+  /** Where it was when the connection was lost, until it is there again. */
+  #kept: { cycle: number; isPlaying: boolean; seed: number | null } | null = null;
 
   constructor(subject: Subject, line: Line) {
     this.subject = subject;
@@ -89,6 +102,28 @@ export class Session {
     this.#look();
   }
 
+  /** The connection was lost: numbers of sessions are the server's, and a new one begins to count again. */
+  cutOff(): void {
+    this.id = 0;
+    this.#rewind.stop();
+    this.#waiting.over();
+    const { cycle } = this.shown;
+    // Lost once more on the way back: where it was in the end is where it was in the beginning.
+    this.#kept ??= { cycle, isPlaying: this.isPlaying, seed: this.#ownSeed };
+  }
+
+  /** Opened again: goes to where it was, and on if it played. Returns the cycle. */
+  async resume(): Promise<number> {
+    const { cycle, isPlaying, seed } = this.#kept ?? { cycle: 0, isPlaying: false, seed: null };
+    const { id } = this;
+    if (this.text !== null) await this.restart(seed, this.text);
+    if (cycle > 0) await this.#seeker.to(cycle);
+    if (id !== this.id) return cycle;
+    this.#kept = null;
+    if (isPlaying) this.play();
+    return cycle;
+  }
+
   #begun(answer: Extract<Answer, { is: "opened" }>): void {
     this.scene = answer.scene;
     this.status = answer.status;
@@ -96,11 +131,17 @@ export class Session {
     this.events.clear();
     this.metrics.clear();
     this.inspection = null;
+    this.#missed.reset();
+    this.#seeker.jumped();
     this.starts++;
   }
 
   /** The seed, where a number of the page can hold it; a recording has none but its own. */
   get seed(): number | null {
+    return this.#kept ? this.#kept.seed : this.#ownSeed;
+  }
+
+  get #ownSeed(): number | null {
     if (this.subject.kind === "recording") return null;
     const seed = Number(this.status.seed);
     return this.status.seed !== "" && Number.isSafeInteger(seed) ? seed : null;
@@ -108,6 +149,15 @@ export class Session {
 
   get isPlaying(): boolean {
     return this.status.state === "playing";
+  }
+
+  /** Whether it goes on or back by itself. */
+  get isMoving(): boolean {
+    return this.isPlaying || this.#rewind.isOn;
+  }
+
+  get isRewinding(): boolean {
+    return this.#rewind.isOn;
   }
 
   /** The last cycle of the timeline; grows where no end is planned. */
@@ -119,6 +169,15 @@ export class Session {
   subscribe(onFrame: () => void): () => void {
     this.#onFrame.add(onFrame);
     return () => this.#onFrame.delete(onFrame);
+  }
+
+  /** Called regularly: what nobody looks at needs few frames, so that it is there when somebody does. */
+  grantUnseen(): void {
+    if (!this.#isWatched && this.id !== 0 && !this.ended) this.credit.drawn();
+  }
+
+  get #isWatched(): boolean {
+    return this.#onFrame.size > 0 && !globalThis.document?.hidden;
   }
 
   takeCast(cast: Cast): void {
@@ -156,19 +215,41 @@ export class Session {
       return;
     }
     this.frame = frame;
-    this.shown = { cycle: frame.cycle, time_s: frame.time_s, leftOut: frame.leftOut };
+    this.isSought = this.#seeker.arrived();
+    this.shown = { cycle: frame.cycle, time_s: frame.time_s, leftOut: this.#missed.count(frame.leftOut, this.#isWatched) };
     if (frame.text.events.length > 0) this.events.add(frame.text.events);
     for (const tell of this.#onFrame) tell();
+    this.#waiting.changed();
     this.#inspectSoon();
   }
 
   takeStatus(status: Status): void {
     this.status = status;
+    this.#waiting.changed();
+  }
+
+  /** Goes to a cycle; returns the digest of the state there, and the cycle, which is less where the run is over before. */
+  async digestAt(cycle: number): Promise<{ cycle: number; digest: string } | null> {
+    this.#rewind.stop();
+    if (!(await this.#seeker.to(cycle))) return null;
+    return this.#waiting.for(() => {
+      const { state, digest, cycle: at } = this.status;
+      const isThere = at === cycle || (state === "over" && at < cycle);
+      return digest !== null && isThere ? { cycle: at, digest } : null;
+    });
+  }
+
+  /** The frame of a cycle where the run stands, once it has come. */
+  frameAt(cycle: number): Promise<Frame | null> {
+    if (this.id === 0 || this.ended) return Promise.resolve(null);
+    return this.#waiting.for(() => (this.frame?.cycle === cycle ? this.frame : null));
   }
 
   takeEnd(problem: Problem): void {
     this.ended = problem;
     this.status = { ...this.status, state: "failed" };
+    this.#rewind.stop();
+    this.#waiting.over();
   }
 
   /** Fetches events and samples; called regularly while the session is shown. */
@@ -185,26 +266,40 @@ export class Session {
   // What the page can do with it.
 
   play(): void {
+    this.#order();
     void this.tell({ do: "play", speed: this.speed });
   }
 
   pause(): void {
+    this.#order();
     void this.tell({ do: "pause" });
   }
 
-  toggle(): void {
-    if (this.isPlaying) this.pause();
-    else this.play();
+  /** Plays backwards. */
+  rewind(): void {
+    this.#order();
+    const { cycle } = this.shown;
+    const times = this.speed === "fastest" ? this.speed : this.speed.times;
+    void this.#rewind.start(cycle, cyclesBack_per_s(times, this.scene.cycle_s, cycle), (to) => this.#seeker.to(to));
   }
 
   step(cycles: number): void {
-    if (cycles >= 0) void this.tell({ do: "step", cycles });
-    else this.seek(this.shown.cycle + cycles);
+    if (cycles < 0) return this.seek(this.shown.cycle + cycles);
+    this.#order();
+    void this.tell({ do: "step", cycles });
+  }
+
+  /** Whatever it does by itself ends with what is asked for now. */
+  #order(): void {
+    this.#orders++;
+    this.#rewind.stop();
   }
 
   setSpeed(speed: Speed): void {
-    if (this.isPlaying) void this.tell({ do: "play", speed });
+    const { isPlaying, isRewinding } = this;
     this.speed = speed;
+    if (isPlaying) this.play();
+    else if (isRewinding) this.rewind();
   }
 
   /** Goes to the next or the previous of the usual speeds. */
@@ -217,22 +312,24 @@ export class Session {
 
   /** Goes to a cycle; while one is under way only the latest wish is kept. */
   seek(cycle: number): void {
-    this.#seekTo = Math.round(Math.min(Math.max(0, cycle), this.lastCycle));
-    if (!this.#isSeeking) void this.#seekOn();
+    this.#order();
+    void this.#seeker.to(Math.round(Math.min(Math.max(0, cycle), this.lastCycle)));
   }
 
-  async #seekOn(): Promise<void> {
-    this.#isSeeking = true;
-    while (this.#seekTo !== null) {
-      const cycle = this.#seekTo;
-      this.#seekTo = null;
-      await this.tell({ do: "seek", cycle });
+  async #seekNow(cycle: number): Promise<boolean> {
+    const orders = this.#orders;
+    try {
+      await this.#ask({ do: "seek", cycle });
+      return true;
+    } catch (error) {
+      if (orders === this.#orders) this.#told(error);
+      return false;
     }
-    this.#isSeeking = false;
   }
 
   /** Starts anew. Returns whether the server agreed. */
   async restart(seed: number | null, text: string | null): Promise<boolean> {
+    this.#order();
     const answer = await this.tell({ do: "restart", seed, text });
     if (answer === null) return false;
     if (text !== null) this.text = text;
@@ -275,8 +372,29 @@ export class Session {
     return this.#ask({ do: "source" });
   }
 
+  /** The folder of the recording, where it is one: of such there are reports. */
+  get folder(): string | null {
+    const { subject } = this;
+    return subject.kind === "recording" && !/\.mcap$/i.test(subject.path) ? subject.path : null;
+  }
+
+  /** The names of the recorded tables. */
+  async tables(): Promise<string[]> {
+    const answer = await this.tell({ do: "tables" });
+    return answer?.is === "tables" ? answer.names : [];
+  }
+
   check(text: string): Promise<Answer> {
     return this.#ask({ do: "check", text });
+  }
+
+  /** Sends a call of the editor's. */
+  ask(call: Call): Promise<Answer> {
+    return this.id === 0 ? Promise.reject(new Refused(NO_SESSION)) : this.#line.ask(call);
+  }
+
+  complain(problem: Problem): void {
+    this.#line.problem(problem);
   }
 
   /** Sends a call and shows its problem, if there is one. */
@@ -284,10 +402,15 @@ export class Session {
     try {
       return await this.#ask(call);
     } catch (error) {
-      if (!(error instanceof Refused)) throw error;
-      this.#line.problem(error.problem);
+      this.#told(error);
       return null;
     }
+  }
+
+  /** Shows a problem, but for that of the connection, which the banner tells for all calls. */
+  #told(error: unknown): void {
+    if (!(error instanceof Refused)) throw error;
+    if (error.problem !== LOST && error.problem !== NO_SESSION) this.#line.problem(error.problem);
   }
 
   /** Sends a call whose failure nobody needs to hear of. */

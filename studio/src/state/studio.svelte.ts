@@ -1,8 +1,10 @@
 /** All open sessions, the connection that they share, and what the page as a whole shows. */
 
-import { Connection, Refused, problemOf, type Listener, type Surroundings } from "../connection";
+import { Connection, LOST, Refused, problemOf, type Listener, type Surroundings } from "../connection";
+import { STANDING_WORDS, type Standing } from "../enter";
 import { HEADER_BYTES } from "../decode";
-import { VERSION, type Notice, type Problem, type Subject } from "../protocol";
+import { VERSION, type Named, type Notice, type Problem, type Subject } from "../protocol";
+import { Comparison } from "./comparison.svelte";
 import { remember } from "./recents";
 import { Session } from "./session.svelte";
 
@@ -14,6 +16,17 @@ export interface Banner {
   isBad: boolean;
 }
 
+/** What a studio needs besides sockets: how it stands with the server. */
+export interface Around extends Surroundings {
+  standing(): Promise<Standing>;
+}
+
+/** A sweep, by its folder. */
+export interface Sweep {
+  folder: string;
+  name: string;
+}
+
 type Hello = Extract<Notice, { notice: "hello" }>;
 
 export class Studio {
@@ -22,21 +35,48 @@ export class Studio {
   banner = $state.raw<Banner | null>(null);
   problems = $state.raw<{ key: number; problem: Problem }[]>([]);
   sessions = $state.raw<Session[]>([]);
-  activeKey = $state(0);
+  /** The sweep that is shown in the place of sessions, and the one that was last. */
+  sweep = $state.raw<Sweep | null>(null);
+  lastSweep = $state.raw<Sweep | null>(null);
+  #activeKey = $state(0);
   /** All sessions beside each other, or the active one only. */
   sideBySide = $state(false);
   /** Transport commands go to all sessions. */
   inStep = $state(false);
+  readonly comparison = new Comparison();
   readonly #connection: Connection;
+  readonly #around: Around;
+  /** Counts greetings and losses: what was begun before one of them is of no more use. */
+  #generation = 0;
   #problemKeys = 0;
 
-  constructor(surroundings: Surroundings) {
+  constructor(around: Around) {
     const listener: Listener = {
       notice: (notice) => this.#notice(notice),
       frame: (bytes) => this.#frame(bytes),
       lost: (attempt, wait_ms) => this.#lost(attempt, wait_ms),
     };
-    this.#connection = new Connection(listener, surroundings);
+    this.#around = around;
+    this.#connection = new Connection(listener, around);
+  }
+
+  get activeKey(): number {
+    return this.#activeKey;
+  }
+
+  /** Shows a session. */
+  set activeKey(key: number) {
+    this.#activeKey = key;
+    this.sweep = null;
+  }
+
+  /** Shows a sweep. */
+  openSweep(folder: string, name: string): void {
+    this.sweep = this.lastSweep = { folder, name };
+  }
+
+  closeSweep(): void {
+    this.sweep = this.lastSweep = null;
   }
 
   get active(): Session | null {
@@ -94,7 +134,8 @@ export class Studio {
       return true;
     } catch (error) {
       if (!(error instanceof Refused)) throw error;
-      this.problem(error.problem);
+      // The banner tells what is the same for all.
+      if (error.problem !== LOST) this.problem(error.problem);
       return false;
     }
   }
@@ -103,6 +144,18 @@ export class Studio {
 
   play(): void {
     for (const session of this.led) session.play();
+  }
+
+  /** Lets what moves stand still, and goes on else. */
+  toggle(): void {
+    if (this.active?.isMoving) this.pause();
+    else this.play();
+  }
+
+  /** Plays backwards, or lets stand still what does. */
+  toggleBack(): void {
+    if (this.active?.isRewinding) return this.pause();
+    for (const session of this.led) session.rewind();
   }
 
   pause(): void {
@@ -123,6 +176,21 @@ export class Studio {
     this.sessions = this.sessions.filter((one) => one !== session);
     if (this.activeKey === session.key) this.activeKey = this.sessions[Math.max(0, at - 1)]?.key ?? 0;
     if (this.sessions.length < 2) this.sideBySide = this.inStep = false;
+    this.comparison.stop();
+  }
+
+  /** The two runs that can be compared: those in step, the active one and the first other. */
+  get pair(): [Session, Session] | null {
+    const active = this.active;
+    const other = this.sessions.find((one) => one !== active);
+    if (!this.inStep || !active || !other) return null;
+    return this.sessions.indexOf(other) < this.sessions.indexOf(active) ? [other, active] : [active, other];
+  }
+
+  /** Looks for the first difference of the two, or gives the search up. */
+  toggleComparison(): void {
+    if (this.comparison.isRunning) return this.comparison.stop();
+    if (this.pair) void this.comparison.find(...this.pair);
   }
 
   #byId(id: number): Session | undefined {
@@ -171,40 +239,61 @@ export class Studio {
       this.banner = { words, isBad: true };
       return;
     }
+    const generation = ++this.#generation;
     const isFirst = this.hello === null;
     this.hello = hello;
     this.isConnected = true;
     this.banner = null;
-    if (this.sessions.length > 0) await this.#reopen();
-    else if (isFirst) for (const subject of hello.open) await this.open(subject as Subject);
+    if (this.sessions.length > 0) await this.#reopen(generation);
+    else if (isFirst) for (const named of hello.open) await this.#openNamed(named);
+  }
+
+  /** Opens what the command line named. */
+  async #openNamed({ kind, path }: Named): Promise<void> {
+    if (kind === "sweep") this.openSweep(path, path.split("/").at(-1) ?? path);
+    else await this.open({ kind, path } as Subject);
   }
 
   #lost(attempt: number, wait_ms: number): void {
+    const generation = ++this.#generation;
     this.isConnected = false;
     this.#early.clear();
-    // Numbers of sessions are the server's, and a new one begins to count again.
-    for (const session of this.sessions) session.id = 0;
+    for (const session of this.sessions) session.cutOff();
     const wait = wait_ms < 1000 ? "at once" : `in ${Math.round(wait_ms / 1000)} s`;
-    const words = `The server does not answer. Attempt ${attempt} to connect again comes ${wait}.`;
-    this.banner = { words, isBad: true };
+    const say = (standing: Standing): void => {
+      this.banner = { words: `${STANDING_WORDS[standing]} Attempt ${attempt} to connect again comes ${wait}.`, isBad: true };
+    };
+    // What is known already stays until the server has said what it is.
+    say(this.#standing);
+    void this.#around.standing().then((standing) => {
+      if (generation !== this.#generation) return;
+      this.#standing = standing;
+      say(standing);
+    });
   }
 
-  /** Opens all sessions again and brings each to the cycle where it was. */
-  async #reopen(): Promise<void> {
+  /** How the page stood with the server when it was asked last. */
+  #standing: Standing = "silent";
+
+  /** Opens all sessions again, brings each to the cycle where it was, and plays those that played. */
+  async #reopen(generation: number): Promise<void> {
     const told: string[] = [];
+    let missing = 0;
     for (const session of this.sessions) {
-      const { cycle } = session.shown;
-      const seed = session.seed;
-      if (!(await this.#openAt(session, seed))) {
+      const isOpen = await this.#openAt(session, session.seed);
+      if (generation !== this.#generation) return;
+      if (!isOpen) {
         session.takeEnd(problemOf(session.scene.name, "it could not be opened again", "open it anew, or close it"));
+        missing++;
         continue;
       }
       this.#deliver(session);
-      if (session.text !== null) await session.restart(seed, session.text);
-      if (cycle > 0) await session.tell({ do: "seek", cycle });
+      const cycle = await session.resume();
+      if (generation !== this.#generation) return;
       told.push(`${session.scene.name} at cycle ${cycle}`);
     }
     const words = told.length > 0 ? `Connected again; reopened ${told.join(", ")}.` : "Connected again.";
-    this.banner = { words, isBad: false };
+    const more = missing > 0 ? ` ${missing} could not be opened again.` : "";
+    this.banner = { words: words + more, isBad: false };
   }
 }

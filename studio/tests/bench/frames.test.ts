@@ -3,11 +3,11 @@
  * Without STUDIO_URL the made-up server sends them; with it, a real one that runs crowd.toml as a text.
  */
 
-import { readFileSync } from "node:fs";
 import type { Browser, CDPSession, Page } from "playwright-core";
 import { afterAll, beforeAll, expect, test } from "vitest";
-import { drawn, launch, openPage, WAIT_MS } from "../browser";
+import { launch, openPage, WAIT_MS } from "../browser";
 import { FakeServer } from "../fake/server";
+import { openCrowd } from "./crowd";
 
 const url = process.env.STUDIO_URL;
 const MEASURED_S = 10;
@@ -21,24 +21,6 @@ afterAll(async () => {
   await browser.close();
   if (!url) await server.stop();
 });
-
-/** A crowd: opened by its name from the made-up server, run as a text by a real one. */
-async function openCrowd(page: Page): Promise<void> {
-  if (!url) {
-    await page.getByRole("button", { name: "crowd", exact: true }).first().click();
-    return drawn(page);
-  }
-  await page.getByRole("button", { name: "robots", exact: true }).first().click();
-  await drawn(page);
-  await page.getByRole("tab", { name: "Text" }).click();
-  const text = page.getByRole("textbox", { name: "Text of the scenario" });
-  await text.click();
-  await page.keyboard.press("Control+A");
-  await page.keyboard.insertText(readFileSync(new URL("crowd.toml", import.meta.url), "utf8"));
-  await page.getByTestId("check").filter({ hasText: "no problems" }).waitFor();
-  await page.getByRole("button", { name: "Run", exact: true }).click();
-  await page.locator("canvas.picture").waitFor();
-}
 
 interface Count {
   pictures: number;
@@ -66,12 +48,12 @@ async function count(page: Page, client: CDPSession): Promise<Count> {
 
 test("ten thousand robots are shown", { timeout: 4 * WAIT_MS }, async () => {
   const { page, complaints } = await openPage(browser, url ?? server.url);
-  await openCrowd(page);
+  await openCrowd(page, url !== undefined);
   await page.getByTestId("agent-count").filter({ hasText: "10000" }).waitFor();
   const client = await page.context().newCDPSession(page);
   await client.send("Performance.enable");
   await page.getByLabel("Speed", { exact: true }).selectOption(url ? "fastest" : "10");
-  await page.getByRole("button", { name: "Play" }).click();
+  await page.getByRole("button", { name: "Play", exact: true }).click();
   await expect.poll(async () => (await count(page, client)).pictures, { timeout: WAIT_MS }).toBeGreaterThan(20);
   const before = await count(page, client);
   const began = performance.now();

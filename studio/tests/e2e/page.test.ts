@@ -1,9 +1,10 @@
 /** What a person can do with the page, in a real browser, against a server of made-up worlds. */
 
+import { readFileSync } from "node:fs";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from "vitest";
-import { launch, openNew, openPage, WAIT_MS, type Look } from "../browser";
-import { FakeServer } from "../fake/server";
+import { drawn, launch, openNew, openPage, WAIT_MS, type Look } from "../browser";
+import { FakeServer, PARTING } from "../fake/server";
 
 const server = new FakeServer("dist");
 let browser: Browser;
@@ -49,7 +50,7 @@ describe("transport", () => {
   test("a run is opened, played, paused and stepped, and nothing complains", async () => {
     await visit("robots");
     expect(await cycle()).toBe(0);
-    await page.getByRole("button", { name: "Play" }).click();
+    await page.getByRole("button", { name: "Play", exact: true }).click();
     await cycleIs((c) => c >= 3);
     await page.getByRole("button", { name: "Pause" }).click();
     await page.getByTestId("state").filter({ hasText: "paused" }).waitFor();
@@ -76,6 +77,31 @@ describe("transport", () => {
     await cycleIs(12);
   });
 
+  test("a run plays backwards, and stands still when asked to", async () => {
+    await visit("robots");
+    await page.getByRole("slider", { name: "Cycle" }).fill("800");
+    await cycleIs(800);
+    await page.getByLabel("Speed", { exact: true }).selectOption("10");
+    await page.locator("canvas.picture").focus();
+    await page.keyboard.press("b");
+    await page.getByTestId("state").filter({ hasText: "playing back" }).waitFor();
+    await cycleIs((c) => c < 770);
+    await page.keyboard.press(" ");
+    await page.getByTestId("state").filter({ hasText: "paused" }).waitFor();
+    // One step may still have been under way.
+    await askedFor("pause", 1);
+    await page.getByRole("slider", { name: "Cycle" }).fill("600");
+    await cycleIs(600);
+    const seeks = asked("seek");
+    await page.getByRole("button", { name: "One cycle on" }).click();
+    await cycleIs(601);
+    expect(asked("seek")).toBe(seeks);
+    await page.getByRole("button", { name: "Play backwards" }).click();
+    await cycleIs((c) => c < 590);
+    expect(complaints).toEqual([]);
+    expect(await page.getByRole("alert").textContent()).toBe("");
+  });
+
   test("another seed starts anew", async () => {
     await visit("robots");
     await page.getByRole("slider", { name: "Cycle" }).fill("100");
@@ -94,7 +120,7 @@ describe("transport", () => {
       window.addEventListener("blur", () => (window.requestAnimationFrame = draw));
     });
     await page.getByLabel("Speed", { exact: true }).selectOption("fastest");
-    await page.getByRole("button", { name: "Play" }).click();
+    await page.getByRole("button", { name: "Play", exact: true }).click();
     await expect.poll(() => server.leftOut(), { timeout: 30_000 }).toBeGreaterThan(3);
     await page.evaluate(() => window.dispatchEvent(new Event("blur")));
     await page.getByRole("button", { name: "Fit" }).click();
@@ -274,6 +300,78 @@ describe("layout", () => {
   });
 });
 
+describe("results", () => {
+  /** Opens something of the list. */
+  async function openFile(name: RegExp): Promise<void> {
+    await visit(null);
+    await page.getByRole("button", { name: /^Open a scenario/ }).click();
+    await page.getByRole("dialog", { name: "Open" }).getByRole("button", { name }).click();
+  }
+
+  test("the report of a recording stands in a frame that reaches nobody, and its parts can be kept", async () => {
+    await openFile(/robots\.run/);
+    await page.getByRole("tab", { name: "Report" }).click();
+    const frame = page.frameLocator("iframe");
+    await frame.getByRole("heading", { name: "Report of robots.run" }).waitFor();
+    await frame.getByText("origin null").waitFor();
+    await expect.poll(() => page.frames()[1]!.title(), { timeout: 20_000 }).toBe("kept in");
+    await page.getByText("figures (1)").click();
+    await page.getByRole("link", { name: "01-speed" }).waitFor();
+    const kept = page.waitForEvent("download");
+    await page.getByRole("link", { name: "Markdown" }).click();
+    expect((await kept).suggestedFilename()).toBe("made-up.markdown");
+    await page.getByRole("tab", { name: "View" }).click();
+    await page.locator("canvas.picture").waitFor();
+  });
+
+  test("the picture on the canvas and the tables of a recording are kept as files", async () => {
+    await openFile(/robots\.run/);
+    await drawn(page);
+    await page.getByRole("slider", { name: "Cycle" }).fill("50");
+    await cycleIs(50);
+    await page.getByRole("button", { name: "Export…" }).click();
+    const dialog = page.getByRole("dialog", { name: /^Export/ });
+    const picture = page.waitForEvent("download");
+    await dialog.getByRole("button", { name: "Picture (PNG)" }).click();
+    const file = await picture;
+    expect(file.suggestedFilename()).toBe("Made-up-hall-50.png");
+    const bytes = readFileSync((await file.path())!);
+    const colors = await page.evaluate(async (url) => {
+      const image = new Image();
+      image.src = url;
+      await image.decode();
+      const canvas = document.createElement("canvas");
+      [canvas.width, canvas.height] = [image.width, image.height];
+      const pen = canvas.getContext("2d")!;
+      pen.drawImage(image, 0, 0);
+      return new Set(new Uint32Array(pen.getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size;
+    }, `data:image/png;base64,${bytes.toString("base64")}`);
+    expect(colors).toBeGreaterThan(20);
+    expect(await dialog.getByRole("link", { name: "cycle 50 (SVG)" }).getAttribute("href")).toBe("/export?path=robots.run&as=svg&cycle=50");
+    const table = page.waitForEvent("download");
+    await dialog.getByRole("row", { name: "trajectories" }).getByRole("link", { name: "CSV" }).click();
+    expect((await table).url()).toContain("/export?path=robots.run&as=csv&table=trajectories");
+    expect(complaints).toEqual([]);
+  });
+
+  test("a sweep shows its report and its runs, and a run is opened with its seed", async () => {
+    await openFile(/^sweep/);
+    await page.getByTestId("run-count").filter({ hasText: "3" }).waitFor();
+    await page.frameLocator("iframe").getByRole("heading", { name: "Report of sweep" }).waitFor();
+    await page.getByText("The sweep is not done.").waitFor();
+    await page.getByRole("searchbox", { name: "Filter runs" }).fill("= 8");
+    await page.getByTestId("run-count").filter({ hasText: "1" }).waitFor();
+    await page.getByRole("searchbox", { name: "Filter runs" }).fill("");
+    await page.getByRole("listitem").getByRole("button", { name: /count = 4 seed 2/ }).click();
+    await page.getByRole("button", { name: /seed 2/ }).waitFor();
+    await drawn(page);
+    await page.getByRole("button", { name: /sweep · sweep/ }).click();
+    await page.frameLocator("iframe").getByRole("heading", { name: "Report of sweep" }).waitFor();
+    await page.getByRole("button", { name: "Close sweep" }).click();
+    await page.locator("canvas.picture").waitFor();
+  });
+});
+
 describe("sessions", () => {
   test("two beside each other go in step, and only when asked to", async () => {
     await visit("robots");
@@ -293,6 +391,34 @@ describe("sessions", () => {
     await page.getByRole("button", { name: "Close Made-up snake" }).click();
     await page.waitForFunction(() => document.querySelectorAll("canvas.picture").length === 1);
   });
+
+  test("the first difference of two runs in step is found, and who differs", async () => {
+    await visit("robots");
+    await page.getByRole("button", { name: "Open…" }).click();
+    await page.getByRole("textbox", { name: "Seed" }).first().fill("2");
+    await page.getByRole("dialog", { name: "Open" }).getByRole("button", { name: "robots", exact: true }).click();
+    await page.getByRole("button", { name: "In step" }).click();
+    await page.getByRole("button", { name: "First difference" }).click();
+    await page.getByTestId("difference").filter({ hasText: `from cycle ${PARTING} on: robot 3 is 0.25\u202fm away.` }).waitFor();
+    await cycleIs(PARTING);
+    await page.getByRole("heading", { name: "robot 3" }).waitFor();
+    expect(complaints).toEqual([]);
+  });
+
+  for (const [status, words] of [[503, "is full"], [401, "Open the whole address"], [421, "does not take this address"]] as const) {
+    test(`a server that answers ${status} is told as that, and found again`, async () => {
+      await visit("robots");
+      await page.getByRole("button", { name: "Play", exact: true }).click();
+      await cycleIs((c) => c > 2);
+      server.entrance = status;
+      await server.stop();
+      await server.start();
+      await page.getByTestId("banner").filter({ hasText: words }).waitFor();
+      server.entrance = 204;
+      await page.getByTestId("banner").filter({ hasText: "reopened Made-up hall" }).waitFor();
+      await page.getByTestId("state").filter({ hasText: "playing" }).waitFor();
+    });
+  }
 
   test("what cannot be opened is told with its remedy", async () => {
     await visit(null);

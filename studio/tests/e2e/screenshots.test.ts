@@ -25,7 +25,7 @@ for (const world of ["robots", "chain", "airspace"]) {
         const { page, complaints } = await openPage(browser, server.url, { width, height, isDark });
         await openNew(page, world);
         await page.getByLabel("Speed", { exact: true }).selectOption("fastest");
-        await page.getByRole("button", { name: "Play" }).click();
+        await page.getByRole("button", { name: "Play", exact: true }).click();
         await page.waitForFunction(() => Number(document.querySelector("[data-testid=cycle]")?.textContent?.replace(/\D/g, "")) >= 12);
         await page.getByRole("button", { name: "Pause" }).click();
         await page.locator(".agents").getByRole("option").nth(3).click();

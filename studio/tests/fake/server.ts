@@ -1,11 +1,12 @@
 /** A small server that speaks the studio's protocol about made-up worlds. Tests kill it and start it again. */
 
 import { readFileSync } from "node:fs";
-import { createServer, type Server } from "node:http";
+import { createServer, type Server, type ServerResponse } from "node:http";
 import type { AddressInfo } from "node:net";
 import { extname, join, normalize } from "node:path";
 import { WebSocketServer, type WebSocket } from "ws";
-import type { Answer, Call, Notice, Problem, Request, Status, Subject } from "../../src/protocol";
+import type { Answer, Call, Notice, Problem, Request, Status, Subject, SweepRun } from "../../src/protocol";
+import { check, edited, modelOf, SCHEMA, textOf } from "./edit";
 import { encodeFrame } from "./encode";
 import { airplanes, chain, robots, type FakeWorld } from "./scenes";
 
@@ -18,21 +19,12 @@ const WORLDS: Record<string, () => FakeWorld> = {
   robots: () => robots(24), crowd: () => robots(10_000), chain, airspace: airplanes,
 };
 
-const TEXT = `# A made-up scenario.
-format = 1
-world = "robots"
-name = "Made-up hall"
-seed = 1
-
-[[robots]]
-name = "couriers"
-count = 24
-size = 2
-`;
-
 function problemOf(cause: string, remedy: string, line: number | null = null, column: number | null = null): Problem {
   return { place: "made-up.toml", line, column, end_line: null, end_column: null, key: null, cause, remedy, is_warning: false };
 }
+
+/** The cycle from which on runs of the seed 2 are others. */
+export const PARTING = 137;
 
 class Run {
   credit = 0;
@@ -42,7 +34,7 @@ class Run {
   seed: string;
   leftOut = 0;
   scansOf: { kind: string; number: number; part: number | null }[] = [];
-  text = TEXT;
+  text: string;
   #fraction = 0;
   #owed = false;
   readonly id: number;
@@ -54,6 +46,7 @@ class Run {
     this.world = world;
     this.#socket = socket;
     this.seed = String(seed ?? 1);
+    this.text = textOf(world.scene.world);
   }
 
   status(): Status {
@@ -62,8 +55,17 @@ class Run {
     return {
       session: this.id, state: isOver ? "over" : this.playing ? "playing" : "paused", cycle: this.cycle, cycles_planned: planned,
       time_s: this.cycle * scene.cycle_s, speed: this.speed, cycles_per_s: this.playing ? 10 : 0, seed: this.seed,
-      digest: isOver ? "a1b2c3d4e5f60718" : null, banner: null,
+      digest: this.playing && !isOver ? null : this.digest(), banner: null,
     };
+  }
+
+  /** Runs of the seed 2 part from the others. */
+  get hasParted(): boolean {
+    return this.seed === "2" && this.cycle >= PARTING;
+  }
+
+  digest(): string {
+    return `a1b2c3d4${this.cycle.toString(16).padStart(6, "0")}${this.hasParted ? "ff" : "00"}`;
   }
 
   cast(): Notice {
@@ -92,10 +94,13 @@ class Run {
     this.credit--;
     this.#owed = false;
     const { scene } = this.world;
+    const columns = this.world.columns(this.cycle);
+    // The fourth body stands elsewhere.
+    if (this.hasParted) columns.places_m[3 * scene.dimensions]! += 0.25;
     const text = { scans: this.scansOf.flatMap((who) => this.world.scans(who, this.cycle)), events: [], events_left_out: 0 };
     this.#socket.send(encodeFrame({
       session: this.id, cast: 1, dimensions: scene.dimensions as 2 | 3, cycle: this.cycle, time_s: this.cycle * scene.cycle_s,
-      leftOut: this.leftOut, text, ...this.world.columns(this.cycle),
+      leftOut: this.leftOut, text, ...columns,
     }));
   }
 }
@@ -105,6 +110,10 @@ export class FakeServer {
   port = 0;
   /** What the command line would have asked to open. */
   open: Subject[] = [];
+  /** The text that a file would have by now, if somebody else had changed it. */
+  theirs: string | null = null;
+  /** What the way in answers; anything but 204 refuses sockets, too. */
+  entrance = 204;
   readonly #dist: string;
   #http: Server | null = null;
   #sockets: WebSocketServer | null = null;
@@ -122,6 +131,8 @@ export class FakeServer {
 
   async start(): Promise<void> {
     const http = createServer((request, response) => {
+      if (request.url === "/enter") return void response.writeHead(this.entrance).end();
+      if (/^\/(report|export)\?/.test(request.url ?? "")) return void result(request.url!, response);
       const path = normalize(new URL(request.url ?? "/", "http://x").pathname);
       const file = path === "/" ? "/index.html" : path;
       try {
@@ -166,6 +177,7 @@ export class FakeServer {
   }
 
   #greet(socket: WebSocket): void {
+    if (this.entrance !== 204) return socket.terminate();
     const say = (words: unknown): void => socket.send(JSON.stringify(words));
     say({ notice: "hello", version: 1, program: "sidestep 0.0.0 (made up)", worlds: Object.keys(WORLDS), read_only: false, open: this.open });
     const mine = new Set<number>();
@@ -184,6 +196,12 @@ export class FakeServer {
     socket.on("close", () => mine.forEach((id) => this.#runs.delete(id)));
   }
 
+  #save(to: string | null, over: boolean): Answer {
+    if (this.theirs !== null && !over) return { is: "differs", text: this.theirs };
+    this.theirs = null;
+    return { is: "saved", place: to ?? "made-up.toml" };
+  }
+
   #tick(): void {
     for (const run of this.#runs.values()) {
       const before = JSON.stringify(run.status());
@@ -199,6 +217,7 @@ export class FakeServer {
 
   #answer(call: Call, socket: WebSocket, say: (words: unknown) => void): Answer {
     if (call.do === "files") return files(call.folder);
+    if (call.do === "runs") return runs();
     if (call.do === "open") {
       const { what } = call;
       const key = what.kind === "new" ? what.world : what.path.replace(/\.\w+$/, "");
@@ -211,13 +230,28 @@ export class FakeServer {
       run.goTo(0);
       return { is: "opened", session: run.id, scene: world.scene, status: run.status() };
     }
+    if (call.do === "schema") return { is: "schema", schema: SCHEMA };
     const run = this.#runs.get(call.session);
     if (!run) throw problemOf("no such session", "open it again");
-    const answer = act(call, run);
+    const answer = call.do === "save" ? this.#save(call.to, call.over) : act(call, run);
     if (call.do === "close") this.#runs.delete(run.id);
     if (answer.is === "done") say({ notice: "status", ...run.status() });
     return answer;
   }
+}
+
+/** Reports and exports, with the headers of the real server. */
+function result(url: string, response: ServerResponse): void {
+  const fields = new URL(url, "http://x").searchParams;
+  const part = fields.get("as");
+  if (part === "figures") return void response.writeHead(200, { "content-type": "application/json" }).end('["01-speed"]');
+  const policy = "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; frame-ancestors 'self'";
+  const kept = part === null ? {} : { "content-disposition": `attachment; filename="made-up.${part}"` };
+  response.writeHead(200, { "content-type": "text/html", "content-security-policy": policy, "x-frame-options": "SAMEORIGIN", ...kept });
+  response.end(`<!doctype html><title>r</title><h1>Report of ${fields.get("path")}</h1><p id="p">no script</p><script>
+    document.getElementById("p").textContent = "origin " + origin;
+    fetch("/enter").then(() => (document.title = "reached"), () => (document.title = "kept in"));
+  </script>`);
 }
 
 function files(folder: string | null): Answer {
@@ -226,12 +260,22 @@ function files(folder: string | null): Answer {
     { path: "more", name: "more", kind: "folder", about: "" },
     ...["robots", "chain", "airspace"].map((name) => ({ path: `${name}.toml`, name: `${name}.toml`, kind: "scenario" as const, about: "made up" })),
     { path: "nowhere.toml", name: "nowhere.toml", kind: "scenario", about: "cannot be opened" },
+    { path: "robots.run", name: "robots.run", kind: "run", about: "made up" },
     { path: "chain.mcap", name: "chain.mcap", kind: "recording", about: "made up" },
     { path: "sweep", name: "sweep", kind: "sweep", about: "40 runs" },
   ] };
 }
 
-function act(call: Exclude<Call, { do: "files" | "open" }>, run: Run): Answer {
+function runs(): Answer {
+  const run = (variant: string, seed: number, failure = ""): SweepRun =>
+    ({ variant, seed: String(seed), failure, replay: { kind: "scenario", path: "robots.toml" } });
+  return {
+    is: "runs", name: "Made-up sweep", is_complete: false, left_out: 0,
+    runs: [run("count = 4", 1), run("count = 4", 2), run("count = 8", 1, "the disk is full")],
+  };
+}
+
+function act(call: Exclude<Call, { do: "files" | "open" | "runs" | "schema" | "save" }>, run: Run): Answer {
   switch (call.do) {
     case "play": run.playing = true; run.speed = call.speed; return { is: "done" };
     case "pause": run.playing = false; return { is: "done" };
@@ -247,8 +291,11 @@ function act(call: Exclude<Call, { do: "files" | "open" }>, run: Run): Answer {
       const all = run.world.events(call.from, call.until);
       return { is: "events", entries: all.slice(0, call.most), left_out: Math.max(0, all.length - call.most), known_until: call.until };
     }
+    case "tables": return { is: "tables", names: run.world.scene.is_recording ? ["events", "trajectories"] : [] };
     case "source": return { is: "source", place: "made-up.toml", text: run.text, read_only: false };
     case "check": return { is: "problems", problems: check(call.text) };
+    case "edit": return { is: "edited", text: edited(call.text, call.edits) };
+    case "model": return model(call.text);
   }
 }
 
@@ -262,13 +309,12 @@ function restart(run: Run, seed: number | null, text: string | null): Answer {
   return { is: "opened", session: run.id, scene: run.world.scene, status: run.status() };
 }
 
-/** Any key that is not known is a problem, as the program itself would say. */
-function check(text: string): Problem[] {
-  const known = /^(format|world|name|seed|count|size|cycles)$/;
-  return text.split("\n").flatMap((line, i) => {
-    const key = /^(\w+)\s*=/.exec(line)?.[1];
-    return key !== undefined && !known.test(key) ? [problemOf(`there is no key \`${key}\``, "did you mean `count`?", i + 1, 1)] : [];
-  });
+function model(text: string): Answer {
+  try {
+    return { is: "model", value: modelOf(text), files: [] };
+  } catch (error) {
+    throw problemOf(String(error), "write TOML");
+  }
 }
 
 function metrics(run: Run, from: number): Answer {

@@ -33,7 +33,7 @@ describe.skipIf(url === "")("a real server", () => {
         await page.getByRole("button", { name: `${folder}/` }).click();
         await page.getByRole("button", { name }).first().click();
         await drawn(page);
-        await page.getByRole("button", { name: "Play" }).click();
+        await page.getByRole("button", { name: "Play", exact: true }).click();
         await page.waitForFunction(() => Number(document.querySelector("[data-testid=cycle]")?.textContent?.replace(/\D/g, "")) >= 20);
         await page.getByRole("button", { name: "Pause" }).click();
         await page.locator(".agents").getByRole("option").nth(2).click();

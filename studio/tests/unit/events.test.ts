@@ -34,3 +34,12 @@ test("what the server never kept is counted once", async () => {
   await events.fetch(20, server([event(9, 1), event(12, 1)]));
   expect([events.list.length, events.leftOut]).toEqual([2, 7]);
 });
+
+test("two equal events of one cycle are two, however often they are told", async () => {
+  const events = new Events();
+  events.add([event(3, 1), event(3, 1), event(4, 1)]);
+  expect(events.list.length).toBe(3);
+  events.add([event(3, 1), event(3, 1)]);
+  await events.fetch(10, server([event(3, 1), event(3, 1), event(4, 1)]));
+  expect([events.list.length, events.kinds.get("contact")]).toEqual([3, 3]);
+});

@@ -1,7 +1,8 @@
 /** A session goes on after frames that cannot be read. */
 
 import { expect, test, vi } from "vitest";
-import type { Call } from "../../src/protocol";
+import type { Call, Cast } from "../../src/protocol";
+import { encodeFrame } from "../fake/encode";
 import { Session } from "../../src/state/session.svelte";
 
 test("frames that cannot be read are granted again, at most once a second", () => {
@@ -17,4 +18,26 @@ test("frames that cannot be read are granted again, at most once a second", () =
   vi.advanceTimersByTime(5000);
   expect(calls).toEqual([{ do: "credit", frames: 2, session: 1 }, { do: "credit", frames: 2, session: 1 }]);
   vi.useRealTimers();
+});
+
+test("a session that nobody sees is granted frames slowly, and tells none of them as lost", () => {
+  const calls: Call[] = [];
+  const ask = (call: Call): Promise<never> => (calls.push(call), new Promise<never>(() => undefined));
+  const session = new Session({ kind: "new", world: "robots" }, { ask, problem: () => undefined });
+  session.id = 1;
+  const frame = (cycle: number, leftOut: number): void =>
+    session.takeFrame(encodeFrame({ session: 1, cast: 1, dimensions: 2, cycle, time_s: 0, places_m: [], turns: [], lines: [], conditions: [], leftOut }));
+  session.takeCast({ session: 1, cast: 1, kinds: [], kind: [], number: [], part: [], is_agent: [], names: [], shapes: [], shape: [], looks: [], look: [] } as unknown as Cast);
+  session.grantUnseen();
+  frame(1, 0);
+  frame(2, 20);
+  session.grantUnseen();
+  expect(calls.filter((call) => call.do === "credit").length).toBe(2);
+  expect(session.shown).toMatchObject({ cycle: 2, leftOut: 0 });
+  session.subscribe(() => undefined);
+  frame(3, 40);
+  session.grantUnseen();
+  expect(calls.filter((call) => call.do === "credit").length).toBe(2);
+  frame(4, 41);
+  expect(session.shown.leftOut).toBe(1);
 });

@@ -38,6 +38,22 @@ test("a jump ahead begins anew, since nobody saw the way", () => {
   expect(trails.of(0)).toEqual([[50, 0]]);
 });
 
+test("a run that goes so fast that frames are far from each other has a trail", () => {
+  const trails = new Trails(1, 2);
+  trails.push(0, at(0, 0));
+  for (let k = 1; k <= 6; k++) trails.push(75 * 2 ** k, at(k, 0));
+  trails.push(4900, at(7, 0));
+  trails.push(7000, at(8, 0));
+  expect(trails.of(0).length).toBe(9);
+});
+
+test("a jump that was sought begins anew, also in a run that went fast", () => {
+  const trails = new Trails(1, 2);
+  for (let k = 0; k < 5; k++) trails.push(190 * k, at(k, 0));
+  trails.push(1400, at(9, 0), true);
+  expect(trails.of(0)).toEqual([[9, 0]]);
+});
+
 test("many bodies have short trails, so that memory is bounded", () => {
   expect(new Trails(10_000, 2).length).toBeLessThan(30);
   expect(new Trails(10, 2).length).toBe(600);

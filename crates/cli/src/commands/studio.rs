@@ -30,7 +30,7 @@ const LOOK: Duration = Duration::from_millis(50);
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct StudioArgs {
-    /// Scenarios, run folders and MCAP files to open, and folders to choose from
+    /// Scenarios, folders of runs and sweeps and MCAP files to open, and folders to choose from
     #[arg(value_name = "SCENARIO|DIR|FILE")]
     named: Vec<PathBuf>,
 
@@ -75,6 +75,9 @@ pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Fa
             "others can reach this studio: whoever has its address with the token can run scenarios\n  \
              and read what it may read; what is sent is not encrypted",
         );
+    }
+    if studio.is_open_to_others() && studio.is_named_for_itself() {
+        console.note("Others put this machine's name or number into the address.");
     }
     console.result_or_short(
         &json!({ "url": url }),

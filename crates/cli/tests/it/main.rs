@@ -26,6 +26,7 @@ mod reproduce;
 mod slurm;
 mod stops;
 mod studio;
+mod studio_edit;
 mod study;
 mod support;
 mod sweep;

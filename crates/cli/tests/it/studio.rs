@@ -10,13 +10,13 @@ use tungstenite::client::IntoClientRequest;
 use tungstenite::{Message, WebSocket};
 
 /// The command while it runs.
-struct Studio {
+pub(crate) struct Studio {
     child: Child,
     url: String,
 }
 
 impl Studio {
-    fn start(place: &Place, args: &[&str]) -> Self {
+    pub(crate) fn start(place: &Place, args: &[&str]) -> Self {
         let all = [&["studio", "--no-open", "--port", "0", "--quiet"], args].concat();
         let mut child = place.start(&all);
         let out = child.stdout.take().expect("its output");
@@ -53,7 +53,7 @@ impl Studio {
         }
     }
 
-    fn page(&self) -> Page {
+    pub(crate) fn page(&self) -> Page {
         let origin = format!("http://{}", self.host());
         self.socket(&[("origin", &origin)]).expect("its own page")
     }
@@ -85,7 +85,7 @@ impl Drop for Studio {
 }
 
 /// A page that speaks with it.
-struct Page {
+pub(crate) struct Page {
     socket: WebSocket<TcpStream>,
     id: u32,
     notices: Vec<Value>,
@@ -110,7 +110,7 @@ impl Page {
     }
 
     /// Asks and waits for the reply.
-    fn reply(&mut self, call: Value) -> Value {
+    pub(crate) fn reply(&mut self, call: Value) -> Value {
         self.id += 1;
         let id = self.id;
         self.send(json!({ "id": id, "call": call }).to_string());
@@ -127,13 +127,13 @@ impl Page {
         }
     }
 
-    fn ask(&mut self, call: Value) -> Value {
+    pub(crate) fn ask(&mut self, call: Value) -> Value {
         let reply = self.reply(call.clone());
         assert!(reply.get("problem").is_none(), "{call}: {reply}");
         reply["answer"].clone()
     }
 
-    fn open(&mut self, path: &str) -> Value {
+    pub(crate) fn open(&mut self, path: &str) -> Value {
         self.ask(
             json!({ "do": "open", "what": { "kind": "scenario", "path": path }, "seed": null }),
         )
@@ -414,4 +414,141 @@ fn recordings_are_replayed_and_a_damaged_one_is_a_problem() {
         assert_eq!(last["digest"], recorded["digest"]);
         assert!(last["banner"].as_str().is_some_and(|b| b.contains("the recorded one")), "{last}");
     }
+}
+
+#[test]
+fn who_finds_all_places_taken_is_told_so_and_let_in_when_one_is_free() {
+    let place = Place::new();
+    let studio = Studio::start(&place, &[]);
+    let mut pages: Vec<Page> = (0..16).map(|_| studio.page()).collect();
+    assert_eq!(studio.socket(&[]).err(), Some(503));
+    let host = studio.host();
+    let enter =
+        || studio.http(&format!("GET /enter HTTP/1.1\nHost: {host}\nConnection: close\n\n"));
+    let told = enter();
+    assert!(told.starts_with("HTTP/1.1 503") && told.contains("close one of them"), "{told}");
+    pages.pop();
+    wait_for("a place", || enter().starts_with("HTTP/1.1 204"));
+    assert_eq!(studio.socket(&[]).err(), None);
+}
+
+/// A scenario of which a check takes a while.
+const HEAVY: &str = "format = 1\nworld = \"robots\"\nseed = 1\ncycles = 10\n[map]\nbox_size_m = 0.25\n[map.office]\n\
+    floors = 4\ncorridors = 10\nrooms_per_side = 12\n[[robots]]\ncount = 5000\nsensors = [\"sonar-8\"]\n";
+
+#[test]
+fn pages_that_ask_for_much_keep_no_other_page_waiting() {
+    let place = Place::new();
+    let studio = Studio::start(&place, &["s.toml"]);
+    // Sockets count their sessions on, and each of them asks as much as is taken in at a time.
+    let asking = (1..=6).map(|session| {
+        let mut page = studio.page();
+        page.open("s.toml");
+        for id in 1000..1060 {
+            let call = json!({ "do": "check", "session": session, "text": HEAVY });
+            page.send(json!({ "id": id, "call": call }).to_string());
+        }
+        page
+    });
+    let mut first = asking.collect::<Vec<Page>>();
+    let mut other = studio.page();
+    let answered = std::thread::scope(|scope| {
+        let all = scope.spawn(|| {
+            first[0].wait_reply(1059);
+            Instant::now()
+        });
+        other.ask(json!({ "do": "files", "folder": "." }));
+        let listed = Instant::now();
+        (listed, all.join().expect("answered"))
+    });
+    assert!(answered.0 < answered.1, "the other waited until all were done");
+}
+
+/// The status, the head and the body of an answer.
+fn parts(answer: &str) -> (u16, &str, &str) {
+    let (head, body) = answer.split_once("\r\n\r\n").expect("a head");
+    (head[9..12].parse().expect("a status"), head, body)
+}
+
+#[test]
+fn reports_and_exports_of_a_run_are_those_of_the_command() {
+    let place = Place::new();
+    place.json(&["run", "s.toml", "--out", "runs/a b"]);
+    place.json(&["report", "runs/a b", "--out", "page.html"]);
+    place.json(&["export", "runs/a b", "--to", "csv", "--out", "tables"]);
+    let studio = Studio::start(&place, &["runs"]);
+    let get = |path: &str, more: &str| {
+        let host = studio.host();
+        studio.http(&format!("GET {path} HTTP/1.1\nHost: {host}\n{more}Connection: close\n\n"))
+    };
+    let answer = get("/report?path=runs%2Fa%20b", "Sec-Fetch-Site: same-origin\n");
+    let (status, head, body) = parts(&answer);
+    assert_eq!(status, 200, "{head}");
+    let policy = "content-security-policy: sandbox allow-scripts; default-src 'none'";
+    for header in [policy, "frame-ancestors 'self'", "x-frame-options: SAMEORIGIN", "nosniff"] {
+        assert!(head.contains(header), "{header}: {head}");
+    }
+    assert_eq!(body, place.read("page.html"));
+    let answer = get("/report?path=runs%2Fa%20b&as=figures", "");
+    let figures: Vec<String> = serde_json::from_str(parts(&answer).2).expect("a list");
+    let answer = get(&format!("/report?path=runs%2Fa%20b&as={}", figures[0]), "");
+    assert!(parts(&answer).2.starts_with("<svg") && answer.contains("attachment; filename=\"a-b-"));
+    let answer = get("/export?path=runs%2Fa%20b&as=csv&table=events", "");
+    let (status, head, body) = parts(&answer);
+    assert!(status == 200 && head.contains("filename=\"a-b-events.csv\""), "{head}");
+    assert_eq!(body, place.read("tables/events.csv"));
+    let answer = get("/export?path=runs%2Fa%20b&as=svg&cycle=100", "");
+    assert!(parts(&answer).2.starts_with("<svg") && answer.contains("Cycle 100."));
+}
+
+#[test]
+fn results_are_made_of_what_may_be_read_and_for_its_own_page_alone() {
+    let place = Place::new();
+    place.json(&["run", "s.toml", "--out", "in/run"]);
+    place.json(&["run", "s.toml", "--out", "out/run"]);
+    let studio = Studio::start(&place, &["in"]);
+    let get = |path: &str, more: &str| {
+        let host = studio.host();
+        let answer =
+            studio.http(&format!("GET {path} HTTP/1.1\nHost: {host}\n{more}Connection: close\n\n"));
+        let (status, _, body) = parts(&answer);
+        (status, body.to_string())
+    };
+    for what in ["/report?path=", "/export?as=svg&path="] {
+        assert_eq!(get(&format!("{what}in%2Frun"), "Sec-Fetch-Site: cross-site\n").0, 403);
+        for path in ["out%2Frun", "in%2F..%2Fout%2Frun", "", "%2Fetc%2Fpasswd", "in"] {
+            let (status, words) = get(&format!("{what}{path}"), "");
+            assert!(status == 422 && words.contains("help: "), "{what}{path}: {status} {words}");
+        }
+    }
+    for wrong in ["/report", "/report?path=in%2Frun&as=none", "/export?path=in%2Frun&as=exe"] {
+        assert_eq!(get(wrong, "").0, 422, "{wrong}");
+    }
+    let open = Studio::start(&place, &["in", "--addr", "0.0.0.0"]);
+    let host = open.host();
+    let answer = open
+        .http(&format!("GET /report?path=in%2Frun HTTP/1.1\nHost: {host}\nConnection: close\n\n"));
+    assert_eq!(parts(&answer).0, 401);
+}
+
+#[test]
+fn runs_of_a_sweep_are_listed_with_what_opens_them() {
+    let place = Place::new();
+    place.json(&["sweep", "s.toml", "--replicate", "2", "--out", "sw"]);
+    let studio = Studio::start(&place, &["."]);
+    let mut page = studio.page();
+    let runs = page.ask(json!({ "do": "runs", "folder": "./sw" }));
+    assert_eq!(runs["runs"].as_array().map(Vec::len), Some(2), "{runs}");
+    let run = &runs["runs"][1];
+    let (path, seed) = (&run["replay"]["path"], run["seed"].as_str().expect("a seed"));
+    assert_eq!(run["replay"]["kind"], "scenario");
+    let what = json!({ "kind": "scenario", "path": path });
+    let seed: u64 = seed.parse().expect("a number");
+    let opened = page.ask(json!({ "do": "open", "what": what, "seed": seed }));
+    assert_eq!(opened["status"]["seed"], seed.to_string());
+    assert!(page.reply(json!({ "do": "runs", "folder": "." }))["problem"].is_object());
+    let named = page
+        .ask(json!({ "do": "open", "what": { "kind": "scenario", "path": "s.toml" }, "seed": 1 }));
+    let tables = page.ask(json!({ "do": "tables", "session": named["session"] }));
+    assert_eq!(tables["names"], json!([]));
 }

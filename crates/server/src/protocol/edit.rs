@@ -2,6 +2,7 @@
 
 use serde::Deserialize;
 use serde_json::Value;
+use sidestep::scenario::{self, Cell};
 
 /// A change of a text. Keys are those of `--set`: `robots.1.at.0`; elements count from 0, and a section that stands
 /// alone is 0 or left out. Parts that hold dots or are not bare are quoted: `kinds."a.b".observation`. Everything else
@@ -54,4 +55,26 @@ pub enum Edit {
         /// Row from the top, column from the left, and the new character.
         cells: Vec<(u32, u32, char)>,
     },
+}
+
+impl From<Edit> for scenario::Edit {
+    fn from(edit: Edit) -> Self {
+        match edit {
+            Edit::Set { key, value } => Self::Set { key, value },
+            Edit::Insert { key, at, value } => {
+                Self::Insert { key, at: at.map(|at| at as usize), value }
+            }
+            Edit::Remove { key } => Self::Remove { key },
+            Edit::Move { key, to } => Self::Move { key, to: to as usize },
+            Edit::Rename { key, to } => Self::Rename { key, to },
+            Edit::Paint { key, cells } => {
+                let cell = |(row, column, mark): (u32, u32, char)| Cell {
+                    row: row as usize,
+                    column: column as usize,
+                    mark,
+                };
+                Self::Paint { key, cells: cells.into_iter().map(cell).collect() }
+            }
+        }
+    }
 }

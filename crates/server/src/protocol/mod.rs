@@ -39,6 +39,7 @@ pub use request::{Call, Request, Speed, Subject, Who};
 pub use shown::{Cast, Event, Floor, FrameText, Look, Scan, Scene, Shape, StillBody};
 pub use told::{
     Answer, FileEntry, FileKind, MetricName, Named, Notice, Outcome, Problem, Reply, State, Status,
+    SweepRun,
 };
 
 /// Version of requests, replies, notices and frames together.

@@ -117,6 +117,16 @@ pub enum Call {
         /// The session.
         session: SessionId,
     },
+    /// Asks for the names of the tables of a recording, which can be exported.
+    Tables {
+        /// Which session.
+        session: SessionId,
+    },
+    /// Asks for the runs of a sweep.
+    Runs {
+        /// Its folder, as a listing gave it.
+        folder: String,
+    },
     /// Asks for the problems of a text that stands for the session's scenario.
     Check {
         /// The session.

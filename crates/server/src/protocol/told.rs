@@ -18,6 +18,7 @@ pub struct Reply {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]
+#[expect(clippy::large_enum_variant, reason = "there is one at a time, for an instant")]
 pub enum Outcome {
     /// The answer.
     Answer(Answer),
@@ -80,6 +81,22 @@ pub enum Answer {
         /// Whether it cannot be replaced by another text.
         read_only: bool,
     },
+    /// The names of a recording's tables; none of an MCAP file, or of what is no recording.
+    Tables {
+        /// The names.
+        names: Vec<String>,
+    },
+    /// The finished runs of a sweep.
+    Runs {
+        /// The sweep's name; may be empty.
+        name: String,
+        /// Whether these are all runs.
+        is_complete: bool,
+        /// The runs.
+        runs: Vec<SweepRun>,
+        /// Number of runs that are not listed.
+        left_out: u64,
+    },
     /// The errors of a text, and its surprises.
     Problems {
         /// Nothing for a valid text without surprises.
@@ -122,7 +139,7 @@ pub enum Answer {
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Problem {
     /// The file, option or request that is wrong.
-    pub place: String,
+    pub place: Box<str>,
     /// Its line, from 1.
     pub line: Option<u32>,
     /// Its column, from 1.
@@ -134,7 +151,7 @@ pub struct Problem {
     /// Key of the scenario that is wrong, as `--set` names it: `robots.1.at.0`.
     pub key: Option<Box<str>>,
     /// The cause.
-    pub cause: String,
+    pub cause: Box<str>,
     /// The remedy: the right way to write or to do it.
     pub remedy: Box<str>,
     /// Whether the text is valid all the same.
@@ -144,8 +161,8 @@ pub struct Problem {
 impl Problem {
     /// Returns a problem without a line.
     pub fn new(
-        place: impl Into<String>,
-        cause: impl Into<String>,
+        place: impl Into<Box<str>>,
+        cause: impl Into<Box<str>>,
         remedy: impl Into<Box<str>>,
     ) -> Self {
         Self {
@@ -174,6 +191,20 @@ pub struct FileEntry {
     pub kind: FileKind,
     /// A few words on its content; may be empty.
     pub about: String,
+}
+
+/// A run of a sweep.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct SweepRun {
+    /// The name of its variant.
+    pub variant: String,
+    /// Its seed, in decimal digits, as it may be larger than a number of JavaScript can be.
+    pub seed: String,
+    /// The cause of its failure; empty if it did not fail.
+    pub failure: String,
+    /// Its recording; or its variant's scenario, which needs the seed.
+    pub replay: Named,
 }
 
 /// The kind of a file or a folder.
@@ -230,7 +261,7 @@ pub enum Notice {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Named {
-    /// `scenario` or `recording`.
+    /// `scenario`, `recording` or `sweep`.
     pub kind: String,
     /// Its path.
     pub path: String,

@@ -1,11 +1,11 @@
 //! The memory of a session of a run as it goes on: places to go back to, samples of metrics, and events.
 
-use crate::KEYFRAME_BYTES;
 use crate::chronicle::Chronicle;
-use crate::keyframes::Keyframes;
+use crate::keyframes::{Budget, Keyframes};
 use crate::samples::Samples;
 use sidestep::kernel::Simulation;
 use sidestep::scenario::Meaning;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// The memory of one run, filled by whichever of its computations comes to a cycle first.
@@ -18,9 +18,13 @@ pub(super) struct Memory {
 
 impl Memory {
     /// Returns the memory of a run that is at its start.
-    pub(super) fn of(run: &dyn Simulation, meanings: &'static [Meaning]) -> Self {
+    pub(super) fn of(
+        run: &dyn Simulation,
+        meanings: &'static [Meaning],
+        budget: &Arc<Budget>,
+    ) -> Self {
         let mut memory = Self {
-            keyframes: Keyframes::new(KEYFRAME_BYTES),
+            keyframes: Keyframes::new(budget),
             samples: Samples::new(meanings),
             log: Chronicle::default(),
             sampled: Instant::now(),

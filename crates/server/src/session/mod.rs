@@ -3,33 +3,37 @@
 //! Nothing that comes from a socket waits for another socket, and no result depends on one: the thread decides what
 //! is computed, and what is shown of it goes to an [`Outbox`], which never lets it wait.
 
+mod edit;
 mod inspect;
 mod memory;
 mod pace;
 mod player;
+mod save;
 mod scout;
 mod stage;
 mod viewer;
 
-pub(crate) use stage::{Means, checked};
+pub(crate) use edit::{edited, model};
+pub(crate) use stage::{Means, checked, stopped};
 
 use crate::outbox::Outbox;
 use crate::protocol::{Call, Outcome, Problem, Reply, SessionId, Subject};
 use player::Player;
+use save::Shown;
 use sidestep::kernel::Interrupt;
 use sidestep::scenario::Source;
 use stage::Stage;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
-use std::sync::{Arc, OnceLock};
 use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
 /// The number of requests that wait for a session.
 const MOST_WAITING: usize = 256;
 /// The longest wait for a request, after which the thread looks around again.
-const LONGEST_WAIT: Duration = Duration::from_secs(3600);
+const LONGEST_WAIT: Duration = Duration::from_secs(5);
 
 /// The first request of a session.
 pub(crate) struct Opening {
@@ -48,7 +52,7 @@ pub(crate) struct Session {
     orders: SyncSender<(u32, Call)>,
     interrupt: Interrupt,
     thread: JoinHandle<()>,
-    source: Arc<OnceLock<Source>>,
+    shown: Shown,
 }
 
 impl Session {
@@ -64,15 +68,15 @@ impl Session {
     ) -> std::io::Result<Self> {
         let (orders, taken) = sync_channel(MOST_WAITING);
         let interrupt = Interrupt::default();
-        let source = Arc::new(OnceLock::new());
-        let (heeded, told) = (interrupt.clone(), source.clone());
+        let shown = Shown::default();
+        let (heeded, told) = (interrupt.clone(), shown.clone());
         let thread =
             Builder::new().name(format!("session-{}", opening.session)).spawn(move || {
                 let _ticket = ticket;
                 let desk = Desk { outbox, interrupt: heeded, orders: taken };
-                desk.work(means, opening, &told);
+                desk.work(means, opening, told);
             })?;
-        Ok(Self { orders, interrupt, thread, source })
+        Ok(Self { orders, interrupt, thread, shown })
     }
 
     /// Passes a request on; it is answered by the session.
@@ -88,9 +92,9 @@ impl Session {
         })
     }
 
-    /// Returns its scenario as it was opened, once it is open.
+    /// Returns its scenario, once it is open: in the file in which it was saved last.
     pub(crate) fn source(&self) -> Option<Source> {
-        self.source.get().cloned()
+        self.shown.source()
     }
 
     /// Whether it has ended.
@@ -128,10 +132,10 @@ enum Broken {
 
 impl Desk {
     /// Opens what is asked for and plays it, until nobody asks any more or a bug ends it.
-    fn work(self, means: Means, opening: Opening, source: &OnceLock<Source>) {
+    fn work(self, means: Means, opening: Opening, shown: Shown) {
         let Opening { session, id, what, seed } = opening;
         let opened = self.guarded(|| {
-            let stage = Stage::open(means, &what, seed)?;
+            let stage = Stage::open(means, &what, seed)?.shown_by(shown);
             let (outbox, interrupt) = (self.outbox.clone(), self.interrupt.clone());
             Ok(Player::new(session, outbox, interrupt, stage))
         });
@@ -141,7 +145,6 @@ impl Desk {
             Err(Broken::Bug(words)) => return self.refuse(id, bug(&words)),
             Err(Broken::Unwanted) => return self.refuse(id, ended()),
         };
-        source.get_or_init(|| player.stage.source.clone());
         let result = Outcome::Answer(player.opened());
         self.outbox.reply(&Reply { id, result });
         match self.guarded(|| self.play(&mut player)) {

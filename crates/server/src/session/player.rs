@@ -65,7 +65,7 @@ impl Player {
             viewer: Viewer::new(session, outbox.clone(), &scenery),
             outbox,
             interrupt,
-            memory: Memory::of(stage.run.as_ref(), stage.meanings()),
+            memory: Memory::of(stage.run.as_ref(), stage.meanings(), stage.budget()),
             scout: None,
             state: State::Paused,
             speed: Speed::Times(1.0),
@@ -96,7 +96,8 @@ impl Player {
         self.stage.restart(seed, text)?;
         self.scenery = self.stage.run.scenery();
         self.viewer.restart(&self.scenery);
-        self.memory = Memory::of(self.stage.run.as_ref(), self.stage.meanings());
+        self.memory =
+            Memory::of(self.stage.run.as_ref(), self.stage.meanings(), self.stage.budget());
         (self.digest, self.pace, self.rate) = (None, Pace::default(), Rate::default());
         self.begin();
         Ok(self.opened())
@@ -187,6 +188,8 @@ impl Player {
                 let (place, text) = (source.place.clone(), source.text.clone());
                 Ok(Answer::Source { place, text, read_only: self.stage.is_fixed() })
             }
+            Call::Save { text, to, over, .. } => self.stage.save(text, to, over),
+            Call::Tables { .. } => self.stage.tables().map(|names| Answer::Tables { names }),
             _ => Err(Problem::new("request", "it is not for a session", "report this as a bug")),
         }
     }
@@ -252,6 +255,7 @@ impl Player {
     /// request; `None` for ever.
     pub(super) fn turn(&mut self) -> Option<Duration> {
         let now = Instant::now();
+        self.memory.keyframes.fit();
         match (self.state, self.errand) {
             (State::Playing, _) => {
                 let cycle = self.cycle();

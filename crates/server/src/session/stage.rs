@@ -1,11 +1,15 @@
 //! The run of a session, and its origin.
 
+use super::save::{OwnFile, Shown, own_path, saved};
 use crate::encode::problem;
 use crate::files::Files;
-use crate::protocol::{Problem, Subject};
+use crate::keyframes::Budget;
+use crate::protocol::{Answer, Problem, Subject};
 use sidestep::kernel::{Cycle, Simulation};
 use sidestep::scenario::{Meaning, Source, Worlds};
 use sidestep_session::{Error, Recorded, read};
+use std::path::Path;
+use std::sync::Arc;
 
 /// The means that sessions need to begin.
 #[derive(Clone)]
@@ -18,6 +22,8 @@ pub(crate) struct Means {
     pub(crate) workers: usize,
     /// Whether texts of a page are refused.
     pub(crate) read_only: bool,
+    /// The memory that the keyframes of all sessions share.
+    pub(crate) budget: Arc<Budget>,
 }
 
 /// A run, and where it comes from.
@@ -32,6 +38,8 @@ pub(crate) struct Stage {
     pub(crate) recorded: Option<Recorded>,
     means: Means,
     seed: Option<u64>,
+    own: Option<OwnFile>,
+    shown: Shown,
 }
 
 impl Stage {
@@ -44,25 +52,43 @@ impl Stage {
             Subject::Scenario { path } => {
                 let path = means.files.find(path)?;
                 let read = read(means.worlds, &path, &[]).map_err(|e| problem(&e))?;
-                Self::of_scenario(means, read.0, seed)
+                let own = OwnFile::of(&path, &read.0);
+                Self::of_scenario(means, read.0, seed, own)
             }
             Subject::New { world } => {
                 let kind = means.worlds.named(world).ok_or_else(|| {
                     let names = means.worlds.names().join(", ");
-                    Problem::new(world, "no such world is known", format!("name one of {names}"))
+                    Problem::new(
+                        world.as_str(),
+                        "no such world is known",
+                        format!("name one of {names}"),
+                    )
                 })?;
                 let folder = means.files.first_folder();
                 let source = Source::new(format!("{world}.toml"), kind.default_scenario(), folder);
-                Self::of_scenario(means, source, seed)
+                Self::of_scenario(means, source, seed, None)
             }
             Subject::Recording { path } => Self::of_recording(means, path, seed),
         }
     }
 
-    fn of_scenario(means: Means, source: Source, seed: Option<u64>) -> Result<Self, Problem> {
+    /// Tells others than its thread about the scenario.
+    pub(crate) fn shown_by(mut self, shown: Shown) -> Self {
+        shown.set(&self.source);
+        self.shown = shown;
+        self
+    }
+
+    fn of_scenario(
+        means: Means,
+        source: Source,
+        seed: Option<u64>,
+        own: Option<OwnFile>,
+    ) -> Result<Self, Problem> {
         let run = started(&means, &source, seed)?;
         let until = run.plan().cycles;
-        Ok(Self { run, until, source, recorded: None, means, seed })
+        let shown = Shown::default();
+        Ok(Self { run, until, source, recorded: None, means, seed, own, shown })
     }
 
     fn of_recording(means: Means, path: &str, seed: Option<u64>) -> Result<Self, Problem> {
@@ -76,7 +102,8 @@ impl Stage {
         let until = recorded.cycles_done;
         let source =
             Source::new(path.join("scenario.toml").display().to_string(), resolved.text, path);
-        Ok(Self { run, until, source, recorded: Some(recorded), means, seed })
+        let (own, shown) = (None, Shown::default());
+        Ok(Self { run, until, source, recorded: Some(recorded), means, seed, own, shown })
     }
 
     /// Starts anew. Without a text it stays the same, also in its seed unless another is given.
@@ -104,6 +131,46 @@ impl Stage {
         Ok(())
     }
 
+    /// Writes a text into a file, the session's own if none is named; it is the session's own from then on.
+    ///
+    /// # Errors
+    /// When it is not written.
+    pub(crate) fn save(
+        &mut self,
+        text: String,
+        to: Option<String>,
+        over: bool,
+    ) -> Result<Answer, Problem> {
+        if self.means.read_only {
+            let remedy = "start the studio without --read-only";
+            return Err(Problem::new(
+                self.source.place.as_str(),
+                "nothing is written here",
+                remedy,
+            ));
+        }
+        if self.recorded.is_some() {
+            return Err(fixed(&self.source.place));
+        }
+        let is_toml = |path: &str| path.to_ascii_lowercase().ends_with(".toml");
+        let path = match to {
+            Some(to) if !is_toml(&to) => {
+                return Err(Problem::new(to, "is no name of a scenario", "end it in .toml"));
+            }
+            Some(to) => to,
+            None => own_path(self.own.as_ref(), &self.source.place)?,
+        };
+        let target = self.means.files.target(&path)?;
+        let answer = saved(&target, self.own.as_ref(), &text, over)?;
+        if let Answer::Saved { place } = &answer {
+            let folder = target.path.parent().map(Path::to_path_buf).unwrap_or_default();
+            (self.source.place, self.source.folder) = (place.clone(), folder);
+            self.own = Some(OwnFile { path: target.path, text });
+            self.shown.set(&self.source);
+        }
+        Ok(answer)
+    }
+
     /// Returns the same run at its start once more, of a recording.
     pub(crate) fn again(&self) -> Option<Box<dyn Simulation>> {
         // It could be started before: where it cannot now, nothing is known ahead.
@@ -128,9 +195,23 @@ impl Stage {
         })
     }
 
+    /// Returns the memory that keyframes of all sessions share.
+    pub(crate) fn budget(&self) -> &Arc<Budget> {
+        &self.means.budget
+    }
+
     /// Returns the metrics of its world in words.
     pub(crate) fn meanings(&self) -> &'static [Meaning] {
         self.means.worlds.named(self.run.world()).map_or(&[], |kind| kind.meanings())
+    }
+
+    /// Returns the names of the recorded tables; none of what has no tables.
+    ///
+    /// # Errors
+    /// When the folder can no longer be read.
+    pub(crate) fn tables(&self) -> Result<Vec<String>, Problem> {
+        let recorded = self.recorded.as_ref();
+        recorded.map_or(Ok(Vec::new()), |recorded| recorded.tables().map_err(|e| problem(&e)))
     }
 
     /// Whether its text cannot be replaced.
@@ -175,10 +256,10 @@ pub(crate) fn checked(
 ///
 /// # Errors
 /// When texts are refused, or this one names a file that may not be read.
-fn other_text(means: &Means, source: &Source, text: String) -> Result<Source, Problem> {
+pub(super) fn other_text(means: &Means, source: &Source, text: String) -> Result<Source, Problem> {
     if means.read_only {
         let remedy = "change the file, or start the studio without --read-only";
-        return Err(Problem::new(&source.place, "texts are not taken here", remedy));
+        return Err(Problem::new(source.place.as_str(), "texts are not taken here", remedy));
     }
     let other = Source { text, ..source.clone() };
     means.files.check_text(&other)?;
@@ -201,10 +282,11 @@ fn fixed(place: &str) -> Problem {
     Problem::new(place, "a recording is computed again as it was", remedy)
 }
 
-fn stopped(error: &Error) -> Problem {
+/// Returns an error of a session as it is told.
+pub(crate) fn stopped(error: &Error) -> Problem {
     match error {
         Error::Input(error) => problem(error),
-        Error::Stopped { cause, remedy } => Problem::new("", cause, remedy.as_str()),
+        Error::Stopped { cause, remedy } => Problem::new("", cause.as_str(), remedy.as_str()),
         other => Problem::new("", other.to_string(), "check the file, and the space on the disk"),
     }
 }

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::files::Files;
+use crate::keyframes::Budget;
 use crate::outbox::Mail;
 use crate::protocol::{Speed, Who};
 use serde_json::{Value, json};
@@ -30,7 +31,8 @@ struct Page {
 
 fn means(folder: &std::path::Path, workers: usize) -> Means {
     let files = Files::below(&[folder.to_path_buf()]).expect("a folder");
-    Means { worlds: WORLDS, files, workers, read_only: false }
+    let budget = Arc::new(Budget::new(1 << 28, 1 << 28));
+    Means { worlds: WORLDS, files, workers, read_only: false, budget }
 }
 
 impl Page {
@@ -194,7 +196,7 @@ fn a_body_is_inspected_as_by_the_library_and_the_digest_stays() {
                     "{told}"
                 );
             }
-            Err(problem) => assert_eq!(told["problem"]["cause"], problem.cause.as_str()),
+            Err(problem) => assert_eq!(told["problem"]["cause"], *problem.cause),
         }
         assert_eq!((page.digest_at(20), page.digest_at(40)), (digest, plain(text, 40)));
         let who = json!({ "kind": "no such kind", "number": 1, "part": null });

@@ -1,0 +1,91 @@
+//! Lines and sections of a text: taken away, inserted, moved.
+
+use super::layout::{Layout, Step, above_comments, line_start};
+use super::section::section_text;
+use super::splice::{Splice, delete, insert, replace};
+use super::{Refusal, refusal};
+use serde_json::Value as Json;
+use std::ops::Range;
+
+/// Takes away all lines of what stands at a way.
+pub(super) fn taken(layout: &Layout<'_>, path: &[Step]) -> Vec<Splice> {
+    layout.runs(path).iter().map(|run| delete(removable(layout, run))).collect()
+}
+
+/// Returns what goes with statements that are taken away: their comment, and a blank line.
+fn removable(layout: &Layout<'_>, run: &Range<usize>) -> Range<usize> {
+    let text = layout.text;
+    let mut lines = layout.lines(run);
+    let is_section = layout.statements[run.start].is_header;
+    let follows = blank_after(text, lines.end);
+    let is_alone = follows.is_some() || lines.end == text.len();
+    if !is_section {
+        lines.start = match is_alone {
+            true => above_comments(text, lines.start),
+            // The comment may be on the keys behind it, too.
+            false => lines.start,
+        };
+    }
+    match (blank_before(text, lines.start), follows) {
+        (Some(blank), _) if is_section || is_alone => blank..lines.end,
+        (None, Some(blank)) if is_section && lines.start == 0 => lines.start..blank,
+        _ => lines,
+    }
+}
+
+/// Returns the start of the empty line before a line.
+fn blank_before(text: &str, start: usize) -> Option<usize> {
+    let before = line_start(text, start.checked_sub(1)?);
+    matches!(&text[before..start], "\n" | "\r\n").then_some(before)
+}
+
+/// Returns the end of the empty line behind a line.
+fn blank_after(text: &str, end: usize) -> Option<usize> {
+    let rest = &text[end..];
+    let ends = ["\n", "\r\n"].into_iter().find(|new_line| rest.starts_with(new_line));
+    ends.map(|new_line| end + new_line.len())
+}
+
+/// Inserts a section into a list at a number, which is at most their count.
+pub(super) fn inserted(
+    layout: &Layout<'_>,
+    list: &[Step],
+    at: usize,
+    value: &Json,
+) -> Result<Vec<Splice>, Refusal> {
+    let Json::Object(members) = value else {
+        return Err(refusal("a section of a list is a table", "give a table"));
+    };
+    let block = section_text(layout, list, members, true)?;
+    let element = |number| [list, &[Step::Index(number)]].concat();
+    if let Some(run) = layout.runs(&element(at)).first() {
+        return Ok(vec![set_before(layout, layout.lines(run).start, &block)]);
+    }
+    let last = layout.runs(list);
+    let end = last.last().map_or(layout.text.len(), |run| layout.lines(run).end);
+    Ok(vec![insert(end, format!("{}{block}", layout.new_line()))])
+}
+
+/// Inserts a section before the lines of another: with an empty line between them if there is one before.
+pub(super) fn set_before(layout: &Layout<'_>, start: usize, block: &str) -> Splice {
+    let is_spaced = start == 0 || blank_before(layout.text, start).is_some();
+    insert(start, format!("{block}{}", if is_spaced { layout.new_line() } else { "" }))
+}
+
+/// Moves a section to another number of its list, which has so many.
+pub(super) fn moved(layout: &Layout<'_>, list: &[Step], order: &[usize]) -> Vec<Splice> {
+    let runs_of = |number| layout.runs(&[list, &[Step::Index(number)]].concat());
+    let text_of = |number: usize| {
+        let runs = runs_of(number);
+        let texts: Vec<&str> = runs.iter().map(|run| &layout.text[layout.lines(run)]).collect();
+        texts.join(layout.new_line())
+    };
+    let mut splices = Vec::new();
+    for (slot, &number) in order.iter().enumerate().filter(|(slot, number)| slot != *number) {
+        let runs = runs_of(slot);
+        let mut places = runs.iter().map(|run| layout.lines(run));
+        splices.extend(places.next().map(|place| replace(place, text_of(number))));
+        splices.extend(places.map(delete));
+    }
+    splices
+}

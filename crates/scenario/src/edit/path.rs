@@ -1,0 +1,143 @@
+//! Keys as overrides name them: `robots.1.at`, `kinds."a.b".observation`.
+
+use super::{Refusal, refusal};
+use toml_edit::Key;
+
+/// Keys of more parts are refused.
+const MOST_PARTS: usize = 64;
+
+/// A part of a key.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Part {
+    /// The name, without quotes.
+    pub(super) name: String,
+    is_quoted: bool,
+}
+
+impl Part {
+    /// Returns the number of an element, if it is one.
+    pub(super) fn number(&self) -> Option<usize> {
+        let is_number = !self.is_quoted && self.name.bytes().all(|b| b.is_ascii_digit());
+        is_number.then(|| self.name.parse().ok()).flatten()
+    }
+}
+
+/// Splits a key into its parts; never returns none.
+pub(super) fn parts(key: &str) -> Result<Vec<Part>, Refusal> {
+    let mut found = Vec::new();
+    let mut rest = key.trim();
+    loop {
+        let end = end_of_part(rest);
+        found.push(part(&rest[..end])?);
+        match rest[end..].strip_prefix('.') {
+            Some(behind) => rest = behind,
+            None if end == rest.len() => return Ok(found),
+            None => return Err(refusal("a dot is missing behind a quote", "write a.\"b.c\".d")),
+        }
+        if found.len() > MOST_PARTS {
+            return Err(refusal("the key has too many parts", "name what is in the text"));
+        }
+    }
+}
+
+fn part(text: &str) -> Result<Part, Refusal> {
+    let is_quoted = text.starts_with(['"', '\'']);
+    let name = match is_quoted {
+        false => text.to_string(),
+        true => match Key::parse(text).as_deref() {
+            Ok([key]) => key.get().to_string(),
+            _ => return Err(refusal("a quoted part of the key is not TOML", "write a.\"b.c\".d")),
+        },
+    };
+    match name.is_empty() && !is_quoted {
+        true => Err(refusal("a part of the key is empty", "write a.b.c")),
+        false => Ok(Part { name, is_quoted }),
+    }
+}
+
+/// Returns where the part ends that a text begins with.
+fn end_of_part(text: &str) -> usize {
+    match text.bytes().next() {
+        Some(quote @ (b'"' | b'\'')) => end_of_quoted(text, quote),
+        _ => text.find('.').unwrap_or(text.len()),
+    }
+}
+
+/// Returns where the quoted name ends that a text begins with.
+fn end_of_quoted(text: &str, quote: u8) -> usize {
+    let mut bytes = text.bytes().enumerate().skip(1);
+    while let Some((at, byte)) = bytes.next() {
+        match byte {
+            b'\\' if quote == b'"' => drop(bytes.next()),
+            _ if byte == quote => return at + 1,
+            _ => {}
+        }
+    }
+    text.len()
+}
+
+/// Returns the places of the parts of the key that stands at a place of a text, which is TOML.
+pub(super) fn keys_at(text: &str, at: usize) -> Vec<std::ops::Range<usize>> {
+    let mut found = Vec::new();
+    let mut at = behind_blanks(text, at);
+    loop {
+        let end = at + end_of_key(&text[at..]);
+        found.push(at..end);
+        let dot = behind_blanks(text, end);
+        match text[dot..].starts_with('.') {
+            true => at = behind_blanks(text, dot + 1),
+            false => return found,
+        }
+    }
+}
+
+fn end_of_key(text: &str) -> usize {
+    match text.bytes().next() {
+        Some(quote @ (b'"' | b'\'')) => end_of_quoted(text, quote),
+        _ => text.bytes().position(|b| b" \t.=]".contains(&b)).unwrap_or(text.len()),
+    }
+}
+
+fn behind_blanks(text: &str, at: usize) -> usize {
+    at + text[at..].bytes().take_while(|b| b" \t".contains(b)).count()
+}
+
+/// Returns a name as TOML writes it.
+pub(super) fn written(name: &str) -> String {
+    Key::new(name)
+        .default_repr()
+        .as_raw()
+        .as_str()
+        .map_or_else(|| format!("{name:?}"), String::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_split_at_dots_outside_of_quotes() {
+        let names = |key| parts(key).map(|all| all.into_iter().map(|p| p.name).collect::<Vec<_>>());
+        assert_eq!(names("robots.1.at"), Ok(vec!["robots".into(), "1".into(), "at".into()]));
+        assert_eq!(names(r#"kinds."a.b".c"#), Ok(vec!["kinds".into(), "a.b".into(), "c".into()]));
+        assert_eq!(names(r#""a\"b".'c.d'"#), Ok(vec!["a\"b".into(), "c.d".into()]));
+        for wrong in ["", "a..b", ".a", "a.", "\"a", "\"a\"b", "\"\\q\"", &"a.".repeat(100)] {
+            assert!(names(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn numbers_in_quotes_are_names() {
+        let number = |key| parts(key).expect("a key")[0].number();
+        assert_eq!((number("12"), number("\"12\""), number("+1")), (Some(12), None, None));
+        assert_eq!(number("99999999999999999999999"), None);
+    }
+
+    #[test]
+    fn the_parts_of_a_written_key_are_found() {
+        let text = "[ a . \"b.]\".c ]";
+        let found: Vec<&str> = keys_at(text, 1).into_iter().map(|range| &text[range]).collect();
+        assert_eq!(found, ["a", "\"b.]\"", "c"]);
+        assert_eq!((written("a-b"), written("a b")), ("a-b".into(), "\"a b\"".into()));
+    }
+}

@@ -1,0 +1,73 @@
+//! The text of new sections.
+
+use super::Refusal;
+use super::layout::{Layout, Step};
+use super::path::written;
+use super::value::text_of;
+use serde_json::{Map, Value as Json};
+
+/// A longer table is a section rather than one in braces.
+const MOST_IN_BRACES: usize = 80;
+
+/// Whether a table is better a section than in braces.
+pub(super) fn is_large(members: &Map<String, Json>) -> bool {
+    let text = text_of(&Json::Object(members.clone()), false);
+    text.is_ok_and(|text| text.len() > MOST_IN_BRACES)
+}
+
+/// Whether an array becomes a list of sections.
+pub(super) fn are_sections(items: &[Json]) -> bool {
+    !items.is_empty() && items.iter().all(Json::is_object)
+}
+
+/// Returns the names on a way.
+pub(super) fn names_of(path: &[Step]) -> Vec<String> {
+    let names = path.iter().filter_map(|step| match step {
+        Step::Name(name) => Some(name.clone()),
+        Step::Index(_) => None,
+    });
+    names.collect()
+}
+
+/// Returns names as a key of several parts.
+pub(super) fn dotted(names: &[String]) -> String {
+    names.iter().map(|name| written(name)).collect::<Vec<_>>().join(".")
+}
+
+/// Returns the header of a section, or of one of a list.
+pub(super) fn header(layout: &Layout<'_>, path: &[Step], is_element: bool) -> String {
+    let (open, close) = if is_element { ("[[", "]]") } else { ("[", "]") };
+    format!("{open}{}{close}{}", dotted(&names_of(path)), layout.new_line())
+}
+
+/// Returns the text of a section, or of one of a list.
+pub(super) fn section_text(
+    layout: &Layout<'_>,
+    path: &[Step],
+    members: &Map<String, Json>,
+    is_element: bool,
+) -> Result<String, Refusal> {
+    let new_line = layout.new_line();
+    let mut text = header(layout, path, is_element);
+    let mut sections = String::new();
+    for (name, value) in members {
+        let way = [path, &[Step::Name(name.clone())]].concat();
+        match value {
+            Json::Array(items) if are_sections(items) => {
+                for inner in items.iter().filter_map(Json::as_object) {
+                    sections += new_line;
+                    sections += &section_text(layout, &way, inner, true)?;
+                }
+            }
+            Json::Object(inner) if is_large(inner) => {
+                sections += new_line;
+                sections += &section_text(layout, &way, inner, false)?;
+            }
+            _ => {
+                let line = format!("{} = {}{new_line}", written(name), text_of(value, false)?);
+                text += &line;
+            }
+        }
+    }
+    Ok(text + &sections)
+}

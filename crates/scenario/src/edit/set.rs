@@ -1,0 +1,202 @@
+//! Values in place of others, and keys that are taken away.
+
+use super::blocks::taken;
+use super::create::{before, create};
+use super::layout::{Layout, Reach, Step};
+use super::lists::without;
+use super::members::{enclosing, with_value, without_members};
+use super::path::Part;
+use super::splice::{Splice, replace};
+use super::value::{New, is_same};
+use super::{Refusal, refusal};
+use serde_json::{Map, Value as Json};
+use toml_edit::{Item, Value};
+
+/// Larger tables are not set key by key.
+const MOST_KEYS: usize = 1000;
+
+/// Sets a value.
+pub(super) fn set(layout: &Layout<'_>, key: &[Part], new: New<'_>) -> Result<Vec<Splice>, Refusal> {
+    let Reach { path, item, rest } = layout.reach(key)?;
+    match rest.is_empty() {
+        true => set_item(layout, &path, item, new),
+        false => create(layout, &path, item, &rest, new),
+    }
+}
+
+/// Returns what gives a header to a table that has none and gets keys of its own.
+pub(super) fn headed(
+    layout: &Layout<'_>,
+    key: &[Part],
+    value: &Json,
+) -> Result<Vec<Splice>, Refusal> {
+    let Reach { path, item, rest } = layout.reach(key)?;
+    let table = item.as_table().filter(|t| t.position().is_none() && !t.is_dotted());
+    let (Some(table), Json::Object(members), true) = (table, value, rest.is_empty()) else {
+        return Ok(Vec::new());
+    };
+    match path.is_empty() || members.keys().all(|name| table.contains_key(name)) {
+        true => Ok(Vec::new()),
+        false => Ok(vec![before(layout, &path, "")]),
+    }
+}
+
+/// Takes a key, an element or a section away.
+pub(super) fn remove(layout: &Layout<'_>, key: &[Part]) -> Result<Vec<Splice>, Refusal> {
+    let path = layout.find(key)?.path;
+    match path.is_empty() {
+        true => Err(refusal("this is the whole text", "name a key of it")),
+        false => Ok(removed(layout, &path)),
+    }
+}
+
+/// Returns what takes away that which stands at a way.
+pub(super) fn removed(layout: &Layout<'_>, path: &[Step]) -> Vec<Splice> {
+    let Some((last, parent)) = path.split_last() else { return Vec::new() };
+    match (layout.item(parent), last) {
+        (Item::Value(Value::Array(array)), Step::Index(number)) => {
+            without(layout.text, array, *number)
+        }
+        (Item::Value(Value::InlineTable(_)), _) => match enclosing(layout, parent) {
+            Some((table, depth)) => without_members(layout.text, table, &path[depth..]),
+            None => Vec::new(),
+        },
+        _ => taken(layout, path),
+    }
+}
+
+fn set_item(
+    layout: &Layout<'_>,
+    path: &[Step],
+    item: &Item,
+    new: New<'_>,
+) -> Result<Vec<Splice>, Refusal> {
+    match (item, new) {
+        (Item::Value(old), _) if is_dotted(old) => set_dotted(layout, path, old, new),
+        (Item::Value(old), _) => set_value(old, new),
+        (_, New::Json(Json::Object(members))) if item.is_table_like() => {
+            set_members(layout, path, item, members)
+        }
+        (Item::ArrayOfTables(_), New::Json(Json::Array(elements)))
+            if elements.iter().all(Json::is_object) && !elements.is_empty() =>
+        {
+            set_sections(layout, path, item, elements)
+        }
+        _ => set_anew(layout, path, new),
+    }
+}
+
+fn is_dotted(value: &Value) -> bool {
+    value.as_inline_table().is_some_and(toml_edit::InlineTable::is_dotted)
+}
+
+/// Sets a value in place of dotted keys in braces.
+fn set_dotted(
+    layout: &Layout<'_>,
+    path: &[Step],
+    old: &Value,
+    new: New<'_>,
+) -> Result<Vec<Splice>, Refusal> {
+    match (enclosing(layout, path), new) {
+        (_, New::Json(json)) if is_same(old, json) => Ok(Vec::new()),
+        (Some((table, depth)), _) => {
+            let value = new.written(None)?;
+            Ok(with_value(layout.text, table, &path[depth..], &value))
+        }
+        (None, _) => Ok(Vec::new()),
+    }
+}
+
+/// Sets a value in place of one that is written as a value; parts that stay the same keep their text.
+fn set_value(old: &Value, new: New<'_>) -> Result<Vec<Splice>, Refusal> {
+    match (old, new) {
+        (_, New::Json(json)) if is_same(old, json) => Ok(Vec::new()),
+        (Value::Array(old), New::Json(Json::Array(new))) if old.len() == new.len() => {
+            each(old.iter().zip(new))
+        }
+        (Value::InlineTable(table), New::Json(Json::Object(new)))
+            if table.len() == new.len() && new.keys().all(|key| table.contains_key(key)) =>
+        {
+            each(table.iter().filter_map(|(key, old)| Some((old, new.get(key)?))))
+        }
+        _ => {
+            let text = new.written(Some(old))?;
+            Ok(old.span().map(|span| replace(span, text)).into_iter().collect())
+        }
+    }
+}
+
+fn each<'v>(pairs: impl Iterator<Item = (&'v Value, &'v Json)>) -> Result<Vec<Splice>, Refusal> {
+    let mut splices = Vec::new();
+    for (old, new) in pairs {
+        splices.extend(set_value(old, New::Json(new))?);
+    }
+    Ok(splices)
+}
+
+/// Sets the keys of a section one by one.
+fn set_members(
+    layout: &Layout<'_>,
+    path: &[Step],
+    item: &Item,
+    members: &Map<String, Json>,
+) -> Result<Vec<Splice>, Refusal> {
+    let table = item.as_table_like();
+    let old: Vec<&str> = table.iter().flat_map(|table| table.iter()).map(|(key, _)| key).collect();
+    if members.len() + old.len() > MOST_KEYS {
+        return Err(refusal("the table has too many keys", "set them one by one"));
+    }
+    let at = |name: &str| [path, &[Step::Name(name.into())]].concat();
+    let gone = old.iter().filter(|key| !members.contains_key(**key));
+    let mut splices: Vec<Splice> = gone.flat_map(|key| removed(layout, &at(key))).collect();
+    // Lines stand before sections.
+    let (sections, lines): (Vec<_>, Vec<_>) = members.iter().partition(|(_, v)| may_be_section(v));
+    for (name, value) in lines.into_iter().chain(sections) {
+        let new = New::Json(value);
+        splices.extend(match table.and_then(|table| table.get(name)) {
+            Some(member) => set_item(layout, &at(name), member, new)?,
+            None => create(layout, path, item, std::slice::from_ref(name), new)?,
+        });
+    }
+    Ok(splices)
+}
+
+fn may_be_section(value: &Json) -> bool {
+    match value {
+        Json::Object(_) => true,
+        Json::Array(items) => items.iter().any(Json::is_object),
+        _ => false,
+    }
+}
+
+/// Sets the sections of a list one by one.
+fn set_sections(
+    layout: &Layout<'_>,
+    path: &[Step],
+    item: &Item,
+    elements: &[Json],
+) -> Result<Vec<Splice>, Refusal> {
+    let count = super::layout::count(item).unwrap_or(0);
+    if elements.len() + count > MOST_KEYS {
+        return Err(refusal("the list has too many sections", "set them one by one"));
+    }
+    let at = |number| [path, &[Step::Index(number)]].concat();
+    let mut splices = Vec::new();
+    for (number, element) in elements.iter().enumerate() {
+        splices.extend(match item.get(number) {
+            Some(old) => set_item(layout, &at(number), old, New::Json(element))?,
+            None => super::blocks::inserted(layout, path, count, element)?,
+        });
+    }
+    splices.extend((elements.len()..count).flat_map(|number| removed(layout, &at(number))));
+    Ok(splices)
+}
+
+/// Sets a value in place of sections.
+fn set_anew(layout: &Layout<'_>, path: &[Step], new: New<'_>) -> Result<Vec<Splice>, Refusal> {
+    let Some((Step::Name(name), parent)) = path.split_last() else {
+        return Err(refusal("a section of a list is a table", "give a table"));
+    };
+    let made = create(layout, parent, layout.item(parent), std::slice::from_ref(name), new)?;
+    Ok([removed(layout, path), made].concat())
+}

@@ -1,0 +1,191 @@
+//! Values as TOML writes them.
+
+use super::path::written;
+use super::{Refusal, refusal};
+use serde_json::{Map, Number, Value as Json};
+use std::fmt::Write;
+use toml_edit::{Datetime, Value};
+
+/// Whole numbers up to this are exact as floats.
+const MOST_EXACT: f64 = 9_007_199_254_740_992.0;
+
+/// A value that is set.
+#[derive(Clone, Copy)]
+pub(super) enum New<'v> {
+    /// By its meaning.
+    Json(&'v Json),
+    /// As TOML, to be written as it is.
+    Toml(&'v str),
+}
+
+impl New<'_> {
+    /// Returns its text; `old` is what it takes the place of.
+    pub(super) fn written(self, old: Option<&Value>) -> Result<String, Refusal> {
+        match self {
+            New::Toml(text) => Ok(text.to_string()),
+            New::Json(Json::String(text)) if is_date(old, text) => Ok(text.clone()),
+            New::Json(value) => text_of(value, old.is_some_and(has_floats)),
+        }
+    }
+}
+
+/// Whether a text takes the place of a date, and is one.
+fn is_date(old: Option<&Value>, text: &str) -> bool {
+    old.is_some_and(Value::is_datetime) && text.parse::<Datetime>().is_ok()
+}
+
+/// Whether it is a float, or an array of floats.
+pub(super) fn has_floats(value: &Value) -> bool {
+    match value {
+        Value::Float(_) => true,
+        Value::Array(items) => !items.is_empty() && items.iter().all(has_floats),
+        _ => false,
+    }
+}
+
+/// Returns the text of a value on one line, but for strings of several lines.
+pub(super) fn text_of(value: &Json, floats: bool) -> Result<String, Refusal> {
+    let mut text = String::new();
+    write_value(&mut text, value, floats)?;
+    Ok(text)
+}
+
+fn write_value(text: &mut String, value: &Json, floats: bool) -> Result<(), Refusal> {
+    match value {
+        Json::Null => {
+            let remedy = "leave the key out; what is NaN or infinite becomes null in JSON";
+            return Err(refusal("null is no value of TOML", remedy));
+        }
+        Json::Bool(is_so) => text.push_str(if *is_so { "true" } else { "false" }),
+        Json::Number(number) => text.push_str(&number_text(number, floats)?),
+        Json::String(words) => text.push_str(&string_text(words)),
+        Json::Array(items) => {
+            text.push('[');
+            for (at, item) in items.iter().enumerate() {
+                text.push_str(if at == 0 { "" } else { ", " });
+                write_value(text, item, floats)?;
+            }
+            text.push(']');
+        }
+        Json::Object(members) => write_members(text, members)?,
+    }
+    Ok(())
+}
+
+fn write_members(text: &mut String, members: &Map<String, Json>) -> Result<(), Refusal> {
+    if members.is_empty() {
+        text.push_str("{}");
+        return Ok(());
+    }
+    for (at, (name, member)) in members.iter().enumerate() {
+        text.push_str(if at == 0 { "{ " } else { ", " });
+        text.push_str(&written(name));
+        text.push_str(" = ");
+        write_value(text, member, false)?;
+    }
+    text.push_str(" }");
+    Ok(())
+}
+
+fn number_text(number: &Number, floats: bool) -> Result<String, Refusal> {
+    let float = number.as_f64().filter(|x| x.is_finite());
+    match (number.as_i64(), float) {
+        (Some(whole), _) if !floats => Ok(whole.to_string()),
+        (None, Some(x)) if !floats && x.trunc() == x && x.abs() <= MOST_EXACT => {
+            Ok(format!("{x:.0}"))
+        }
+        (None, Some(x)) if floats || number.is_f64() => Ok(format!("{x:?}")),
+        (Some(_), Some(x)) => Ok(format!("{x:?}")),
+        _ => {
+            let cause = format!("{number} is larger than any whole number of TOML");
+            Err(refusal(cause, format!("give at most {}", i64::MAX)))
+        }
+    }
+}
+
+/// Returns a string in quotes: on several lines if it has several.
+fn string_text(words: &str) -> String {
+    if !words.contains('\n') {
+        return Value::from(words).to_string();
+    }
+    // Quotes side by side, or at the end, could be taken for the end of the string.
+    let is_risky = words.contains("\"\"") || words.ends_with('"');
+    let mut text = String::from("\"\"\"\n");
+    for c in words.chars() {
+        match c {
+            '\\' => text.push_str("\\\\"),
+            '"' if is_risky => text.push_str("\\\""),
+            '\n' | '\t' => text.push(c),
+            _ if c.is_control() => drop(write!(text, "\\u{:04X}", u32::from(c))),
+            _ => text.push(c),
+        }
+    }
+    text + "\"\"\""
+}
+
+/// Whether an old value means the same as a new one.
+pub(super) fn is_same(old: &Value, new: &Json) -> bool {
+    match (old, new) {
+        (Value::String(a), Json::String(b)) => a.value() == b,
+        (Value::Datetime(a), Json::String(b)) => a.value().to_string() == *b,
+        (Value::Boolean(a), Json::Bool(b)) => a.value() == b,
+        (Value::Integer(a), Json::Number(b)) => match b.as_i64() {
+            Some(b) => *a.value() == b,
+            None => b.as_f64().is_some_and(|b| b.abs() <= MOST_EXACT && *a.value() as f64 == b),
+        },
+        (Value::Float(a), Json::Number(b)) => b.as_f64() == Some(*a.value()),
+        (Value::Array(a), Json::Array(b)) => {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| is_same(a, b))
+        }
+        (Value::InlineTable(a), Json::Object(b)) => {
+            let same = |(key, a): (&str, &Value)| b.get(key).is_some_and(|b| is_same(a, b));
+            a.len() == b.len() && a.iter().all(same)
+        }
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn read(text: &str) -> Value {
+        text.parse().expect("TOML")
+    }
+
+    #[test]
+    fn values_come_back_from_their_text() {
+        for value in [
+            json!(true),
+            json!(-3),
+            json!(0.1),
+            json!(1e300),
+            json!(i64::MIN),
+            json!("a \"b\" \\ c\u{7f}"),
+            json!("two\nlines \"\"\" \\ \u{1}\r\n\""),
+            json!([[1, 2.5], []]),
+            json!({ "a b": { "c": [] }, "d": {} }),
+        ] {
+            let text = text_of(&value, false).expect("a value");
+            assert!(is_same(&read(&text), &value), "{text}");
+        }
+    }
+
+    #[test]
+    fn whole_numbers_are_integers_unless_a_float_was_there() {
+        let written = |old: Option<&str>, new: Json| {
+            New::Json(&new).written(old.map(read).as_ref()).map_err(|r| r.cause)
+        };
+        assert_eq!(written(None, json!(2.0)), Ok("2".into()));
+        assert_eq!(written(Some("1"), json!(2.0)), Ok("2".into()));
+        assert_eq!(written(Some("1.5"), json!(2)), Ok("2.0".into()));
+        assert_eq!(written(Some("[1.5, 2.5]"), json!([3, 4, 0.5])), Ok("[3.0, 4.0, 0.5]".into()));
+        assert_eq!(written(Some("[1.5, 2]"), json!([3])), Ok("[3]".into()));
+        assert_eq!(written(None, json!(1e21)), Ok("1e21".into()));
+        assert_eq!(written(Some("1.0"), json!(u64::MAX)), Ok("1.8446744073709552e19".into()));
+        assert!(written(None, json!(u64::MAX)).expect_err("too large").contains("larger"));
+        assert_eq!(written(Some("2020-01-01"), json!("2021-02-03")), Ok("2021-02-03".into()));
+        assert!(written(None, json!([1, null])).expect_err("null").contains("null"));
+    }
+}

@@ -1,0 +1,89 @@
+//! How many connections there may be: of one peer, so that it cannot keep out all others, and in all.
+
+use std::collections::BTreeMap;
+use std::net::IpAddr;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// The number of connections at a time.
+const MOST: usize = 128;
+/// The number of connections of a peer at a time. What is forwarded to this machine all comes from itself.
+const MOST_OF_PEER: usize = 64;
+
+/// The connections that there are, by peer.
+#[derive(Debug, Default)]
+pub(crate) struct Doors(Mutex<BTreeMap<IpAddr, usize>>);
+
+/// The place of a connection; it is free again when this is dropped.
+#[derive(Debug)]
+pub(crate) struct Place {
+    doors: Arc<Doors>,
+    peer: IpAddr,
+}
+
+impl Doors {
+    fn inside(&self) -> MutexGuard<'_, BTreeMap<IpAddr, usize>> {
+        // The numbers are right after every step.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Returns the place of a connection; `None` if there are too many.
+    pub(crate) fn enter(self: &Arc<Self>, peer: IpAddr) -> Option<Place> {
+        let peer = peer.to_canonical();
+        let mut inside = self.inside();
+        let (all, own) = (inside.values().sum::<usize>(), inside.get(&peer).copied().unwrap_or(0));
+        if all >= MOST || (own >= MOST_OF_PEER && !peer.is_loopback()) {
+            return None;
+        }
+        inside.insert(peer, own + 1);
+        Some(Place { doors: self.clone(), peer })
+    }
+
+    /// Whether there is no connection.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.inside().is_empty()
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        let mut inside = self.doors.inside();
+        match inside.get_mut(&self.peer) {
+            Some(number) if *number > 1 => *number -= 1,
+            _ => drop(inside.remove(&self.peer)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn peer(k: u8) -> IpAddr {
+        IpAddr::from([192, 0, 2, k])
+    }
+
+    #[test]
+    fn one_peer_leaves_room_for_others_and_places_are_free_again() {
+        let doors = Arc::new(Doors::default());
+        let mut places: Vec<Place> =
+            (0..MOST_OF_PEER).filter_map(|_| doors.enter(peer(1))).collect();
+        assert_eq!(places.len(), MOST_OF_PEER);
+        assert!(doors.enter(peer(1)).is_none());
+        assert!(doors.enter(IpAddr::from([0, 0, 0, 0, 0, 0xffff, 0xc000, 0x0201])).is_none());
+        places.extend((0..MOST).filter_map(|_| doors.enter(peer(2))));
+        assert_eq!(places.len(), MOST);
+        assert!(doors.enter(peer(3)).is_none(), "in all");
+        places.pop();
+        assert!(doors.enter(peer(3)).is_some());
+        places.clear();
+        assert!(doors.is_empty());
+    }
+
+    #[test]
+    fn this_machine_may_have_all_as_others_may_stand_behind_it() {
+        let doors = Arc::new(Doors::default());
+        let own: Vec<_> =
+            (0..MOST).map_while(|_| doors.enter(IpAddr::from([127, 0, 0, 1]))).collect();
+        assert_eq!(own.len(), MOST);
+    }
+}

@@ -1,0 +1,47 @@
+//! Results of runs and sweeps that are recorded: their reports, what can be exported of them, and the runs of a sweep.
+//!
+//! They are fetched by plain addresses, so that a browser shows a report in a frame and keeps an export as a file:
+//! ```text
+//! /report?path=DIR                       the page of `sidestep report`
+//! /report?path=DIR&as=html|markdown|NN-figure   the same as a file, its text, or one of its figures
+//! /export?path=DIR&as=csv&table=NAME     what `sidestep export` writes; of pictures, with &cycle=N
+//! ```
+//! Whoever asks must come from our own page, and each path must be below the folders that were named at start. One
+//! result is made at a time, in a thread of its own; nobody makes one any more for a browser that is gone.
+
+mod export;
+mod fields;
+mod report;
+mod runs;
+mod work;
+
+pub(crate) use export::answer as export;
+pub(crate) use report::answer as report;
+pub(crate) use runs::runs;
+pub(crate) use work::Workshop;
+
+use crate::protocol::Problem;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+
+/// Why there is no result.
+pub(super) struct Failed(StatusCode, Problem);
+
+impl Failed {
+    fn new(status: StatusCode, problem: Problem) -> Self {
+        Self(status, problem)
+    }
+}
+
+impl From<Problem> for Failed {
+    fn from(problem: Problem) -> Self {
+        Self(StatusCode::UNPROCESSABLE_ENTITY, problem)
+    }
+}
+
+impl IntoResponse for Failed {
+    fn into_response(self) -> Response {
+        let Self(status, Problem { place, cause, remedy, .. }) = self;
+        (status, format!("{place}: {cause}\nhelp: {remedy}\n")).into_response()
+    }
+}

@@ -1,0 +1,40 @@
+//! The runs of a sweep, each with what opens it.
+
+use crate::encode::problem;
+use crate::protocol::{Answer, Named, Problem, SweepRun};
+use sidestep_session::sweep::{Finished, Folder, finished};
+use std::path::Path;
+
+/// The number of runs that are listed.
+const MOST_RUNS: usize = 20_000;
+
+/// Lists the runs of the sweep in a folder.
+///
+/// # Errors
+/// When it is no sweep, none of its runs is finished, or something in it is damaged.
+pub(crate) fn runs(path: &Path) -> Result<Answer, Problem> {
+    let folder = Folder::open(path).map_err(|e| problem(&e))?;
+    let Finished { table, is_complete } = finished(&folder).map_err(|e| problem(&e))?;
+    let (plan, names) = (folder.plan(), folder.plan().names());
+    let number = |name: &str, row: usize| table.column(name)?.values.number(row);
+    let run = |row: usize| {
+        let cell = plan.cell_of(number("cell", row)? as u64)?;
+        let failure = table.column("failure").map_or_else(String::new, |c| c.values.text(row));
+        let kept = folder.run_folder(cell.id);
+        // A run that is not recorded is that of its variant's scenario with its seed.
+        let (kind, replay) = match kept.join("run.json").is_file() {
+            true => ("recording", kept),
+            false => ("scenario", folder.scenario(cell.variant)),
+        };
+        Some(SweepRun {
+            variant: names.get(cell.variant as usize)?.clone(),
+            seed: cell.seed.to_string(),
+            failure,
+            replay: Named { kind: kind.into(), path: replay.display().to_string() },
+        })
+    };
+    let all = table.runs();
+    let runs = (0..all.min(MOST_RUNS)).filter_map(run).collect();
+    let left_out = all.saturating_sub(MOST_RUNS) as u64;
+    Ok(Answer::Runs { name: plan.name.clone(), is_complete, runs, left_out })
+}

@@ -1,0 +1,104 @@
+//! Work for a browser that waits for it: one piece at a time, and none for a browser that is gone.
+
+use super::Failed;
+use crate::protocol::Problem;
+use axum::http::StatusCode;
+use sidestep::kernel::Interrupt;
+use sidestep_report::Rendered;
+use sidestep_session::{Error, Watcher};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, PoisonError};
+use tokio::sync::Semaphore;
+use tokio::task::spawn_blocking;
+
+/// The place where results are made.
+pub(crate) struct Workshop {
+    turn: Semaphore,
+    /// The report that was made last, of which figures are asked for next.
+    last: Mutex<Option<(PathBuf, Arc<Rendered>)>>,
+}
+
+impl Default for Workshop {
+    fn default() -> Self {
+        Self { turn: Semaphore::new(1), last: Mutex::default() }
+    }
+}
+
+/// A browser that waits, as the work sees it.
+#[derive(Clone, Default)]
+pub(super) struct Client {
+    is_gone: Arc<AtomicBool>,
+    interrupt: Interrupt,
+}
+
+impl Client {
+    /// Whether it is gone.
+    pub(super) fn is_gone(&self) -> bool {
+        self.is_gone.load(Relaxed)
+    }
+
+    /// Wants no more of the work.
+    pub(super) fn leave(&self) {
+        self.is_gone.store(true, Relaxed);
+        self.interrupt.raise();
+    }
+}
+
+impl Watcher for Client {
+    fn go_on(&self) -> bool {
+        !self.is_gone()
+    }
+
+    fn interrupt(&self) -> Interrupt {
+        self.interrupt.clone()
+    }
+}
+
+/// Tells the work that nobody waits any more.
+struct Leaves(Client);
+
+impl Drop for Leaves {
+    fn drop(&mut self) {
+        self.0.leave();
+    }
+}
+
+impl Workshop {
+    /// Does a piece of work in its turn, for as long as the future is waited for.
+    ///
+    /// # Errors
+    /// Those of the work; a bug in it.
+    pub(super) async fn work<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&Client) -> Result<T, Failed> + Send + 'static,
+    ) -> Result<T, Failed> {
+        let bug = || {
+            let problem = Problem::new("result", "this is a bug in sidestep", "please report it");
+            Failed::new(StatusCode::INTERNAL_SERVER_ERROR, problem)
+        };
+        // The semaphore is never closed.
+        let _turn = self.turn.acquire().await.map_err(|_| bug())?;
+        let leaves = Leaves(Client::default());
+        let client = leaves.0.clone();
+        let done = spawn_blocking(move || catch_unwind(AssertUnwindSafe(|| work(&client)))).await;
+        done.map_err(|_| bug())?.map_err(|_| bug())?
+    }
+
+    /// Keeps a report.
+    pub(super) fn keep(&self, path: PathBuf, rendered: Arc<Rendered>) {
+        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some((path, rendered));
+    }
+
+    /// Returns the report of a folder, if it is the one that was made last.
+    pub(super) fn kept(&self, path: &PathBuf) -> Option<Arc<Rendered>> {
+        let last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        last.as_ref().filter(|(of, _)| of == path).map(|(_, rendered)| rendered.clone())
+    }
+}
+
+/// Returns an error of the work as it is told.
+pub(super) fn failed(error: &Error) -> Failed {
+    crate::session::stopped(error).into()
+}

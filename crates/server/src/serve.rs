@@ -1,0 +1,248 @@
+//! Connections: taken, served for a time, and ended. None that says nothing keeps its place.
+
+use crate::doors::{Doors, Place};
+use axum::Router;
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use std::io;
+use std::pin::{Pin, pin};
+use std::sync::Arc;
+use std::task::{Context, Poll};
+use std::time::Duration;
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, ReadBuf};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::{Semaphore, watch};
+use tokio::time::{sleep, timeout};
+
+/// The patience with connections that are no sockets.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Patience {
+    /// The time for the head of a request, and between two requests.
+    head: Duration,
+    /// The time of a whole connection; the browser opens another one.
+    longest: Duration,
+}
+
+impl Default for Patience {
+    fn default() -> Self {
+        Self { head: Duration::from_secs(20), longest: Duration::from_secs(600) }
+    }
+}
+
+/// The time for an answer that is under way when a connection ends.
+const GRACE: Duration = Duration::from_secs(1);
+/// The wait where the system gives no connections, as there are too many files.
+const PAUSE: Duration = Duration::from_millis(500);
+/// The number of connections that are told at a time that there are too many.
+const MOST_TOLD: usize = 32;
+const TOO_MANY: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\ncontent-type: text/plain; charset=utf-8\r\n\
+    connection: close\r\ncontent-length: 63\r\n\r\nThere are too many connections: close pages, and try it again.\n";
+
+/// Answers requests until the server ends, as `ending` tells.
+pub(crate) async fn serve(
+    listener: TcpListener,
+    routes: Router,
+    ending: watch::Receiver<bool>,
+    patience: Patience,
+) {
+    let (doors, told) = (Arc::new(Doors::default()), Arc::new(Semaphore::new(MOST_TOLD)));
+    loop {
+        let accepted = tokio::select! {
+            () = ended(ending.clone()) => break,
+            accepted = listener.accept() => accepted,
+        };
+        let Ok((stream, address)) = accepted else {
+            sleep(PAUSE).await;
+            continue;
+        };
+        // Frames are sent at once. Without it they are only late.
+        let _ = stream.set_nodelay(true);
+        match (doors.enter(address.ip()), told.clone().try_acquire_owned()) {
+            (Some(place), _) => {
+                let connection = Connection { stream, _place: place };
+                tokio::spawn(converse(connection, routes.clone(), ending.clone(), patience));
+            }
+            (None, Ok(turn)) => drop(tokio::spawn(async move {
+                let _turn = turn;
+                let _ = timeout(GRACE, turn_away(stream)).await;
+            })),
+            (None, Err(_)) => {}
+        }
+    }
+    let emptied = async {
+        while !doors.is_empty() {
+            sleep(Duration::from_millis(5)).await;
+        }
+    };
+    let _ = timeout(GRACE, emptied).await;
+}
+
+/// Serves one connection, until it ends, becomes a socket, or has had its time.
+async fn converse(
+    connection: Connection,
+    routes: Router,
+    ending: watch::Receiver<bool>,
+    patience: Patience,
+) {
+    let mut http = http1::Builder::new();
+    let http = http.timer(TokioTimer::new()).header_read_timeout(patience.head);
+    let served = http.serve_connection(TokioIo::new(connection), TowerToHyperService::new(routes));
+    let mut served = pin!(served.with_upgrades());
+    tokio::select! {
+        _ = &mut served => return,
+        () = ended(ending) => {}
+        () = sleep(patience.longest) => {}
+    }
+    served.as_mut().graceful_shutdown();
+    let _ = timeout(GRACE, served).await;
+}
+
+/// Waits until the server ends.
+pub(crate) async fn ended(mut ending: watch::Receiver<bool>) {
+    // Whoever could end it otherwise is gone: then it ends, too.
+    let _ = ending.wait_for(|ends| *ends).await;
+}
+
+/// Tells a peer that there are too many connections.
+async fn turn_away(mut stream: TcpStream) -> io::Result<()> {
+    stream.write_all(TOO_MANY).await?;
+    stream.shutdown().await?;
+    // What it said must be read, or the system may throw away what it is told.
+    let mut said = [0; 1024];
+    while stream.read(&mut said).await? > 0 {}
+    Ok(())
+}
+
+/// A connection, and its place among all.
+struct Connection {
+    stream: TcpStream,
+    _place: Place,
+}
+
+impl AsyncRead for Connection {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_read(context, buffer)
+    }
+}
+
+impl AsyncWrite for Connection {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        Pin::new(&mut self.stream).poll_write(context, bytes)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(context)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(context)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use axum::routing::get;
+    use std::io::{Read, Write};
+    use std::time::Instant;
+
+    /// A server of one word, with little patience; returns its address, and what ends it.
+    fn impatient(longest: Duration) -> (std::net::SocketAddr, watch::Sender<bool>) {
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+        let address = listener.local_addr().expect("bound");
+        listener.set_nonblocking(true).expect("set");
+        let (ends, ending) = watch::channel(false);
+        let patience = Patience { head: Duration::from_millis(200), longest };
+        std::thread::spawn(move || {
+            let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+            runtime.expect("a runtime").block_on(async {
+                let listener = TcpListener::from_std(listener).expect("taken");
+                let routes = Router::new().route("/", get(|| async { "here" }));
+                serve(listener, routes, ending, patience).await;
+            });
+        });
+        (address, ends)
+    }
+
+    fn connect(address: std::net::SocketAddr) -> std::net::TcpStream {
+        let stream = std::net::TcpStream::connect(address).expect("connected");
+        stream.set_read_timeout(Some(Duration::from_secs(60))).expect("a time");
+        stream
+    }
+
+    /// What is said until the connection ends; a cut one has said nothing more.
+    fn heard(mut stream: std::net::TcpStream) -> String {
+        let mut said = Vec::new();
+        let _ = stream.read_to_end(&mut said);
+        String::from_utf8_lossy(&said).into_owned()
+    }
+
+    #[test]
+    fn a_connection_that_says_nothing_or_half_a_head_or_nothing_more_is_ended() {
+        let (address, _ends) = impatient(Duration::from_secs(600));
+        for said in ["", "GET / HTTP/1.1\r\nHost: a", "GET / HTTP/1.1\r\nHost: a\r\n\r\n"] {
+            let mut stream = connect(address);
+            stream.write_all(said.as_bytes()).expect("sent");
+            let started = Instant::now();
+            let is_whole = said.ends_with("\r\n\r\n");
+            assert_eq!(heard(stream).ends_with("here"), is_whole, "{said}");
+            assert!(started.elapsed() < Duration::from_secs(30), "{said}");
+        }
+    }
+
+    #[test]
+    fn a_connection_that_asks_again_and_again_has_its_time() {
+        let (address, _ends) = impatient(Duration::from_millis(600));
+        let mut stream = connect(address);
+        let mut told = [0; 256];
+        let started = Instant::now();
+        // A write or a read fails once it is ended.
+        while stream.write_all(b"GET / HTTP/1.1\r\nHost: a\r\n\r\n").is_ok()
+            && stream.read(&mut told).is_ok_and(|bytes| bytes > 0)
+        {
+            assert!(started.elapsed() < Duration::from_secs(30), "it goes on");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    #[test]
+    fn who_comes_when_there_are_too_many_is_told_so_and_places_are_free_again() {
+        let (address, _ends) = impatient(Duration::from_secs(600));
+        let ask = |mut stream: std::net::TcpStream| {
+            let asked = b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n";
+            stream.write_all(asked).expect("sent");
+            heard(stream)
+        };
+        let mut told = String::new();
+        let mut inside: Vec<std::net::TcpStream> = Vec::new();
+        while !told.starts_with("HTTP/1.1 503") {
+            // They keep their places for a while, and are ended then.
+            inside.clear();
+            inside.extend((0..128).map(|_| connect(address)));
+            told = ask(connect(address));
+        }
+        assert!(told.ends_with("try it again.\n"), "{told}");
+        drop(inside);
+        while !ask(connect(address)).ends_with("here") {}
+    }
+
+    #[test]
+    fn the_refusal_has_the_length_that_it_names() {
+        let text = String::from_utf8_lossy(TOO_MANY);
+        let (head, body) = text.split_once("\r\n\r\n").expect("a head");
+        assert!(
+            head.ends_with(&format!("content-length: {}", body.len())),
+            "{head} {}",
+            body.len()
+        );
+    }
+}

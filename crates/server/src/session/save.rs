@@ -1,0 +1,72 @@
+//! Scenarios that are saved: whole or not at all, and never over what somebody else wrote meanwhile.
+
+use crate::protocol::{Answer, Problem};
+use crate::write::{Target, replaced};
+use sidestep::scenario::Source;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// The file of a session, as it was read or written last.
+#[derive(Debug, Clone)]
+pub(super) struct OwnFile {
+    pub(super) path: PathBuf,
+    pub(super) text: String,
+}
+
+/// The scenario of a session, as others than its thread know it: its place is that of the file it was saved in last.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Shown(Arc<Mutex<Option<Source>>>);
+
+impl Shown {
+    /// Returns the scenario, once it is open.
+    pub(crate) fn source(&self) -> Option<Source> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Shows another one.
+    pub(super) fn set(&self, source: &Source) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(source.clone());
+    }
+}
+
+impl OwnFile {
+    /// Returns the file that a scenario was read from, unless it holds something that stands for the scenario.
+    pub(super) fn of(path: &Path, source: &Source) -> Option<Self> {
+        let read = Source::read(path, &[]).ok()?;
+        (read.text == source.text).then(|| Self { path: path.into(), text: read.text })
+    }
+}
+
+/// Returns a file's path, or the problem of a session that has none.
+pub(super) fn own_path(own: Option<&OwnFile>, place: &str) -> Result<String, Problem> {
+    let path = own.and_then(|own| own.path.to_str()).map(String::from);
+    path.ok_or_else(|| {
+        let remedy = "give a name that ends in .toml";
+        Problem::new(place, "the scenario is in no file yet", remedy)
+    })
+}
+
+/// Writes a text into a file, unless the file holds something else than the session knows of.
+///
+/// # Errors
+/// When it cannot be written; then the file is as it was.
+pub(super) fn saved(
+    target: &Target,
+    own: Option<&OwnFile>,
+    text: &str,
+    over: bool,
+) -> Result<Answer, Problem> {
+    let known = own.filter(|own| is_same(&own.path, target)).map(|own| own.text.as_str());
+    let may_replace = |found: Option<&str>| match found {
+        None => true,
+        Some(found) => over || known == Some(found) || found == text,
+    };
+    match replaced(target, text, known.is_some(), may_replace)? {
+        None => Ok(Answer::Saved { place: target.path.display().to_string() }),
+        Some(text) => Ok(Answer::Differs { text }),
+    }
+}
+
+fn is_same(path: &Path, target: &Target) -> bool {
+    path == target.path || path.canonicalize().is_ok_and(|real| real == target.real)
+}

@@ -1,0 +1,221 @@
+//! Files that a page may write: scenarios below the folders that were named at start, whole or not at all.
+
+use crate::files::Files;
+use crate::protocol::Problem;
+use serde_json::Value;
+use sidestep::scenario::Source;
+use std::fs::{self, File, OpenOptions, Permissions};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+
+/// Larger files are not replaced.
+const MOST_BYTES: u64 = 16 << 20;
+const GZIP_MAGIC: &[u8] = &[0x1f, 0x8b];
+const BYTE_ORDER_MARK: &str = "\u{feff}";
+
+/// A file that a page may write.
+#[derive(Debug)]
+pub(crate) struct Target {
+    /// Its path as it was named.
+    pub(crate) path: PathBuf,
+    /// Its path without links.
+    pub(crate) real: PathBuf,
+}
+
+/// A file that is replaced.
+struct Old {
+    text: String,
+    has_mark: bool,
+    permissions: Permissions,
+}
+
+impl Files {
+    /// Returns the file that a page may write at a path.
+    ///
+    /// # Errors
+    /// When it is elsewhere, hidden, or no plain file.
+    pub(crate) fn target(&self, path: &str) -> Result<Target, Problem> {
+        let refuse = |cause| {
+            let remedy = "name a .toml file below the folders that were named at start";
+            Err(Problem::new(path, cause, remedy))
+        };
+        let named = PathBuf::from(path);
+        // A folder that is not there and one that may not be read are told alike.
+        let real = real(&named).unwrap_or_default();
+        let Some(below) = self.below_root(&real) else {
+            return refuse("is in no folder below those that were named at start");
+        };
+        let is_hidden = |part: &std::ffi::OsStr| part.as_encoded_bytes().starts_with(b".");
+        if below.iter().any(is_hidden) {
+            return refuse("is hidden");
+        }
+        match fs::symlink_metadata(&real) {
+            Ok(found) if !found.is_file() => refuse("is no plain file"),
+            Ok(_) => Ok(Target { path: named, real }),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                Ok(Target { path: named, real })
+            }
+            Err(_) => refuse("cannot be read"),
+        }
+    }
+}
+
+/// Returns the path without links of a file that is there, or that can be made.
+fn real(path: &Path) -> Option<PathBuf> {
+    // A link to nowhere could be made to lead anywhere.
+    if path.is_symlink() || path.exists() {
+        return path.canonicalize().ok();
+    }
+    let folder = path.parent().filter(|folder| *folder != Path::new(""));
+    let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
+    Some(folder.join(path.file_name()?))
+}
+
+/// Replaces a file by a text, or makes it, if what it holds may be replaced. Otherwise returns what it holds.
+///
+/// # Errors
+/// When it cannot be written, or is another's and no scenario; then it is as it was.
+pub(crate) fn replaced(
+    target: &Target,
+    text: &str,
+    is_own: bool,
+    may_replace: impl Fn(Option<&str>) -> bool,
+) -> Result<Option<String>, Problem> {
+    let old = read(target)?;
+    if let Some(old) = &old {
+        check(target, old, is_own)?;
+    }
+    let found = old.as_ref().map(|old| old.text.as_str());
+    if !may_replace(found) {
+        return Ok(old.map(|old| old.text));
+    }
+    let growing = Growing::new(target).and_then(|growing| growing.filled(text, old.as_ref()));
+    let growing = growing.map_err(|error| unwritten(target, &error))?;
+    // It took a while to write it.
+    let again = read(target)?;
+    match again
+        .filter(|again| Some(again.text.as_str()) != found && !may_replace(Some(&again.text)))
+    {
+        Some(again) => Ok(Some(again.text)),
+        None => growing.finish(target).map(|()| None).map_err(|error| unwritten(target, &error)),
+    }
+}
+
+fn read(target: &Target) -> Result<Option<Old>, Problem> {
+    let told = |cause: String, remedy: &str| {
+        Err(Problem::new(target.path.display().to_string(), cause, remedy))
+    };
+    match try_read(&target.real) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(error) => told(format!("cannot be read: {error}"), "save it under another name"),
+        Ok((bytes, _)) if bytes.starts_with(GZIP_MAGIC) => {
+            told("is packed with gzip".into(), "unpack it, or save it under another name")
+        }
+        Ok((bytes, _)) if bytes.len() as u64 > MOST_BYTES => {
+            told(format!("has more than {MOST_BYTES} bytes"), "save it under another name")
+        }
+        Ok((bytes, permissions)) => match String::from_utf8(bytes) {
+            Err(_) => told("is no text (UTF-8)".into(), "save it under another name"),
+            Ok(text) => {
+                let plain = text.strip_prefix(BYTE_ORDER_MARK).map(String::from);
+                let has_mark = plain.is_some();
+                Ok(Some(Old { text: plain.unwrap_or(text), has_mark, permissions }))
+            }
+        },
+    }
+}
+
+fn try_read(path: &Path) -> io::Result<(Vec<u8>, Permissions)> {
+    let file = File::open(path)?;
+    let permissions = file.metadata()?.permissions();
+    let mut bytes = Vec::new();
+    file.take(MOST_BYTES + 1).read_to_end(&mut bytes)?;
+    Ok((bytes, permissions))
+}
+
+/// Refuses what is not replaced even where a page insists.
+fn check(target: &Target, old: &Old, is_own: bool) -> Result<(), Problem> {
+    let place = target.path.display().to_string();
+    if old.permissions.readonly() {
+        let remedy = "allow to write it, or save it under another name";
+        return Err(Problem::new(place, "may only be read", remedy));
+    }
+    let values = Source::new(place.as_str(), old.text.as_str(), "").parse::<Value>();
+    let is_scenario = values.is_ok_and(|values| values["world"].is_string());
+    match is_own || is_scenario || old.text.trim().is_empty() {
+        true => Ok(()),
+        false => {
+            let cause = "holds something else than a scenario";
+            Err(Problem::new(place, cause, "save it under another name"))
+        }
+    }
+}
+
+fn unwritten(target: &Target, error: &io::Error) -> Problem {
+    let remedy = match error.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "make room, and save again",
+        _ => "check that its folder may be written, or save it elsewhere",
+    };
+    let cause = format!("cannot be written: {error}; it is as it was");
+    Problem::new(target.path.display().to_string(), cause, remedy)
+}
+
+/// A file that is written beside the one that it will replace, and taken away if it does not.
+struct Growing {
+    path: PathBuf,
+    file: File,
+    is_done: bool,
+}
+
+impl Growing {
+    fn new(target: &Target) -> io::Result<Self> {
+        let name = format!(".sidestep-{:016x}.part", getrandom::u64().map_err(io::Error::other)?);
+        let path = target.real.with_file_name(name);
+        let file = OpenOptions::new().write(true).create_new(true).open(&path)?;
+        Ok(Self { path, file, is_done: false })
+    }
+
+    fn filled(mut self, text: &str, old: Option<&Old>) -> io::Result<Self> {
+        if let Some(old) = old {
+            self.file.set_permissions(old.permissions.clone())?;
+        }
+        if old.is_some_and(|old| old.has_mark) {
+            self.file.write_all(BYTE_ORDER_MARK.as_bytes())?;
+        }
+        self.file.write_all(text.as_bytes())?;
+        self.file.sync_all()?;
+        Ok(self)
+    }
+
+    fn finish(mut self, target: &Target) -> io::Result<()> {
+        fs::rename(&self.path, &target.real)?;
+        self.is_done = true;
+        sync_folder(&target.real)
+    }
+}
+
+impl Drop for Growing {
+    fn drop(&mut self) {
+        if !self.is_done {
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Makes the new name durable, where the system can.
+#[cfg(unix)]
+fn sync_folder(path: &Path) -> io::Result<()> {
+    match path.parent() {
+        Some(folder) => File::open(folder)?.sync_all(),
+        None => Ok(()),
+    }
+}
+
+/// Does nothing: other systems do not open folders.
+#[cfg(not(unix))]
+fn sync_folder(_path: &Path) -> io::Result<()> {
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,62 @@
+/** Two texts beside each other, line by line. */
+
+export interface DiffLine {
+  kind: "same" | "mine" | "theirs";
+  words: string;
+}
+
+/** Beyond so many pairs of lines that may match, the middle is told as replaced in whole. */
+const MOST_PAIRS = 4_000_000;
+
+/** What both texts have, what only the first, and what only the second. */
+export function differences(mine: string, theirs: string): DiffLine[] {
+  const [a, b] = [mine.split("\n"), theirs.split("\n")];
+  let head = 0;
+  while (head < a.length && head < b.length && a[head] === b[head]) head++;
+  let tail = 0;
+  while (tail < a.length - head && tail < b.length - head && a.at(-1 - tail) === b.at(-1 - tail)) tail++;
+  const same = (lines: string[]): DiffLine[] => lines.map((words) => ({ kind: "same", words }));
+  const middle = between(a.slice(head, a.length - tail), b.slice(head, b.length - tail));
+  return [...same(a.slice(0, head)), ...middle, ...same(a.slice(a.length - tail))];
+}
+
+function between(a: string[], b: string[]): DiffLine[] {
+  const mine = (words: string): DiffLine => ({ kind: "mine", words });
+  const theirs = (words: string): DiffLine => ({ kind: "theirs", words });
+  if (a.length * b.length > MOST_PAIRS) return [...a.map(mine), ...b.map(theirs)];
+  const longest = common(a, b);
+  const lines: DiffLine[] = [];
+  let [i, j] = [0, 0];
+  while (i < a.length || j < b.length) {
+    const here = longest[i]?.[j] ?? 0;
+    if (i < a.length && j < b.length && a[i] === b[j]) {
+      lines.push({ kind: "same", words: a[i++]! });
+      j++;
+    } else if (i < a.length && (j >= b.length || (longest[i + 1]?.[j] ?? 0) === here)) lines.push(mine(a[i++]!));
+    else lines.push(theirs(b[j++]!));
+  }
+  return lines;
+}
+
+/** Length of the longest common sequence of the rests from i and j on. */
+function common(a: string[], b: string[]): Uint32Array[] {
+  const table = Array.from({ length: a.length + 1 }, () => new Uint32Array(b.length + 1));
+  for (let i = a.length - 1; i >= 0; i--) {
+    for (let j = b.length - 1; j >= 0; j--) {
+      table[i]![j] = a[i] === b[j] ? table[i + 1]![j + 1]! + 1 : Math.max(table[i + 1]![j]!, table[i]![j + 1]!);
+    }
+  }
+  return table;
+}
+
+/** Only what differs, with so many lines around it; null stands for what was left out. */
+export function condensed(lines: readonly DiffLine[], around = 2): (DiffLine | null)[] {
+  const isNear = (at: number): boolean =>
+    lines.slice(Math.max(0, at - around), at + around + 1).some(({ kind }) => kind !== "same");
+  const shown: (DiffLine | null)[] = [];
+  lines.forEach((line, at) => {
+    if (isNear(at)) shown.push(line);
+    else if (shown.at(-1) !== null) shown.push(null);
+  });
+  return shown;
+}

@@ -1,0 +1,62 @@
+/** Airplanes with their routes. */
+
+import type { Edit, Place } from "../../protocol";
+import { numbersOf, sectionsOf, type Json, type Path, type Table } from "../keypath";
+import { insert, remove, removeFrom, rounded, set, type Item } from "./item";
+
+function pointOf(value: Json | undefined): Place | null {
+  const numbers = numbersOf(value, 2);
+  return numbers ? [numbers[0]!, numbers[1]!, 0] : null;
+}
+
+/** The way-points of an airplane, with their numbers in the text. */
+function routeOf(value: Table): { at: Place; index: number }[] {
+  const given = Array.isArray(value["way_points_m"]) ? value["way_points_m"] : [];
+  return given.flatMap((one, index) => {
+    const at = pointOf(one);
+    return at ? [{ at, index }] : [];
+  });
+}
+
+/** Headings are degrees from east, counter-clockwise. */
+export function headingTo([x0, y0]: Place, [x1, y1]: Place): number {
+  return Math.round((Math.atan2(y1 - y0, x1 - x0) * 180) / Math.PI);
+}
+
+export function airplaneItems(model: Table, m_per_px: number): Item[] {
+  return sectionsOf(model, "airplanes").flatMap(({ path, value }, i) => {
+    const start = pointOf(value["at_m"]);
+    if (!start) return [];
+    const words = typeof value["callsign"] === "string" ? value["callsign"] : `airplane ${i + 1}`;
+    const round = ([x, y]: Place): number[] => [rounded(x, m_per_px), rounded(y, m_per_px)];
+    const route = routeOf(value);
+    const own: Item = {
+      path, words: `${words}, its start`, kind: "start", outline_m: [start, ...route.map(({ at }) => at)], isClosed: false, at_m: start,
+      move: (to) => [set([...path, "at_m"], round(to))],
+      remove: () => [remove(path)],
+      turn: () => [set([...path, "heading_deg"], ((typeof value["heading_deg"] === "number" ? value["heading_deg"] : 0) + 90) % 360)],
+    };
+    const points = route.map(({ at, index }): Item => ({
+      path: [...path, "way_points_m", index], words: `way-point ${index + 1} of ${words}`, kind: "goal", outline_m: [at], isClosed: false, at_m: at,
+      move: (to) => [set([...path, "way_points_m", index], round(to))],
+      remove: () => removeFrom(path, "way_points_m", index, value),
+    }));
+    return [own, ...points];
+  });
+}
+
+/** An airplane that flies from one place to another. */
+export function putAirplane(from: Place, to: Place, m_per_px: number): Edit[] {
+  const round = ([x, y]: Place): number[] => [rounded(x, m_per_px), rounded(y, m_per_px)];
+  return [insert(["airplanes"], { at_m: round(from), heading_deg: headingTo(from, to), way_points_m: [round(to)] })];
+}
+
+/** One more way-point of the chosen airplane, else of the last. */
+export function putWayPoint(model: Table, at: Place, chosen: Path | null, m_per_px: number): Edit[] {
+  const all = sectionsOf(model, "airplanes").filter(({ value }) => value["at_m"] !== undefined);
+  const host = all.find(({ path }) => chosen && path.every((part, i) => part === chosen[i])) ?? all.at(-1);
+  if (!host) return [];
+  const place = [rounded(at[0], m_per_px), rounded(at[1], m_per_px)];
+  const path = [...host.path, "way_points_m"];
+  return [Array.isArray(host.value["way_points_m"]) ? insert(path, place) : set(path, [place])];
+}

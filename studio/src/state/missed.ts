@@ -1,0 +1,21 @@
+/** Frames that were left out while somebody looked. What was not seen anyway is no loss. */
+
+export class Missed {
+  #before = 0;
+  #forgiven = 0;
+  #wasWatched = false;
+
+  /** A frame says how many the server has left out so far; returns how many of them would have been seen. */
+  count(leftOut: number, isWatched: boolean): number {
+    if (!isWatched || !this.#wasWatched) this.#forgiven += Math.max(0, leftOut - this.#before);
+    this.#wasWatched = isWatched;
+    this.#before = leftOut;
+    return leftOut - this.#forgiven;
+  }
+
+  /** The server counts anew. */
+  reset(): void {
+    this.#before = this.#forgiven = 0;
+    this.#wasWatched = false;
+  }
+}

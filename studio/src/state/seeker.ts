@@ -1,0 +1,45 @@
+/** The way to cycles that were asked for: one at a time, and of further wishes the latest only. */
+
+export class Seeker {
+  #wish: number | null = null;
+  #way: Promise<boolean> | null = null;
+  #isSought = false;
+  readonly #go: (cycle: number) => Promise<boolean>;
+
+  /** `go` asks the server, and tells whether it came there. */
+  constructor(go: (cycle: number) => Promise<boolean>) {
+    this.#go = go;
+  }
+
+  /** Goes to a cycle, after the one that is on its way. Tells whether the last wish came true. */
+  to(cycle: number): Promise<boolean> {
+    this.#wish = cycle;
+    this.#isSought = true;
+    this.#way ??= this.#goOn();
+    return this.#way;
+  }
+
+  /** The server starts anew: what it shows next follows from nothing that was seen. */
+  jumped(): void {
+    this.#isSought = true;
+  }
+
+  /** A frame has come; returns whether it was sought, and does not just follow the one before. */
+  arrived(): boolean {
+    const isSought = this.#isSought;
+    // The one that comes after the answer is the last of a way.
+    if (this.#way === null) this.#isSought = false;
+    return isSought;
+  }
+
+  async #goOn(): Promise<boolean> {
+    let isThere = false;
+    while (this.#wish !== null) {
+      const cycle = this.#wish;
+      this.#wish = null;
+      isThere = await this.#go(cycle);
+    }
+    this.#way = null;
+    return isThere;
+  }
+}

@@ -1,0 +1,57 @@
+/**
+ * Memory of server and page over a long play of ten thousand robots. STUDIO_URL names a real server and STUDIO_PID its
+ * process, MINUTES how long it is played (60), SPEED how fast (10); skipped without them.
+ */
+
+import { readFileSync } from "node:fs";
+import type { Browser, CDPSession } from "playwright-core";
+import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import { launch, openPage, WAIT_MS } from "../browser";
+import { openCrowd } from "./crowd";
+
+const { STUDIO_URL: url = "", STUDIO_PID: pid = "", SPEED: speed = "10" } = process.env;
+const minutes = Number(process.env.MINUTES ?? "60");
+/** Until then caches fill, as they may. */
+const SETTLED = 1 / 12;
+const MOST = 1.1;
+
+function server_mb(): number {
+  const status = readFileSync(`/proc/${pid}/status`, "utf8");
+  return Number(/VmRSS:\s+(\d+) kB/.exec(status)![1]) / 1e3;
+}
+
+/** What is in use of the page's heap, garbage aside. */
+async function page_mb(client: CDPSession): Promise<number> {
+  await client.send("HeapProfiler.collectGarbage");
+  const { metrics } = await client.send("Performance.getMetrics");
+  return metrics.find((metric) => metric.name === "JSHeapUsedSize")!.value / 1e6;
+}
+
+describe.skipIf(url === "" || pid === "")("a real server", () => {
+  let browser: Browser;
+  beforeAll(async () => {
+    browser = await launch();
+  });
+  afterAll(async () => browser.close());
+
+  test("memory stays as it was after a while", { timeout: 60_000 * minutes + 2 * WAIT_MS }, async () => {
+    const { page, complaints } = await openPage(browser, url);
+    await openCrowd(page, true);
+    const client = await page.context().newCDPSession(page);
+    await client.send("Performance.enable");
+    await page.getByLabel("Speed", { exact: true }).selectOption(speed);
+    await page.getByRole("button", { name: "Play" }).click();
+    const measure = async (after: number): Promise<[number, number, string | null]> => {
+      await page.waitForTimeout(60_000 * minutes * after);
+      return [server_mb(), await page_mb(client), await page.getByTestId("cycle").textContent()];
+    };
+    const early = await measure(SETTLED);
+    const late = await measure(1 - SETTLED);
+    const told = ([server, heap, cycle]: [number, number, string | null]): string =>
+      `server ${server.toFixed(0)} MB, heap ${heap.toFixed(1)} MB at cycle ${cycle}`;
+    console.log(`after ${minutes * SETTLED} minutes ${told(early)}; after ${minutes} ${told(late)}`);
+    expect(late[0] / early[0]).toBeLessThanOrEqual(MOST);
+    expect(late[1] / early[1]).toBeLessThanOrEqual(MOST);
+    expect(complaints).toEqual([]);
+  });
+});

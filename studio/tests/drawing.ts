@@ -1,0 +1,39 @@
+/** A hand that draws on the canvas at places of the world. */
+
+import type { Page } from "playwright-core";
+
+export class Hand {
+  readonly #page: Page;
+
+  constructor(page: Page) {
+    this.#page = page;
+  }
+
+  /** Where a place of the world is on the screen. */
+  async at(x_m: number, y_m: number): Promise<[number, number]> {
+    const layer = this.#page.locator("canvas.layer");
+    await this.#page.waitForFunction(() => document.querySelector<HTMLElement>("canvas.layer")?.dataset.eye !== undefined);
+    return layer.evaluate((canvas: HTMLElement, [x, y]) => {
+      const [x0, y0, m] = canvas.dataset.eye!.split(" ").map(Number) as [number, number, number];
+      const box = canvas.getBoundingClientRect();
+      return [box.left + box.width / 2 + (x! - x0) / m, box.top + box.height / 2 - (y! - y0) / m] as [number, number];
+    }, [x_m, y_m]);
+  }
+
+  async click(x_m: number, y_m: number): Promise<void> {
+    await this.#page.mouse.click(...(await this.at(x_m, y_m)));
+  }
+
+  /** Presses at the first place, goes over the others, and lets go at the last. */
+  async drag(...places: [number, number][]): Promise<void> {
+    const points = await Promise.all(places.map(([x, y]) => this.at(x, y)));
+    await this.#page.mouse.move(...points[0]!);
+    await this.#page.mouse.down();
+    for (const point of points.slice(1)) await this.#page.mouse.move(...point, { steps: 6 });
+    await this.#page.mouse.up();
+  }
+
+  async tool(name: string): Promise<void> {
+    await this.#page.getByRole("group", { name: "Tools" }).getByRole("button", { name, exact: true }).click();
+  }
+}

@@ -1,0 +1,347 @@
+/** Changing a scenario on the canvas, in forms and as text, against a server of made-up worlds. */
+
+import type { Browser, Page } from "playwright-core";
+import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from "vitest";
+import type { Edit } from "../../src/protocol";
+import { launch, openNew, openPage, type Look } from "../browser";
+import { Hand } from "../drawing";
+import { FakeServer } from "../fake/server";
+
+const server = new FakeServer("dist");
+let browser: Browser;
+let page: Page;
+let hand: Hand;
+let complaints: string[];
+
+beforeAll(async () => {
+  await server.start();
+  browser = await launch();
+});
+afterAll(async () => {
+  await browser.close();
+  await server.stop();
+});
+beforeEach(() => {
+  server.calls.length = 0;
+  server.theirs = null;
+});
+afterEach(async () => {
+  await page.context().close();
+});
+
+async function visit(world: string, look: Look = {}): Promise<void> {
+  ({ page, complaints } = await openPage(browser, server.url, look));
+  await openNew(page, world);
+  hand = new Hand(page);
+}
+
+async function draws(world: string, look: Look = {}): Promise<void> {
+  await visit(world, look);
+  await page.getByRole("button", { name: "Edit", exact: true }).click();
+  await page.locator("canvas.layer").waitFor();
+  await checked();
+}
+
+async function checked(words = "no problems"): Promise<void> {
+  await page.getByTestId("check").filter({ hasText: words }).waitFor();
+}
+
+const edits = (): Edit[] => server.calls.flatMap((call) => (call.do === "edit" ? call.edits : []));
+
+/** Waits for so many edits and returns the last. */
+async function edited(count: number): Promise<Edit> {
+  await expect.poll(() => edits().length, { timeout: 30_000 }).toBe(count);
+  await checked();
+  return edits().at(-1)!;
+}
+
+const text = (): string => {
+  const call = server.calls.findLast((one) => one.do === "check");
+  return call?.do === "check" ? call.text : "";
+};
+
+describe("the canvas", () => {
+  test("a brush, a line, a rectangle and a fill draw the boxes that they cross, and the picture starts anew", async () => {
+    await draws("robots");
+    await hand.tool("Brush");
+    await hand.drag([1.25, 0.75], [3.25, 0.75]);
+    expect(await edited(1)).toEqual({ op: "paint", key: "map.ascii", cells: [2, 3, 4, 5, 6].map((column) => [4, column, "#"]) });
+    await expect.poll(() => server.calls.filter((call) => call.do === "restart").length, { timeout: 30_000 }).toBe(1);
+    await hand.tool("Line");
+    await hand.drag([3.75, 2.25], [4.25, 1.25]);
+    expect(await edited(2)).toMatchObject({ op: "paint", cells: [[1, 7, "#"], [2, 8, "#"], [3, 8, "#"]] });
+    await hand.tool("Eraser");
+    await hand.click(2.75, 1.25);
+    expect(await edited(3)).toEqual({ op: "paint", key: "map.ascii", cells: [[3, 5, "."]] });
+    await hand.tool("Rectangle");
+    await hand.drag([0.75, 1.25], [1.75, 2.25]);
+    expect(await edited(4)).toMatchObject({ cells: expect.objectContaining({ length: 8 }) });
+    await hand.tool("Fill");
+    await hand.click(1.25, 1.75);
+    expect(await edited(5)).toEqual({ op: "paint", key: "map.ascii", cells: [[2, 2, "#"]] });
+    for (let i = 0; i < 5; i++) await page.getByRole("button", { name: "Undo" }).click();
+    await checked();
+    expect(text()).toContain("#....#...#\n#........#\n##########");
+    expect(await page.getByRole("button", { name: "Undo" }).isDisabled()).toBe(true);
+    await page.keyboard.press("Control+y");
+    await checked();
+    expect(text()).toContain("#.#####..#");
+    expect(complaints).toEqual([]);
+  });
+
+  test("robots are put, moved, turned and taken away; a door makes its way through a wall", async () => {
+    await draws("robots");
+    await hand.tool("Robot");
+    await hand.click(3.25, 1.75);
+    expect(await edited(1)).toEqual({ op: "insert", key: "robots.0.at", at: null, value: [6, 3] });
+    await hand.tool("Select");
+    await hand.drag([1.5, 1], [2, 1]);
+    expect(await edited(2)).toEqual({ op: "set", key: "robots.0.at.0", value: [3, 1] });
+    await page.keyboard.press("r");
+    expect(await edited(3)).toEqual({ op: "set", key: "robots.0.at.0", value: [3, 1, 0] });
+    await hand.click(3.5, 2);
+    await page.keyboard.press("Delete");
+    expect(await edited(4)).toEqual({ op: "remove", key: "robots.0.at.1" });
+    await hand.tool("Door");
+    await hand.drag([4.75, 0.75], [4.75, 1.25]);
+    await expect.poll(() => edits().length).toBe(6);
+    expect(edits().slice(4)).toEqual([
+      { op: "paint", key: "map.ascii", cells: [[4, 9, "."], [3, 9, "."]] },
+      { op: "insert", key: "doors", at: null, value: { at: [[9, 1]], size: [1, 2], periodic: { open: 60, closed: 20 } } },
+    ]);
+    await hand.tool("Way-point");
+    await hand.click(2.25, 2.25);
+    expect((await edited(7)).key).toBe("robots.0.behaviour");
+  });
+
+  test("all of it goes by keys alone", async () => {
+    await draws("robots");
+    await page.locator("canvas.layer").focus();
+    await page.keyboard.press("3");
+    expect(await page.getByRole("button", { name: "Line", exact: true }).getAttribute("aria-pressed")).toBe("true");
+    await page.keyboard.press("1");
+    await page.keyboard.press("n");
+    await page.keyboard.press("Enter");
+    await page.keyboard.press("ArrowRight");
+    await page.keyboard.press("ArrowUp");
+    await page.keyboard.press("Enter");
+    expect(await edited(1)).toEqual({ op: "set", key: "robots.0.at.0", value: [3, 2] });
+    await page.keyboard.press("3");
+    await page.keyboard.press("Enter");
+    await page.keyboard.press("Shift+ArrowRight");
+    await page.keyboard.press("Enter");
+    expect(await edited(2)).toMatchObject({ op: "paint", key: "map.ascii" });
+    await page.keyboard.press("1");
+    await page.keyboard.press("n");
+    await page.keyboard.press("Delete");
+    expect(await edited(3)).toEqual({ op: "remove", key: "robots.0" });
+  });
+
+  test("obstacles of chains in space and routes of airplanes: told, put and moved", async () => {
+    await draws("chain");
+    await page.getByText("A scene in space is changed in its forms").waitFor();
+    await page.context().close();
+    await draws("airspace");
+    await hand.drag([-4000, 0], [-3000, 2000]);
+    const moved = await edited(1);
+    expect(moved).toMatchObject({ op: "set", key: "airplanes.0.at_m" });
+    const [x, y] = (moved as { value: number[] }).value;
+    expect(Math.hypot(x! + 3000, y! - 2000)).toBeLessThan(60);
+    await hand.tool("Way-point");
+    await hand.click(2000, -3000);
+    expect(await edited(2)).toMatchObject({ op: "insert", key: "airplanes.0.way_points_m" });
+    await hand.tool("Airplane");
+    await hand.drag([-2000, -2000], [-2000, 3000]);
+    expect(await edited(3)).toMatchObject({ op: "insert", key: "airplanes", value: { heading_deg: 90 } });
+  });
+
+  test("who plays wants to watch, and Run does", async () => {
+    await draws("robots");
+    await page.getByRole("button", { name: "Run", exact: true }).click();
+    await page.getByRole("button", { name: "Pause" }).waitFor();
+    expect(await page.locator("canvas.layer").count()).toBe(0);
+    await page.keyboard.press("e");
+    await page.locator("canvas.layer").waitFor();
+    await page.getByTestId("state").filter({ hasText: "paused" }).waitFor();
+  });
+});
+
+describe("a new drawing", () => {
+  test("begins with walls around, one robot and a brush", async () => {
+    ({ page, complaints } = await openPage(browser, server.url));
+    hand = new Hand(page);
+    await page.getByRole("button", { name: "Draw a new one…" }).click();
+    const dialog = page.getByRole("dialog", { name: "Draw a new scenario of robots" });
+    await dialog.getByLabel("Columns").fill("3");
+    await dialog.getByText("from 5").waitFor();
+    await dialog.getByLabel("Columns").fill("20");
+    await dialog.getByLabel("Rows", { exact: true }).fill("10");
+    await dialog.getByText("5 m by 2.5 m").waitFor();
+    await dialog.getByRole("button", { name: "Draw" }).click();
+    await page.locator("canvas.layer").waitFor();
+    await checked();
+    expect(text()).toContain(`${"#".repeat(20)}\n#${".".repeat(18)}#`);
+    expect(text()).toContain("at = [[9, 4]]");
+    expect(await page.getByRole("button", { name: "Brush", exact: true }).getAttribute("aria-pressed")).toBe("true");
+    expect(complaints).toEqual([]);
+  });
+});
+
+describe("forms", () => {
+  test("a field becomes one edit, its problem stands at it, and steps back go over all views", async () => {
+    await visit("robots");
+    await page.getByRole("tab", { name: "Forms" }).click();
+    await page.getByRole("button", { name: "robots 1: couriers" }).click();
+    const size = page.getByLabel("size", { exact: true });
+    await size.fill("2.5");
+    await size.press("Enter");
+    await page.getByText("write a whole number").waitFor();
+    expect(await size.getAttribute("aria-invalid")).toBe("true");
+    await size.fill("3");
+    await size.press("Enter");
+    expect(await edited(1)).toEqual({ op: "set", key: "robots.0.size", value: 3 });
+    await page.getByLabel("regime").selectOption("reliable");
+    expect(await edited(2)).toEqual({ op: "set", key: "robots.0.regime", value: "reliable" });
+    await page.getByRole("button", { name: "echo ✕" }).click();
+    expect(await edited(3)).toEqual({ op: "remove", key: "robots.0.sensors" });
+    await page.getByRole("button", { name: "Duplicate robots.0", exact: true }).click();
+    expect(await edited(4)).toMatchObject({ op: "insert", key: "robots", at: 1 });
+    await page.getByRole("heading", { name: "robots 2: couriers" }).waitFor();
+    await page.getByRole("button", { name: "Move robots.1 up" }).click();
+    expect(await edited(5)).toEqual({ op: "move", key: "robots.1", to: 0 });
+    await page.getByRole("button", { name: "Remove robots.0", exact: true }).click();
+    expect(await edited(6)).toEqual({ op: "remove", key: "robots.0" });
+    await page.getByLabel("Add a section").selectOption("record");
+    expect(await edited(7)).toEqual({ op: "set", key: "record", value: {} });
+    await page.getByLabel("events", { exact: true }).selectOption("false");
+    expect(await edited(8)).toEqual({ op: "set", key: "record.events", value: false });
+    // Two equal sections that change places change nothing: that was no step.
+    for (let i = 0; i < 7; i++) await page.getByRole("button", { name: "Undo" }).click();
+    await checked();
+    expect(await page.getByRole("button", { name: "Undo" }).isDisabled()).toBe(true);
+    expect(text()).toContain("# A made-up scenario.");
+    expect(complaints).toEqual([]);
+  });
+
+  test("a matrix sums its rows while one types, marks the wrong one, and scales it", async () => {
+    await visit("robots");
+    await page.getByRole("tab", { name: "Forms" }).click();
+    await page.getByRole("button", { name: "sensors: echo" }).click();
+    const cell = page.getByRole("textbox", { name: "wall, wall" });
+    await cell.fill("0.6");
+    expect(await page.getByLabel("Sum of wall").textContent()).toBe("0.8");
+    expect(edits()).toEqual([]);
+    await cell.press("Enter");
+    await checked("1 problem");
+    expect(edits()).toEqual([{ op: "set", key: "sensors.echo.confusion.wall.1", value: 0.6 }]);
+    expect(await cell.getAttribute("aria-invalid")).toBe("true");
+    await page.getByRole("cell", { name: /the row sums to 0.8/ }).waitFor();
+    await page.getByRole("button", { name: "Scale the row wall to 1" }).click();
+    expect(await edited(2)).toEqual({ op: "set", key: "sensors.echo.confusion.wall", value: [0.125, 0.75, 0.125] });
+    expect(await page.getByLabel("Sum of wall").textContent()).toBe("1");
+  });
+
+  test("a problem leads to its field", async () => {
+    await visit("robots");
+    await page.getByRole("tab", { name: "Forms" }).click();
+    await page.getByRole("button", { name: "sensors: echo" }).click();
+    await page.getByRole("textbox", { name: "robot, robot" }).fill("0.1");
+    await page.keyboard.press("Tab");
+    await checked("1 problem");
+    await page.getByRole("button", { name: "map", exact: true }).click();
+    await page.getByRole("list", { name: "Problems" }).getByRole("button").click();
+    await page.getByRole("textbox", { name: "robot, nothing" }).and(page.locator(":focus")).waitFor();
+  });
+});
+
+describe("text", () => {
+  test("problems are marked over all of their span, and keys are completed from the schema", async () => {
+    await visit("robots");
+    await page.getByRole("tab", { name: "Text" }).click();
+    const box = page.getByRole("textbox", { name: "Text of the scenario" });
+    await checked();
+    await box.click();
+    await page.keyboard.press("Control+End");
+    await page.keyboard.type("reg");
+    const list = page.getByRole("listbox");
+    await list.getByRole("option", { name: "regime" }).waitFor();
+    await list.getByRole("option", { name: "region" }).waitFor();
+    await page.getByText("Whose errors are on.").waitFor();
+    await page.keyboard.press("Escape");
+    for (let i = 0; i < 3; i++) await page.keyboard.press("Backspace");
+    await page.keyboard.type("cuont = 3");
+    await checked("1 problem");
+    expect(await page.locator(".cm-lintRange-error").textContent()).toBe("cuont");
+    await page.keyboard.press("Control+z");
+    await checked();
+    expect(text().endsWith("size = 2\n")).toBe(true);
+    expect(complaints).toEqual([]);
+  });
+
+  test("what was drawn is in the text, and what was typed in the picture", async () => {
+    await draws("robots");
+    await hand.tool("Robot");
+    await hand.click(3.25, 1.75);
+    await edited(1);
+    await page.getByRole("tab", { name: "Text" }).click();
+    await page.locator(".cm-line", { hasText: "at = [ [ 2, 1 ], [ 6, 3 ] ]" }).waitFor();
+  });
+});
+
+describe("saving", () => {
+  test("a new scenario asks where, a saved one does not, and leaving unsaved asks", async () => {
+    await draws("robots");
+    await hand.tool("Robot");
+    await hand.click(3.25, 1.75);
+    await edited(1);
+    await page.getByRole("toolbar", { name: "Editing" }).getByText("changed, not saved").waitFor();
+    await page.keyboard.press("Control+s");
+    const dialog = page.getByRole("dialog", { name: "Save as" });
+    await dialog.getByRole("button", { name: "more/" }).click();
+    await dialog.getByLabel("Name").fill("mine");
+    await dialog.getByRole("button", { name: "Save", exact: true }).click();
+    await expect.poll(() => server.calls.findLast((call) => call.do === "save")).toMatchObject({ to: "more/mine.toml", over: false });
+    await dialog.waitFor({ state: "detached" });
+    await hand.click(2.25, 2.25);
+    await edited(2);
+    await page.keyboard.press("Control+s");
+    await expect.poll(() => server.calls.filter((call) => call.do === "save").length).toBe(2);
+    expect(server.calls.findLast((call) => call.do === "save")).toMatchObject({ to: "more/mine.toml", over: false });
+    await hand.click(1.25, 2.25);
+    await edited(3);
+    const asked = new Promise<string>((told) => page.once("dialog", (one) => void one.dismiss().then(() => told(one.type()))));
+    await page.getByRole("button", { name: "Close Made-up hall" }).click();
+    expect(await asked).toBe("confirm");
+    expect(await page.locator("canvas.layer").count()).toBe(1);
+    const left = new Promise<string>((told) => page.once("dialog", (one) => void one.dismiss().then(() => told(one.type()))));
+    await page.close({ runBeforeUnload: true });
+    expect(await left).toBe("beforeunload");
+  });
+
+  test("a file that was changed meanwhile is shown, and mine or theirs stays", async () => {
+    ({ page, complaints } = await openPage(browser, server.url));
+    hand = new Hand(page);
+    await page.getByRole("button", { name: "Open…", exact: true }).click();
+    await page.getByRole("button", { name: /^robots\.toml/ }).click();
+    await page.locator(".view").waitFor();
+    await page.getByRole("tab", { name: "Text" }).click();
+    await checked();
+    await page.getByRole("textbox", { name: "Text of the scenario" }).click();
+    await page.keyboard.press("Control+Home");
+    await page.keyboard.type("# mine\n");
+    await checked();
+    server.theirs = "# theirs\nformat = 1\n";
+    await page.keyboard.press("Control+s");
+    const dialog = page.getByRole("dialog", { name: /was changed/ });
+    await dialog.locator(".mine", { hasText: "# mine" }).waitFor();
+    await dialog.locator(".theirs", { hasText: "# theirs" }).waitFor();
+    await dialog.getByRole("button", { name: "Take the file's" }).click();
+    await page.locator(".cm-line", { hasText: "# theirs" }).waitFor();
+    await page.keyboard.press("Control+z");
+    await page.locator(".cm-line", { hasText: "# mine" }).waitFor();
+    await page.keyboard.press("Control+s");
+    await dialog.getByRole("button", { name: "Keep mine" }).click();
+    await expect.poll(() => server.calls.findLast((call) => call.do === "save")).toMatchObject({ over: true });
+    await dialog.waitFor({ state: "detached" });
+  });
+});

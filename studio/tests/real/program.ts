@@ -1,0 +1,43 @@
+/** The real program behind the page as it was built: SIDESTEP_BINARY names it. */
+
+import { spawn, type ChildProcess } from "node:child_process";
+import { createInterface } from "node:readline";
+import { preview, type PreviewServer } from "vite";
+
+export const BINARY = process.env.SIDESTEP_BINARY ?? "";
+
+export class Program {
+  readonly url: string;
+  readonly #child: ChildProcess;
+  readonly #page: PreviewServer;
+
+  private constructor(url: string, child: ChildProcess, page: PreviewServer) {
+    this.url = url;
+    this.#child = child;
+    this.#page = page;
+  }
+
+  /** Starts it over a folder; the page comes from `dist` and hands its socket on. */
+  static async start(folder: string): Promise<Program> {
+    const child = spawn(BINARY, ["studio", "--no-open", "--port", "0", "--quiet", folder], { stdio: ["ignore", "pipe", "inherit"] });
+    const lines = createInterface({ input: child.stdout! });
+    const server = await new Promise<string>((told, failed) => {
+      lines.once("line", (line) => told(line.trim().replace(/\/$/, "")));
+      child.once("exit", (code) => failed(new Error(`the program ended with ${code}`)));
+    });
+    const proxy = {
+      "/socket": { target: server, ws: true, changeOrigin: true, rewriteWsOrigin: true },
+      "/enter": { target: server, changeOrigin: true },
+    };
+    const page = await preview({ configFile: false, logLevel: "silent", build: { outDir: "dist" }, preview: { port: 0, host: "127.0.0.1", proxy } });
+    const address = page.httpServer.address();
+    if (typeof address !== "object" || address === null) throw new Error("the page is not served");
+    return new Program(`http://127.0.0.1:${address.port}/`, child, page);
+  }
+
+  async stop(): Promise<void> {
+    this.#child.removeAllListeners("exit");
+    this.#child.kill();
+    await this.#page.close();
+  }
+}

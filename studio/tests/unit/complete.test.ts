@@ -1,0 +1,58 @@
+import { describe, expect, test } from "vitest";
+import { completionAt } from "../../src/edit/complete";
+import { World } from "../../src/edit/schema";
+import { modelOf, SCHEMA, TEXT } from "../fake/edit";
+
+const world = new World(SCHEMA);
+
+/** Labels at the mark `|` of a text. */
+function labels(text: string): string[] | null {
+  const at = text.indexOf("|");
+  return completionAt(text.replace("|", ""), at, world, modelOf(TEXT))?.options.map(({ label }) => label) ?? null;
+}
+
+describe("what can be written", () => {
+  test("keys of the section that the cursor is in", () => {
+    expect(labels("|")).toContain("seed");
+    expect(labels("[map]\nbo|")).toEqual(["box_size_m", "ascii"]);
+    expect(labels("[[robots]]\nsize = 2\nre|")).toContain("regime");
+    expect(labels("[[robots]]\n[map]\n|")).toEqual(["box_size_m", "ascii"]);
+    expect(labels("map.bo|")).toEqual(["box_size_m", "ascii"]);
+  });
+
+  test("keys and values of a table in one line", () => {
+    expect(labels("robots = [{ size = 1, re|")).toContain("regime");
+    expect(labels('map = { |')).toEqual(["box_size_m", "ascii"]);
+    expect(labels('robots = { regime = "|')).toEqual(['"reliable"', '"both"']);
+  });
+
+  test("values: choices, yes and no, names that the text itself has", () => {
+    expect(labels('[[robots]]\nregime = "b|')).toEqual(['"reliable"', '"both"']);
+    expect(labels("[record]\nevents = |")).toEqual(["true", "false"]);
+    expect(labels('[[robots]]\nsensors = ["|')).toEqual(['"sonar-ring"', '"echo"']);
+    expect(labels('[[robots]]\nsensors = ["echo", "|')).toEqual(['"sonar-ring"', '"echo"']);
+  });
+
+  test("sections in a header, by any name below a table of them", () => {
+    expect(labels("[ro|")).toEqual(["map", "sensors", "robots", "record"]);
+    expect(labels("[sensors.echo.|")).toEqual(["confusion"]);
+  });
+
+  test("nothing in comments, drawings, and where nothing is known", () => {
+    expect(labels("# se|")).toBe(null);
+    expect(labels('[map]\nascii = """\n##|')).toBe(null);
+    expect(labels("seed = 1 # se|")).toBe(null);
+    expect(labels("[nowhere]\n|")).toBe(null);
+    expect(labels("[[robots]]\nsize = |")).toBe(null);
+  });
+
+  test("what is chosen replaces what was typed of it", () => {
+    expect(completionAt("[map]\nbo", 8, world, null)?.from).toBe(6);
+    expect(completionAt('[[robots]]\nregime = "b', 22, world, null)?.from).toBe(20);
+  });
+
+  test("a description and the default come along", () => {
+    const seed = completionAt("se", 2, world, null)?.options.find(({ label }) => label === "seed");
+    expect(seed?.words).toBe("All randomness grows from it. [1]");
+  });
+});

@@ -1,0 +1,55 @@
+/** The first difference of two runs is found, and little is computed beyond it. */
+
+import { expect, test } from "vitest";
+import { differing, firstDifference } from "../../src/state/difference";
+import { Bodies } from "../../src/state/cast";
+import { decodeFrame, type Frame } from "../../src/decode";
+import type { Cast } from "../../src/protocol";
+import { encodeFrame } from "../fake/encode";
+
+/** Asks for the first difference of runs that part at a cycle; returns what was asked, too. */
+async function searched(last: number, parting: number): Promise<{ found: number | null; asked: number[] }> {
+  const asked: number[] = [];
+  const found = await firstDifference(last, (cycle) => (asked.push(cycle), Promise.resolve(cycle >= parting)));
+  return { found, asked };
+}
+
+test("every cycle of a run can be the first, and none", async () => {
+  for (const last of [0, 1, 2, 3, 100]) {
+    for (let parting = 0; parting <= last; parting++) expect((await searched(last, parting)).found, `${parting} of ${last}`).toBe(parting);
+    expect((await searched(last, last + 1)).found).toBeNull();
+  }
+});
+
+test("a difference early in a long run is found early", async () => {
+  const { found, asked } = await searched(1e9, 1000);
+  expect(found).toBe(1000);
+  expect(Math.max(...asked)).toBeLessThanOrEqual(2000);
+  expect(asked.length).toBeLessThan(25);
+});
+
+function bodies(numbers: number[]): Bodies {
+  const zeros = numbers.map(() => 0);
+  return new Bodies({
+    session: 1, cast: 1, kinds: ["robot"], kind: zeros, number: numbers, part: numbers.map(() => -1), is_agent: numbers.map(() => true),
+    names: [], shapes: [{ type: "sphere", radius_m: 1 }], shape: zeros, looks: [], look: zeros,
+  } as unknown as Cast);
+}
+
+function frame(places_m: number[], turns: number[], conditions: number[]): Frame {
+  return decodeFrame(encodeFrame({ session: 1, cast: 1, dimensions: 2, cycle: 1, time_s: 0, places_m, turns, lines: [], conditions }));
+}
+
+test("bodies that differ are found by who they are, whatever their order", () => {
+  const a = { bodies: bodies([1, 2, 3, 4]), frame: frame([0, 0, 1, 1, 2, 2, 3, 3], [0, 0, 0, 0], [0, 0, 0, 0]) };
+  const b = { bodies: bodies([3, 2, 1, 5]), frame: frame([2, 2, 1, 1, 0, 3, 9, 9], [1, 0, 0, 0], [0, 2, 0, 0]) };
+  const told = differing(a, b, (m) => `${m} m`).map(({ who, words }) => `${who.number} ${words}`);
+  expect(told).toEqual([
+    "1 is 3 m away", "2 is in another condition", "3 heads elsewhere", "4 is in one of them only", "5 is in one of them only",
+  ]);
+});
+
+test("runs that look alike have no body to name", () => {
+  const one = { bodies: bodies([1]), frame: frame([0, 0], [0], [0]) };
+  expect(differing(one, one, String)).toEqual([]);
+});

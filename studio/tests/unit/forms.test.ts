@@ -1,0 +1,128 @@
+import { describe, expect, test } from "vitest";
+import { differences, condensed } from "../../src/edit/diff";
+import { keyOf, partsOf, sectionsOf, settled, type Table } from "../../src/edit/keypath";
+import { World, unitOf } from "../../src/edit/schema";
+import { chancesOf, columnsOf, entriesOf, freeName, parted, readAny, readNumber, readNumbers, rowsOf, scaled, sumOf, valueEdits } from "../../src/edit/values";
+import { modelOf, SCHEMA, TEXT } from "../fake/edit";
+
+const world = new World(SCHEMA);
+const model = modelOf(TEXT);
+
+describe("paths of keys", () => {
+  test("what is not bare stands in quotes, to and fro", () => {
+    for (const parts of [["robots", "1", "at", "0"], ["kinds", "a.b", "observation"], ["x", 'say "so"'], ["ä", "b c"]]) {
+      expect(partsOf(keyOf(parts))).toEqual(parts);
+    }
+    expect(keyOf(["kinds", "a.b", "observation"])).toBe('kinds."a.b".observation');
+    expect(partsOf("kinds.'a.b'.x")).toEqual(["kinds", "a.b", "x"]);
+  });
+
+  test("a section that stands alone may be told as the first", () => {
+    const alone = { robots: { size: 2 }, doors: [{ at: [[1, 2]] }] };
+    expect(settled(alone, "robots.0.size")).toEqual(["robots", "size"]);
+    expect(settled(alone, "robots.size")).toEqual(["robots", "size"]);
+    expect(settled(alone, "doors.0.at.0.1")).toEqual(["doors", "0", "at", "0", "1"]);
+  });
+
+  test("one table counts as a list of one section", () => {
+    expect(sectionsOf({ robots: { size: 2 } }, "robots").map(({ path }) => path)).toEqual([["robots"]]);
+    expect(sectionsOf(model, "robots").map(({ path }) => path)).toEqual([["robots", 0]]);
+  });
+});
+
+describe("fields", () => {
+  test("types, limits, choices and sections come from the schema", () => {
+    const shape = (path: string[], value?: never): unknown => world.shapeOf(world.at(path)!, value);
+    expect(shape(["seed"])).toEqual({ kind: "number", isWhole: true, least: 0, most: null });
+    expect(shape(["robots", "0", "count"])).toEqual({ kind: "number", isWhole: true, least: 0, most: null });
+    expect(shape(["robots", "regime"])).toEqual({ kind: "choice", choices: [{ value: "reliable", words: "Nobody's." }, { value: "both", words: "" }] });
+    expect(shape(["record", "events"])).toEqual({ kind: "switch" });
+    expect(world.shapeOf(world.at(["robots"])!, undefined).kind).toBe("sections");
+    expect(world.shapeOf(world.at(["sensors"])!, undefined).kind).toBe("named");
+    expect(world.shapeOf(world.at(["map"])!, undefined)).toEqual({ kind: "table", keys: ["box_size_m", "ascii"] });
+    expect(world.at(["sensors", "echo", "confusion", "wall", "1"])).toEqual({ type: "number" });
+    expect(world.at(["nowhere"])).toBe(null);
+  });
+
+  test("units come from the names of keys", () => {
+    expect(["box_size_m", "v_m_s", "heading_deg", "dt_s", "omega_max_deg_s", "seed"].map((key) => unitOf(key))).toEqual(["m", "m/s", "°", "s", "°/s", ""]);
+  });
+
+  test("an empty field takes the key away, an equal one changes nothing", () => {
+    expect(valueEdits(["robots", 0, "size"], 3, 2)).toEqual([{ op: "set", key: "robots.0.size", value: 3 }]);
+    expect(valueEdits(["robots", 0, "size"], undefined, 2)).toEqual([{ op: "remove", key: "robots.0.size" }]);
+    expect(valueEdits(["seed"], undefined, undefined)).toEqual([]);
+    expect(valueEdits(["at"], [1, 2], [1, 2])).toEqual([]);
+  });
+
+  test("what cannot be read is told, and sends nothing", () => {
+    expect(readNumber("2.5", false)).toEqual({ value: 2.5 });
+    expect(readNumber("", false)).toEqual({ value: undefined });
+    expect(readNumber("2.5", true)).toEqual({ wrong: "write a whole number" });
+    expect(readNumber("inf", false)).toEqual({ wrong: "inf can be written in the text only" });
+    expect(readNumbers("0, 22.5 45")).toEqual({ value: [0, 22.5, 45] });
+    expect(readNumbers("a, b")).toHaveProperty("wrong");
+    expect(readAny("[0.4, 0.5]")).toEqual({ value: [0.4, 0.5] });
+    expect(readAny("fixed")).toEqual({ value: "fixed" });
+    expect(readAny("{ a = 1 }")).toHaveProperty("wrong");
+    expect(readAny("null")).toHaveProperty("wrong");
+  });
+
+  test("sections are listed, plain keys told from tables", () => {
+    expect(entriesOf(model, world).map(({ words }) => words)).toEqual(["Scenario", "map", "sensors: echo", "robots 1: couriers"]);
+    const sensor = (model["sensors"] as Table)["echo"] as Table;
+    expect(parted(world, world.at(["sensors", "echo"]), sensor)).toEqual({ plain: ["observations"], tables: ["confusion"] });
+    const robots = world.at(["robots", "0"]);
+    expect(parted(world, robots, {}).tables).toEqual([]);
+  });
+
+  test("a new name is one that nobody has", () => {
+    expect(freeName(["new", "new-2"], "new")).toBe("new-3");
+    expect(freeName([], "new")).toBe("new");
+  });
+});
+
+describe("rows of numbers", () => {
+  test("are known by name or by number, with the names of their columns", () => {
+    expect(rowsOf({ wall: [0.1, 0.9] }, ["c"])).toEqual([{ name: "wall", path: ["c", "wall"], values: [0.1, 0.9] }]);
+    expect(rowsOf([[1, 2], [3, 4]], ["at"])?.map(({ name }) => name)).toEqual(["1", "2"]);
+    expect(rowsOf([1, 2], ["at"])).toBe(null);
+    expect(rowsOf({ a: "b" }, [])).toBe(null);
+    expect(chancesOf([{ p: 0.9, path: "F" }, { p: 0.1 }])).toEqual([{ p: 0.9, rest: { path: "F" } }, { p: 0.1, rest: {} }]);
+    expect(chancesOf([{ path: "F" }])).toBe(null);
+    expect(columnsOf(model, ["sensors", "echo", "confusion"], 3)).toEqual(["nothing", "wall", "robot"]);
+    expect(columnsOf(model, ["sensors", "echo", "confusion"], 2)).toEqual(["1", "2"]);
+  });
+
+  test("a scaled row sums to exactly 1 and keeps its shares", () => {
+    expect(scaled([0.3, 0.3, 0.3])).toEqual([0.333334, 0.333333, 0.333333]);
+    expect(scaled([2, 1, 1])).toEqual([0.5, 0.25, 0.25]);
+    expect(scaled([0, 0])).toBe(null);
+    expect(scaled([1, -0.5])).toBe(null);
+    for (let n = 2; n < 40; n++) {
+      const row = scaled(Array.from({ length: n }, (_, i) => 1 + ((7 * i) % 5)))!;
+      expect(sumOf(row)).toBe(1);
+    }
+  });
+});
+
+describe("differences", () => {
+  test("tell what only one text has, with a little around it", () => {
+    const mine = Array.from({ length: 20 }, (_, i) => `line ${i}`);
+    const theirs = [...mine];
+    theirs[10] = "changed";
+    theirs.splice(12, 0, "added");
+    const lines = differences(mine.join("\n"), theirs.join("\n"));
+    expect(lines.filter(({ kind }) => kind === "mine").map(({ words }) => words)).toEqual(["line 10"]);
+    expect(lines.filter(({ kind }) => kind === "theirs").map(({ words }) => words)).toEqual(["changed", "added"]);
+    expect(lines.filter(({ kind }) => kind !== "theirs").map(({ words }) => words)).toEqual(mine);
+    const shown = condensed(lines);
+    expect(shown[0]).toBe(null);
+    expect(shown.length).toBeLessThan(12);
+  });
+
+  test("equal texts have none", () => {
+    expect(differences("a\nb", "a\nb").every(({ kind }) => kind === "same")).toBe(true);
+    expect(condensed(differences("a\nb", "a\nb"))).toEqual([null]);
+  });
+});

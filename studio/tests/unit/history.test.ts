@@ -1,0 +1,45 @@
+import { expect, test } from "vitest";
+import { History } from "../../src/edit/history";
+
+test("steps are undone one by one, to the first, and done again", () => {
+  const history = new History("a");
+  for (let i = 0; i < 5000; i++) history.push(`a${i}`, null, i);
+  for (let i = 4998; i >= 0; i--) {
+    history.undo();
+    expect(history.now).toBe(`a${i}`);
+  }
+  history.undo();
+  expect([history.now, history.canUndo, history.undo()]).toEqual(["a", false, false]);
+  history.redo();
+  expect(history.now).toBe("a0");
+});
+
+test("typing without a pause is one step, and an edit between is its own", () => {
+  const history = new History("");
+  history.push("w", "typing", 0);
+  history.push("wo", "typing", 300);
+  history.push("wor", "typing", 1200);
+  history.push("wor!", null, 1300);
+  history.push("wor!d", "typing", 1400);
+  const seen: string[] = [];
+  while (history.undo()) seen.push(history.now);
+  expect(seen).toEqual(["wor!", "wor", ""]);
+});
+
+test("a pause in typing ends a step", () => {
+  const history = new History("");
+  history.push("a", "typing", 0);
+  history.push("ab", "typing", 5000);
+  history.undo();
+  expect(history.now).toBe("a");
+});
+
+test("a new step drops those that were undone, and no step changes nothing", () => {
+  const history = new History("a");
+  history.push("b", null, 0);
+  history.push("b", null, 1);
+  history.undo();
+  expect(history.now).toBe("a");
+  history.push("c", null, 2);
+  expect([history.canRedo, history.redo(), history.now]).toEqual([false, false, "c"]);
+});

@@ -1,0 +1,18 @@
+/** Frames are lost on who looks; what nobody looks at loses nothing. */
+
+import { expect, test } from "vitest";
+import { Missed } from "../../src/state/missed";
+
+test("what is left out while somebody looks is counted", () => {
+  const missed = new Missed();
+  expect([0, 2, 5].map((n) => missed.count(n, true))).toEqual([0, 2, 5]);
+});
+
+test("what is left out while nobody looks is not, nor in the first frame afterwards", () => {
+  const missed = new Missed();
+  missed.count(0, true);
+  missed.count(3, true);
+  expect([9, 20].map((n) => missed.count(n, false))).toEqual([3, 3]);
+  expect(missed.count(40, true)).toBe(3);
+  expect(missed.count(41, true)).toBe(4);
+});

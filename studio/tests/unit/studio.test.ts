@@ -1,0 +1,162 @@
+/** After a loss the page says what it is, and everything goes on where it was, however often the server dies meanwhile. */
+
+import { beforeEach, expect, test, vi } from "vitest";
+import type { Socket } from "../../src/connection";
+import type { Standing } from "../../src/enter";
+import type { Call, Notice, Scene, Status } from "../../src/protocol";
+import { encodeFrame } from "../fake/encode";
+import { Studio } from "../../src/state/studio.svelte";
+
+const SCENE = { world: "robots", name: "Hall", dimensions: 2, cycle_s: 0.1, is_recording: false, floor: null, bodies: [] } as unknown as Scene;
+
+function status(more: Partial<Status> = {}): Status {
+  return {
+    session: 1, state: "paused", cycle: 0, cycles_planned: 1000, time_s: 0, speed: { times: 1 }, cycles_per_s: 0, seed: "7",
+    digest: null, banner: null, ...more,
+  };
+}
+
+/** A server's end of a socket: answers by hand. */
+class Line implements Socket {
+  binaryType = "";
+  onopen: (() => void) | null = null;
+  onclose: (() => void) | null = null;
+  onmessage: ((event: { data: unknown }) => void) | null = null;
+  readonly asked: { id: number; call: Call }[] = [];
+  send(text: string): void {
+    this.asked.push(JSON.parse(text) as { id: number; call: Call });
+  }
+  close(): void {}
+
+  greet(): void {
+    this.onopen!();
+    this.say({ notice: "hello", version: 1, program: "x", worlds: [], read_only: false, open: [] });
+  }
+  say(words: unknown): void {
+    this.onmessage?.({ data: JSON.stringify(words) });
+  }
+  calls(what: string): Call[] {
+    return this.asked.map(({ call }) => call).filter((call) => call.do === what);
+  }
+  /** Answers all questions of a kind that are open. */
+  async answer(what: string, answer: unknown): Promise<void> {
+    const found = this.asked.filter(({ call }) => call.do === what);
+    for (const { id } of found) this.asked.splice(this.asked.findIndex((one) => one.id === id), 1);
+    for (const { id } of found) this.say({ id, answer });
+    expect(found.length, `open questions: ${what}`).toBeGreaterThan(0);
+    await settled();
+  }
+}
+
+const settled = (): Promise<void> => vi.waitFor(() => Promise.resolve()).then(async () => {
+  for (let i = 0; i < 20; i++) await Promise.resolve();
+});
+const OPENED = { is: "opened", session: 1, scene: SCENE, status: status() };
+
+let lines: Line[];
+let retries: (() => void)[];
+let standing: Standing;
+let studio: Studio;
+
+beforeEach(async () => {
+  lines = [];
+  retries = [];
+  standing = "silent";
+  studio = new Studio({
+    open: () => (lines.push(new Line()), lines.at(-1)!),
+    after: (ms, then) => (ms === 6000 ? 0 : retries.push(then)),
+    cancel: () => undefined,
+    standing: () => Promise.resolve(standing),
+  });
+  studio.connect();
+  line().greet();
+  void studio.open({ kind: "new", world: "robots" });
+  await settled();
+  await line().answer("open", OPENED);
+});
+
+const line = (): Line => lines.at(-1)!;
+const session = () => studio.sessions[0]!;
+const tell = (more: Partial<Status>): void => line().say({ notice: "status", ...status(more) } satisfies Notice);
+
+function show(cycle: number): void {
+  line().say({ notice: "cast", session: 1, cast: 1, kinds: ["robot"], kind: [0], number: [0], part: [-1], is_agent: [true], names: [], shapes: [{ type: "sphere", radius_m: 1 }], shape: [0], looks: [], look: [0] });
+  const frame = encodeFrame({ session: 1, cast: 1, dimensions: 2, cycle, time_s: 0, places_m: [0, 0], turns: [0], lines: [], conditions: [0] });
+  line().onmessage!({ data: frame });
+}
+
+async function lose(): Promise<void> {
+  line().onclose!();
+  await settled();
+}
+
+async function back(): Promise<void> {
+  retries.at(-1)!();
+  line().greet();
+  await settled();
+}
+
+for (const [how, words] of [
+  ["silent", /does not answer/], ["token", /Open the whole address/], ["full", /is full.*Close one/], ["name", /does not take this address/], ["in", /connection was lost/],
+] as const) {
+  test(`a loss where the server is "${how}" is told as that`, async () => {
+    standing = how;
+    await lose();
+    expect(studio.banner).toMatchObject({ isBad: true, words: expect.stringMatching(words) });
+  });
+}
+
+test("a run that played goes to its cycle and plays on", async () => {
+  tell({ state: "playing", cycle: 345 });
+  show(345);
+  await lose();
+  await back();
+  await line().answer("open", OPENED);
+  expect(line().calls("seek")).toEqual([{ do: "seek", cycle: 345, session: 1 }]);
+  expect(line().calls("play")).toEqual([]);
+  await line().answer("seek", { is: "done" });
+  expect(line().calls("play").length).toBe(1);
+  expect(studio.banner).toEqual({ words: "Connected again; reopened Hall at cycle 345.", isBad: false });
+});
+
+test("a run that stood still stays so", async () => {
+  show(20);
+  await lose();
+  await back();
+  await line().answer("open", OPENED);
+  await line().answer("seek", { is: "done" });
+  expect(line().calls("play")).toEqual([]);
+});
+
+test("a server that dies while sessions are reopened is not told to be connected, and nothing is lost", async () => {
+  tell({ state: "playing", cycle: 345 });
+  show(345);
+  await lose();
+  await back();
+  await line().answer("open", OPENED);
+  show(3);
+  await lose();
+  expect(studio.banner!.isBad).toBe(true);
+  expect(studio.problems).toEqual([]);
+  await back();
+  await line().answer("open", OPENED);
+  await line().answer("seek", { is: "done" });
+  expect(studio.banner).toEqual({ words: "Connected again; reopened Hall at cycle 345.", isBad: false });
+  expect([line().calls("play").length, session().ended]).toEqual([1, null]);
+});
+
+test("what cannot be opened again is told, and opened the next time", async () => {
+  show(5);
+  await lose();
+  await back();
+  const { id } = line().asked.shift()!;
+  line().say({ id, problem: { place: "p", line: null, column: null, cause: "gone", remedy: "", is_warning: false } });
+  await settled();
+  expect(studio.banner!.words).toContain("1 could not be opened again");
+  expect(session().ended).not.toBeNull();
+  await lose();
+  await back();
+  await line().answer("open", OPENED);
+  await line().answer("seek", { is: "done" });
+  expect([session().ended, session().seed]).toEqual([null, 7]);
+});

@@ -1,0 +1,125 @@
+import { describe, expect, test } from "vitest";
+import { Board, groundOf } from "../../src/edit/board";
+import type { Table } from "../../src/edit/keypath";
+import { airplaneItems, headingTo, putAirplane, putWayPoint } from "../../src/edit/tools/airspace";
+import { chainItems, putBall, putBox, putWall } from "../../src/edit/tools/chain";
+import { around, putBody, putDoor, putGoal, robotItems } from "../../src/edit/tools/robots";
+
+const board = new Board("######\n#....#\n#....#\n######\n", 0.5);
+const ground = groundOf(board, null)!;
+
+describe("robots", () => {
+  const model: Table = {
+    robots: [{ at: [[1, 1], [3, 1, 2]], size: 2, behaviour: { kind: "goto", goals: [[4, 2]] } }, { count: 3, region: [1, 1, 4, 2] }],
+    people: { at: [[1, 2]], size: [1, 2] },
+  };
+  const items = robotItems(model, ground);
+  const item = (key: string) => items.find(({ path }) => path.join(".") === key)!;
+
+  test("stand where the program puts them: around the middle of their boxes", () => {
+    expect(item("robots.0.at.0").at_m).toEqual([1, 1, 0]);
+    expect(item("robots.0.at.0").outline_m).toEqual([[0.5, 0.5, 0], [1.5, 0.5, 0], [1.5, 1.5, 0], [0.5, 1.5, 0]]);
+    expect(item("people.at.0").at_m).toEqual([0.75, 1.5, 0]);
+    expect(item("robots.0.behaviour.goals.0").at_m).toEqual([2.25, 1.25, 0]);
+    expect(items.length).toBe(5);
+  });
+
+  test("are moved by whole boxes and keep their headings", () => {
+    expect(item("robots.0.at.0").move([1.3, 1.2, 0])).toEqual([{ op: "set", key: "robots.0.at.0", value: [2, 1] }]);
+    expect(item("robots.0.at.0").move([1, 1, 0])).toEqual([{ op: "set", key: "robots.0.at.0", value: [1, 1] }]);
+    expect(item("robots.0.at.1").move([1, 1, 0])).toEqual([{ op: "set", key: "robots.0.at.1", value: [1, 1, 2] }]);
+    expect(item("robots.1.region").move([2, 1, 0])).toEqual([{ op: "set", key: "robots.1.region", value: [2, 1, 4, 2] }]);
+  });
+
+  test("are turned by quarters, from east", () => {
+    expect(item("robots.0.at.0").turn!()).toEqual([{ op: "set", key: "robots.0.at.0", value: [1, 1, 0] }]);
+    expect(item("robots.0.at.1").turn!()).toEqual([{ op: "set", key: "robots.0.at.1", value: [3, 1, 3] }]);
+  });
+
+  test("go alone, and the last of a section with it", () => {
+    expect(item("robots.0.at.0").remove()).toEqual([{ op: "remove", key: "robots.0.at.0" }]);
+    expect(item("people.at.0").remove()).toEqual([{ op: "remove", key: "people" }]);
+  });
+
+  test("are put beside those that are chosen, never beside counted ones", () => {
+    expect(putBody(model, "robots", [2, 2], null)).toEqual([{ op: "insert", key: "robots.0.at", at: null, value: [2, 2] }]);
+    const [first] = putBody({ robots: { count: 4 } }, "robots", [2, 2], null);
+    expect(first).toMatchObject({ op: "insert", key: "robots", value: { at: [[2, 2]], size: 2 } });
+    expect(around([5, 5], 2)).toEqual([5, 5]);
+    expect(around([5, 5], 3)).toEqual([4, 4]);
+  });
+
+  test("a door takes the wall away that it stands in, and joins those of its size", () => {
+    const rect = { column: 5, row: 1, width: 1, height: 2 };
+    const [way, door] = putDoor(model, board, rect);
+    expect(way).toEqual({ op: "paint", key: "map.ascii", cells: [[2, 5, "."], [1, 5, "."]] });
+    expect(door).toMatchObject({ op: "insert", key: "doors", value: { at: [[5, 1]], size: [1, 2] } });
+    const more = putDoor({ doors: { at: [[0, 1]], size: [1, 2] } }, board, rect);
+    expect(more[1]).toEqual({ op: "insert", key: "doors.at", at: null, value: [5, 1] });
+  });
+
+  test("a way-point is added to the goals, or makes robots go somewhere", () => {
+    expect(putGoal(model, [2, 1], null)).toEqual([{ op: "insert", key: "robots.0.behaviour.goals", at: null, value: [2, 1] }]);
+    expect(putGoal(model, [2, 1], ["robots", 1])).toEqual([{ op: "set", key: "robots.1.behaviour", value: { kind: "goto", goals: [[2, 1]], repeat: true } }]);
+  });
+});
+
+describe("chains", () => {
+  const model: Table = {
+    obstacles: [{ at_m: [4, 1.5], radius_m: 0.5 }, { ends_m: [[2, -2], [5, -1]], radius_m: 0.2 }, { at_m: [7, 1], size_m: [2, 1], turn_deg: 90 }, { corners_m: [[0, 0], [1, 0], [0, 1]] }],
+    chains: { at_m: [0, 0], tasks: [{ kind: "targets", targets_m: [[12, 0]] }] },
+  };
+  const items = chainItems(model, 0.01);
+  const item = (key: string) => items.find(({ path }) => path.join(".") === key)!;
+
+  test("balls, walls, boxes, polygons, starts and targets can be touched", () => {
+    expect(item("obstacles.0").at_m).toEqual([4, 1.5, 0]);
+    expect(item("obstacles.1").at_m).toEqual([3.5, -1.5, 0]);
+    expect(item("obstacles.1.ends_m.1").at_m).toEqual([5, -1, 0]);
+    expect(item("obstacles.2").outline_m[0]!.map((v) => Math.abs(Math.round(v * 100) / 100))).toEqual([7.5, 0, 0]);
+    expect(item("obstacles.3.corners_m.2").at_m).toEqual([0, 1, 0]);
+    expect(item("chains.at_m").words).toBe("start of chain 1");
+    expect(item("chains.tasks.0.targets_m.0").at_m).toEqual([12, 0, 0]);
+  });
+
+  test("a wall moves as a whole, an end alone", () => {
+    expect(item("obstacles.1").move([4.5, -1.5, 0])).toEqual([{ op: "set", key: "obstacles.1.ends_m", value: [[3, -2], [6, -1]] }]);
+    expect(item("obstacles.1.ends_m.0").move([2.004, -2.5, 0])).toEqual([{ op: "set", key: "obstacles.1.ends_m.0", value: [2, -2.5] }]);
+    expect(item("obstacles.0").move([1, 1, 0])).toEqual([{ op: "set", key: "obstacles.0.at_m", value: [1, 1] }]);
+  });
+
+  test("a corner of a triangle takes the triangle with it", () => {
+    expect(item("obstacles.3.corners_m.0").remove()).toEqual([{ op: "remove", key: "obstacles.3" }]);
+    expect(item("chains.tasks.0.targets_m.0").remove()).toEqual([{ op: "remove", key: "chains.tasks.0" }]);
+  });
+
+  test("new ones are written as people write them", () => {
+    expect(putBall([1.23456, 2, 0], 0.5, 0.01)).toEqual([{ op: "insert", key: "obstacles", at: null, value: { at_m: [1.23, 2], radius_m: 0.5 } }]);
+    expect(putWall([0, 0, 0], [1, 1, 0], 0.01)[0]).toMatchObject({ value: { ends_m: [[0, 0], [1, 1]] } });
+    expect(putBox([0, 2, 0], [1, 0, 0], 0.01)[0]).toMatchObject({ value: { at_m: [0.5, 1], size_m: [1, 2] } });
+    expect(putBox([0, 0, 0], [1, 0, 0], 0.01)).toEqual([]);
+    expect(putWall([0, 0, 0], [0, 0, 0], 0.01)).toEqual([]);
+  });
+});
+
+describe("airplanes", () => {
+  const model: Table = { airplanes: [{ callsign: "ONE1", at_m: [-5000, 0], heading_deg: 0, way_points_m: [[0, 500], [5000, 0]] }, { track: [[0, 0, 0, 0]] }] };
+
+  test("have starts and way-points; recorded ones have none", () => {
+    const items = airplaneItems(model, 20);
+    expect(items.map(({ path }) => path.join("."))).toEqual(["airplanes.0", "airplanes.0.way_points_m.0", "airplanes.0.way_points_m.1"]);
+    expect(items[1]!.move([100.4, 400, 0])).toEqual([{ op: "set", key: "airplanes.0.way_points_m.0", value: [100, 400] }]);
+    expect(items[0]!.turn!()).toEqual([{ op: "set", key: "airplanes.0.heading_deg", value: 90 }]);
+  });
+
+  test("fly from where the drag began to where it ended, counter-clockwise from east", () => {
+    expect(headingTo([0, 0, 0], [0, 10, 0])).toBe(90);
+    expect(headingTo([0, 0, 0], [-10, 0, 0])).toBe(180);
+    expect(putAirplane([0, 0, 0], [0, 3000.4, 0], 20)).toEqual([{ op: "insert", key: "airplanes", at: null, value: { at_m: [0, 0], heading_deg: 90, way_points_m: [[0, 3000]] } }]);
+  });
+
+  test("a way-point goes to the chosen one, else to the last that is not recorded", () => {
+    expect(putWayPoint(model, [1, 2, 0], null, 1)).toEqual([{ op: "insert", key: "airplanes.0.way_points_m", at: null, value: [1, 2] }]);
+    expect(putWayPoint({}, [1, 2, 0], null, 1)).toEqual([]);
+  });
+});
