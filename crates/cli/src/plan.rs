@@ -5,7 +5,7 @@ use clap::Args;
 use sidestep::kernel::{InputError, workers};
 use sidestep::scenario::Compiled;
 use sidestep::scenario::Source;
-use sidestep_session::read;
+use sidestep_session::{problems, read};
 use std::path::PathBuf;
 
 /// The scenario, and the options that change it.
@@ -66,6 +66,14 @@ impl ScenarioArgs {
     /// When anything in it is wrong.
     pub(crate) fn compile(&self) -> Result<(Source, Box<dyn Compiled>), InputError> {
         read(worlds(), &self.file, &self.all_overrides())
+    }
+
+    /// Returns all that is wrong with the scenario and the options; none if it is right.
+    ///
+    /// # Errors
+    /// When the scenario cannot be read, or an override does not fit.
+    pub(crate) fn problems(&self) -> Result<Vec<InputError>, InputError> {
+        problems(worlds(), &self.file, &self.all_overrides())
     }
 
     fn all_overrides(&self) -> Vec<String> {

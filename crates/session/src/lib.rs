@@ -46,6 +46,6 @@ pub use recorded::{csv_table, stored_summary};
 pub use recording::Recording;
 pub use replay::{Replayed, replay_all, replay_to};
 pub use rerun::Recorded;
-pub use scenario::read;
+pub use scenario::{problems, read};
 pub use summary::{Phases, Status, Summary};
 pub use watcher::{Progress, Unwatched, Watcher};

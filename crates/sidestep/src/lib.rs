@@ -66,8 +66,10 @@
 //! part of the kernel, and the crate `sidestep-record` has one that writes Parquet.
 
 pub mod experiment;
+mod problems;
 pub mod worlds;
 
+pub use problems::{MOST as MOST_PROBLEMS, problems};
 pub use sidestep_collectives as collectives;
 pub use sidestep_document as document;
 pub use sidestep_import as import;

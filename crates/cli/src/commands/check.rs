@@ -6,6 +6,8 @@ use crate::plan::ScenarioArgs;
 use crate::worlds;
 use clap::Args;
 use serde_json::Value;
+use sidestep::MOST_PROBLEMS;
+use sidestep::kernel::InputError;
 use sidestep::kernel::words::Said;
 use sidestep::scenario::{Compiled, Foreign, Remark, Source};
 
@@ -31,7 +33,7 @@ pub(crate) struct CheckArgs {
 /// Runs the command.
 ///
 /// # Errors
-/// When the scenario is wrong.
+/// When one thing is wrong with the scenario. Several are printed, and told by the exit code alone.
 pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Failure> {
     let foreign = worlds().translate(&args.scenario.file)?;
     if let Some(Foreign { scenario: Err(error), json, lines }) = foreign {
@@ -41,7 +43,10 @@ pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Fail
         console.result(&json, || aligned(&lines));
         return Err(error.into());
     }
-    let (source, compiled) = args.scenario.compile()?;
+    let (source, compiled) = match args.scenario.compile() {
+        Ok(right) => right,
+        Err(first) => return tell_all(args, first, console),
+    };
     let mut found = compiled.contents(&source);
     if let Some(foreign) = foreign {
         if let (Some(all), Value::Object(more)) = (found.json.as_object_mut(), foreign.json) {
@@ -55,6 +60,21 @@ pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Fail
     let heading = format!("{} is a valid scenario\n", args.scenario.file.display());
     console.result(&found.json, || heading + &found.text + &in_words(&remarks));
     Ok(ExitCode::Done)
+}
+
+/// Prints all errors of a scenario of which `first` is one.
+///
+/// # Errors
+/// When that is the only one.
+fn tell_all(args: &CheckArgs, first: InputError, console: Console) -> Result<ExitCode, Failure> {
+    let all = args.scenario.problems().unwrap_or_default();
+    if all.len() < 2 {
+        return Err(all.into_iter().next().unwrap_or(first).into());
+    }
+    all.iter().for_each(|error| console.error(error));
+    let more = if all.len() == MOST_PROBLEMS { " at least" } else { "" };
+    console.error(format!("{}:{more} {} errors", args.scenario.file.display(), all.len()));
+    Ok(ExitCode::WrongInput)
 }
 
 /// Adds the memory that a run takes: that of this process, because a run begins in the same way.

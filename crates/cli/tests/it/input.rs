@@ -105,6 +105,21 @@ fn an_error_stands_where_it_stands_in_the_file_whatever_is_set() {
 }
 
 #[test]
+fn check_tells_all_errors_and_their_number() {
+    let place = Place::new();
+    let wrong = SCENARIO.replace("seed = 5", "seed = \"five\"").replace("sonar-8", "sonar-9");
+    place.write("s.toml", wrong.replace("cycles = 3000", "cylces = 3000"));
+    let ended = place.run(&["check", "s.toml"]);
+    let err = ended.err();
+    assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{err}");
+    for words in ["did you mean `cycles`?", "invalid type", "did you mean `sonar-8`?"] {
+        assert_eq!(err.matches(words).count(), 1, "{err}");
+    }
+    assert!(err.ends_with("error: s.toml: 3 errors\n"), "{err}");
+    assert_eq!(refused(&place, "s.toml", &[]).matches("error: ").count(), 1);
+}
+
+#[test]
 fn a_wrong_override_is_named() {
     let place = Place::new();
     for wrong in ["seed", "seed.x=1", "robots.9.count=1", "nothing.at.all=1"] {

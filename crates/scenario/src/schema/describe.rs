@@ -78,11 +78,19 @@ fn add_titles(schema: &mut Value) {
     match schema {
         Value::Array(many) => many.iter_mut().for_each(add_titles),
         Value::Object(members) => {
+            let own = members.get("description").cloned();
             if let Some(Value::Object(keys)) = members.get_mut("properties") {
+                let is_alone = keys.len() == 1;
                 for (key, part) in keys.iter_mut() {
                     let (quantity, unit) = split_unit(key);
                     let Some(part) = part.as_object_mut() else { continue };
                     part.insert("title".into(), quantity.replace('_', " ").into());
+                    // Names of alternatives mean what these mean.
+                    if let Some(own) =
+                        own.clone().filter(|_| is_alone || part.contains_key("const"))
+                    {
+                        part.entry("description").or_insert(own);
+                    }
                     if let Some(unit) = unit {
                         part.insert("x-unit".into(), unit.into());
                     }

@@ -229,13 +229,17 @@ pub(crate) fn checked(
     source: &Source,
     text: String,
 ) -> Result<Vec<Problem>, Problem> {
+    let syntax = Source { text: text.clone(), ..source.clone() }.syntax_errors();
+    if !means.read_only && !syntax.is_empty() {
+        return Ok(syntax.iter().map(problem).collect());
+    }
     let source = match other_text(means, source, text) {
         Err(problem) if means.read_only => return Err(problem),
         Err(problem) => return Ok(vec![problem]),
         Ok(source) => source,
     };
     Ok(match means.worlds.compile(&source) {
-        Err(error) => vec![problem(&error)],
+        Err(_) => sidestep::problems(means.worlds, &source).iter().map(problem).collect(),
         Ok(compiled) => {
             let remarks = compiled.remarks().into_iter();
             let told = remarks.map(|remark| Problem {

@@ -120,6 +120,20 @@ fn keys(root: &Value, part: &Value, way: &str, found: &mut Vec<(String, Value)>)
     }
 }
 
+#[test]
+fn every_key_says_what_it_is() {
+    let mut silent: Vec<String> = Vec::new();
+    for world in WORLDS.names() {
+        let schema = schema_of(world);
+        let mut all = Vec::new();
+        keys(&schema, &schema, "", &mut all);
+        assert!(all.len() > 80, "{world}: {}", all.len());
+        let without = all.iter().filter(|(_, part)| part.get("description").is_none());
+        silent.extend(without.map(|(way, _)| format!("{world}: {way}")));
+    }
+    assert!(silent.is_empty(), "{silent:#?}");
+}
+
 /// Returns the digest of a run after some cycles; none of a scenario that is wrong.
 fn digest(text: &str) -> Option<String> {
     let source = Source::new("s.toml", text, "");

@@ -30,6 +30,7 @@ pub(super) struct AirplaneSection {
     pub(super) appears_s: Option<Time>,
     /// Recorded track: [t_s, x_m, y_m, altitude_m], ...
     track: Option<Spanned<Vec<[f64; 4]>>>,
+    /// Orders on its way, one thing each.
     #[serde(default)]
     orders: Vec<Spanned<OrderSection>>,
     /// Speed, if not that of all.

@@ -44,11 +44,13 @@ pub enum Preset {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct AirspaceFile {
+    /// Methods by which airplanes avoid each other, and the air that they fly in.
     #[serde(default)]
     airspace: AirspaceSection,
     airplane: Option<ModelSection>,
     #[serde(default)]
     airplanes: Sections<AirplaneSection>,
+    /// Tables that a run keeps.
     #[serde(default)]
     record: RecordSection,
 }

@@ -165,6 +165,7 @@ struct ChainFile<const D: usize> {
     fields: Sections<FieldSection<D>>,
     #[serde(default)]
     chains: Sections<ChainSection<D>>,
+    /// Tables that a run keeps.
     #[serde(default)]
     record: RecordSection,
 }

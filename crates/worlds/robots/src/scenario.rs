@@ -228,7 +228,7 @@ pub(super) struct RobotSection {
 #[serde(deny_unknown_fields)]
 pub(super) struct BehaviourSection {
     /// Name of the behavior.
-    pub(super) kind: String,
+    pub(super) kind: Spanned<String>,
     /// Mean number of actions between turns of one who wanders.
     pub(super) turn_every: Option<u32>,
     /// One end of a shuttle: [column, row, width, height].

@@ -45,15 +45,19 @@ struct CorridorSection {
     /// Its width.
     width_m: f64,
     /// Its legs, one after the other.
-    legs: Option<Vec<LegSection>>,
+    legs: Option<Vec<Spanned<LegSection>>>,
 }
 
 /// `{ straight_m = 8 }` or `{ radius_m = 2, turn_deg = 90 }`.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
-#[serde(untagged, deny_unknown_fields)]
-enum LegSection {
-    Straight { straight_m: f64 },
-    Bend { radius_m: f64, turn_deg: f64 },
+#[serde(deny_unknown_fields)]
+struct LegSection {
+    /// Length of a straight leg.
+    straight_m: Option<f64>,
+    /// Radius of a bend.
+    radius_m: Option<f64>,
+    /// Turn of a bend, positive to the left.
+    turn_deg: Option<f64>,
 }
 
 /// One obstacle: a ball (`at_m`, `radius_m`), a capsule or a thin wall (`ends_m`), a box
@@ -216,14 +220,24 @@ impl<const D: usize> Compiler<'_, D> {
         let corridor = match &s.legs {
             None => Corridor::pinned(s.width_m),
             Some(legs) => {
-                let leg = |leg: &LegSection| match *leg {
-                    LegSection::Straight { straight_m } => Leg::Straight { length_m: straight_m },
-                    LegSection::Bend { radius_m, turn_deg } => Leg::Bend { radius_m, turn_deg },
-                };
-                Corridor::new(legs.iter().map(leg).collect(), s.width_m)
+                let legs: Result<Vec<Leg>, _> = legs.iter().map(|leg| self.leg(leg)).collect();
+                Corridor::new(legs?, s.width_m)
             }
         };
         corridor.map_err(|error| self.source.error_of(given.span(), &error))
+    }
+
+    fn leg(&self, given: &Spanned<LegSection>) -> Result<Leg, InputError> {
+        let LegSection { straight_m, radius_m, turn_deg } = *given.get_ref();
+        match (straight_m, radius_m, turn_deg) {
+            (Some(length_m), None, None) => Ok(Leg::Straight { length_m }),
+            (None, Some(radius_m), Some(turn_deg)) => Ok(Leg::Bend { radius_m, turn_deg }),
+            _ => {
+                let remedy = "give straight_m, or radius_m and turn_deg";
+                let cause = "a leg that is neither straight nor a bend";
+                Err(self.source.error(given.span(), cause, remedy))
+            }
+        }
     }
 
     fn add_obstacle(

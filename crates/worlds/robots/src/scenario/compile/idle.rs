@@ -85,9 +85,10 @@ fn behaviour(
     s: &BehaviourSection,
     own: &Behaviours,
 ) -> Result<(), InputError> {
-    let known = match BEHAVIOURS.iter().find(|(kind, _)| *kind == s.kind) {
+    let own_kind = s.kind.get_ref().as_str();
+    let known = match BEHAVIOURS.iter().find(|(kind, _)| *kind == own_kind) {
         Some((_, keys)) => *keys,
-        None if own.contains_key(&s.kind) => &[],
+        None if own.contains_key(own_kind) => &[],
         // Its name is wrong, and that is what is to be told.
         None => return Ok(()),
     };
@@ -100,7 +101,7 @@ fn behaviour(
             Some((other, _)) => format!("leave it out: it is a key of `{other}`"),
             None => "leave it out".into(),
         };
-        return error(key, format!("`{key}` does nothing in the behaviour `{}`", s.kind), remedy);
+        return error(key, format!("`{key}` does nothing in the behaviour `{own_kind}`"), remedy);
     }
     let lists = [
         ("goals", s.goals.as_ref().is_some_and(Vec::is_empty), "[col, row]"),

@@ -26,7 +26,7 @@ const SILENT: [&str; 5] = ["wander", "shuttle", "goto", "replay", "random"];
 pub(super) fn on_radio(file: &RobotsFile) -> Option<Remark> {
     let speaks = |section: &Spanned<RobotSection>| {
         let behaviour = section.get_ref().behaviour.as_ref();
-        behaviour.is_some_and(|b| !SILENT.contains(&b.get_ref().kind.as_str()))
+        behaviour.is_some_and(|b| !SILENT.contains(&b.get_ref().kind.get_ref().as_str()))
     };
     let is_idle = file.radio.is_some() && !file.robots.0.iter().any(speaks);
     is_idle.then(|| Remark::note("radio", "nobody speaks: no robot has a behavior that broadcasts"))

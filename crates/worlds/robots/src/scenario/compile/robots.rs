@@ -156,7 +156,7 @@ impl Compiler<'_> {
         let ways = Ways { compiler: self, free: &free, size, span: section.span() };
         let avoidance = || self.avoidance(s.avoidance, &free, size, body);
         let actions = &body.effector.actions;
-        let behaviour: Arc<dyn Behaviour> = match s.kind.as_str() {
+        let behaviour: Arc<dyn Behaviour> = match s.kind.get_ref().as_str() {
             "wander" => Arc::new(wander(s)),
             "announce" => Arc::new(Announce { wander: wander(s), size }),
             "shuttle" => {
@@ -177,10 +177,13 @@ impl Compiler<'_> {
             "external" => Arc::new(External),
             other => match self.own.get(other) {
                 Some(own) => Arc::clone(own),
-                None => return Err(error(self.unknown_behaviour(other))),
+                None => {
+                    let (cause, remedy) = self.unknown_behaviour(other);
+                    return Err(self.source.error(s.kind.span(), cause, remedy));
+                }
             },
         };
-        let waits = ["wander", "shuttle", "goto"].contains(&s.kind.as_str());
+        let waits = ["wander", "shuttle", "goto"].contains(&s.kind.get_ref().as_str());
         let is_waiting = waits && !behaviour.asks() && self.has_no_contacts(body);
         Ok(if is_waiting { Arc::new(Patient { inner: behaviour }) } else { behaviour })
     }
@@ -250,7 +253,10 @@ impl Ways<'_, '_> {
 /// Returns the value of a key that a behavior cannot do without.
 fn needed<T>(s: &BehaviourSection, key: &str, given: Option<T>, example: &str) -> Result<T, Wrong> {
     given.ok_or_else(|| {
-        (format!("behaviour `{}` needs `{key}`", s.kind), format!("add {key} = {example}"))
+        (
+            format!("behaviour `{}` needs `{key}`", s.kind.get_ref()),
+            format!("add {key} = {example}"),
+        )
     })
 }
 

@@ -1,0 +1,130 @@
+//! All that is wrong with a scenario, instead of the first thing alone.
+//!
+//! Readers and compilers stop at the first error. So it is told, mended in a draft of the text, and
+//! the draft is compiled again, until nothing is wrong any more. A draft is never shown: places and
+//! quoted lines are those of the text as it was given. What may only follow from the mending is not
+//! told; it will be once its cause is gone, if it is a mistake of its own.
+//!
+//! ```text
+//!         ┌──────────────────── draft, with the mended text ◄───────────┐
+//!         ▼                                                             │
+//!     compile ──error──> told, at its place in the given text ──> repairs, the likeliest first
+//! ```
+
+mod draft;
+mod repair;
+mod tree;
+
+use crate::scenario::{Source, Worlds};
+use draft::Draft;
+use repair::{Repair, repairs};
+use serde_json::Value;
+use sidestep_kernel::InputError;
+
+/// Most errors that are told.
+pub const MOST: usize = 20;
+/// Most compilations of drafts, as some take long.
+const MOST_DRAFTS: usize = 150;
+
+/// Returns what is wrong with a scenario, in the order of its text and at most [`MOST`] errors; none
+/// if it compiles. Errors of syntax are told alone, as nothing else is known before they are mended.
+pub fn problems(worlds: Worlds, source: &Source) -> Vec<InputError> {
+    let Err(first) = worlds.compile(source) else { return Vec::new() };
+    let mut told = source.syntax_errors();
+    if told.is_empty() {
+        let mut search = Search::new(worlds, source);
+        search.run(first);
+        told = search.told;
+    }
+    told.sort_by_key(|error| error.position());
+    told.truncate(MOST);
+    told
+}
+
+/// The search for further errors.
+struct Search<'a> {
+    worlds: Worlds,
+    source: &'a Source,
+    told: Vec<InputError>,
+    /// Keys to which drafts give values, or none, that their author did not mean.
+    guessed: Vec<Vec<String>>,
+    drafts: usize,
+}
+
+/// A draft, and what is wrong with it.
+struct Step {
+    draft: Draft,
+    error: Option<InputError>,
+}
+
+impl<'a> Search<'a> {
+    fn new(worlds: Worlds, source: &'a Source) -> Self {
+        Self { worlds, source, told: Vec::new(), guessed: Vec::new(), drafts: 0 }
+    }
+
+    fn run(&mut self, first: InputError) {
+        let draft = Draft::new(self.source.clone());
+        let mut step = Step { draft, error: Some(first) };
+        while let Some(error) = step.error.take()
+            && self.told.len() < MOST
+        {
+            self.tell(&step.draft, &error);
+            match self.mended(&step.draft, &error) {
+                Some(next) => step = next,
+                None => return,
+            }
+        }
+    }
+
+    /// Tells an error, unless it was told before or may follow from what a draft says.
+    fn tell(&mut self, draft: &Draft, error: &InputError) {
+        let told = draft.in_the_given_text(self.source, error);
+        let follows = self.guessed.iter().any(|key| repair::may_follow(error, key));
+        let place = |one: &InputError| (one.place().to_string(), one.position(), one.end());
+        let is_known = |one: &InputError| {
+            one == &told || (told.position().is_some() && place(one) == place(&told))
+        };
+        if !follows && !self.told.iter().any(is_known) {
+            self.told.push(told);
+        }
+    }
+
+    /// Returns a draft in which an error is mended; none if there is no such draft. Of all repairs the
+    /// first is taken from which nothing seems to follow.
+    fn mended(&mut self, draft: &Draft, error: &InputError) -> Option<Step> {
+        let mut forced: Option<(Repair, Step)> = None;
+        for repair in repairs(draft, error, &self.schema(draft)) {
+            let Some(draft) = repair.applied_to(draft) else { continue };
+            if self.drafts == MOST_DRAFTS {
+                return None;
+            }
+            self.drafts += 1;
+            let next = self.worlds.compile(draft.source()).err();
+            let may_follow = next.as_ref().is_some_and(|next| repair.may_lead_to(next));
+            let is_same = next.as_ref().is_some_and(|next| is_same(next, error));
+            let step = Step { draft, error: next };
+            if !may_follow && !is_same {
+                self.guessed.extend(repair.guess());
+                return Some(step);
+            }
+            if !is_same && forced.is_none() {
+                forced = Some((repair, step));
+            }
+        }
+        let (repair, step) = forced?;
+        self.guessed.push(repair.target().to_vec());
+        Some(step)
+    }
+
+    /// Returns the schema of the draft's world.
+    fn schema(&self, draft: &Draft) -> Value {
+        let world = draft.source().value("world");
+        let world = world.as_ref().and_then(toml::Value::as_str);
+        world.and_then(|name| self.worlds.schema(Some(name))).unwrap_or_default()
+    }
+}
+
+/// Whether two drafts have the same error, wherever it stands.
+fn is_same(one: &InputError, other: &InputError) -> bool {
+    (one.key(), one.cause()) == (other.key(), other.cause())
+}

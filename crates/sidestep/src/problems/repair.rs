@@ -1,0 +1,228 @@
+//! Repairs of an error: what its author may have meant, or nothing at all.
+
+use super::draft::Draft;
+use super::tree::{find, way};
+use crate::scenario::schema;
+use serde_json::Value;
+use sidestep_kernel::InputError;
+
+/// Most examples that are tried for a key.
+const MOST_EXAMPLES: usize = 3;
+
+/// A change to a draft.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Repair {
+    /// The key that is changed.
+    target: Vec<String>,
+    what: What,
+    /// Whether its author is likely to have meant it.
+    is_meant: bool,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum What {
+    /// The key has another name.
+    Rename(String),
+    /// The key has another value.
+    Replace(String),
+    /// The key is new, and has this value.
+    Insert(String),
+    /// The key is gone.
+    Remove,
+}
+
+/// Returns repairs of an error, the likeliest first.
+pub(super) fn repairs(draft: &Draft, error: &InputError, schema: &Value) -> Vec<Repair> {
+    let own = error.key().map(way).unwrap_or_default();
+    let mut all = meant(draft, error, &own);
+    all.extend(missing(draft, error, &own, schema));
+    if !own.is_empty() {
+        // A section with all its keys gives fewer errors that only follow.
+        all.extend(others(draft, &own, schema));
+        all.push(Repair::guessed(&own, What::Remove));
+    }
+    for count in (1..own.len()).rev() {
+        all.push(Repair::guessed(&own[..count], What::Remove));
+    }
+    all
+}
+
+/// Returns what the error's remedy takes for what was meant.
+fn meant(draft: &Draft, error: &InputError, own: &[String]) -> Vec<Repair> {
+    let meant = between(error.remedy(), "did you mean `", "`");
+    let (Some(meant), Some(wrong)) = (meant, between(error.cause(), "`", "`")) else {
+        return Vec::new();
+    };
+    let what = if own.last().is_some_and(|name| name == wrong) {
+        let is_there = find(draft.text(), &[&own[..own.len() - 1], &[meant.to_string()]].concat());
+        match is_there {
+            Some(_) => return Vec::new(),
+            None => What::Rename(toml_edit::Key::new(meant).display_repr().into_owned()),
+        }
+    } else {
+        What::Replace(toml::Value::from(meant).to_string())
+    };
+    vec![Repair { target: own.to_vec(), what, is_meant: true }]
+}
+
+/// Returns insertions of a key that is missing.
+fn missing(draft: &Draft, error: &InputError, own: &[String], schema: &Value) -> Vec<Repair> {
+    let named = between(error.cause(), "the key `", "` is missing");
+    let named = named.or_else(|| between(error.cause(), "the row `", "` is missing"));
+    let Some(name) = named.or_else(|| between(error.remedy(), "add ", " = ")) else {
+        return Vec::new();
+    };
+    let name = name.trim_matches('`');
+    let target = [own, &[name.to_string()]].concat();
+    let lists = find(draft.text(), own).map(|found| found.lists).unwrap_or_default();
+    let values = examples(schema, &target).chain(lists.into_iter().take(1));
+    values.map(|value| Repair::guessed(&target, What::Insert(value))).collect()
+}
+
+/// Returns other values for a key: those that its world shows, and that of a list beside it.
+fn others(draft: &Draft, own: &[String], schema: &Value) -> Vec<Repair> {
+    let Some(found) = find(draft.text(), own) else { return Vec::new() };
+    let values = examples(schema, own).chain(found.lists.into_iter().take(1));
+    values.map(|value| Repair::guessed(own, What::Replace(value))).collect()
+}
+
+fn examples(schema: &Value, key: &[String]) -> impl Iterator<Item = String> {
+    // Elements of arrays have no place of their own in a schema.
+    let names: Vec<String> = key.iter().filter(|p| p.parse::<usize>().is_err()).cloned().collect();
+    let is_element = key.last().is_some_and(|part| part.parse::<usize>().is_ok());
+    let known = if is_element { Vec::new() } else { schema::examples(schema, &names) };
+    let texts = known.into_iter().filter_map(|value| toml::Value::try_from(value).ok());
+    texts.map(|value| value.to_string()).take(MOST_EXAMPLES)
+}
+
+fn between<'a>(text: &'a str, before: &str, after: &str) -> Option<&'a str> {
+    text.split_once(before)?.1.split_once(after).map(|(inside, _)| inside)
+}
+
+impl Repair {
+    fn guessed(target: &[String], what: What) -> Self {
+        Self { target: target.to_vec(), what, is_meant: false }
+    }
+
+    /// Returns the key that it changes.
+    pub(super) fn target(&self) -> &[String] {
+        &self.target
+    }
+
+    /// Returns the key to which it gives a value, or none, that its author did not mean.
+    pub(super) fn guess(&self) -> Option<Vec<String>> {
+        (!self.is_meant).then(|| self.target.clone())
+    }
+
+    /// Returns the draft with this change; none if it does not fit.
+    pub(super) fn applied_to(&self, draft: &Draft) -> Option<Draft> {
+        let parts = match &self.what {
+            What::Rename(name) => vec![(find(draft.text(), &self.target)?.name?, name.clone())],
+            What::Replace(value) => vec![(find(draft.text(), &self.target)?.value?, value.clone())],
+            What::Remove => {
+                let parts = find(draft.text(), &self.target)?.parts;
+                parts.into_iter().map(|part| (part, String::new())).collect()
+            }
+            What::Insert(value) => {
+                let (name, table) = self.target.split_last()?;
+                let at = find(draft.text(), table)?.inside?;
+                let line = format!("{} = {value}", toml_edit::Key::new(name).display_repr());
+                let (before, after) = match draft.text()[at.clone()].chars().next() {
+                    None => ("", "\n"),
+                    Some('{') => (" ", ","),
+                    Some(_) => ("\n", ""),
+                };
+                vec![(at.end..at.end, format!("{before}{line}{after}"))]
+            }
+        };
+        draft.with(parts)
+    }
+
+    /// Whether an error of the draft with this change may only be there because of it.
+    pub(super) fn may_lead_to(&self, next: &InputError) -> bool {
+        let key = next.key().map(way).unwrap_or_default();
+        // What was put there may be wrong, too.
+        let is_inside = self.what != What::Remove && key.starts_with(&self.target);
+        is_inside || (!self.is_meant && may_follow(next, &self.target))
+    }
+}
+
+/// Whether an error may only be there because of a value, or none, that was guessed for a key: one of a
+/// table around it, unless that misses another key, or one elsewhere that names it.
+pub(super) fn may_follow(error: &InputError, guessed: &[String]) -> bool {
+    let Some(key) = error.key().map(way) else { return true };
+    if error.cause().starts_with("unknown key") {
+        return false;
+    }
+    if let Some(name) = guessed.strip_prefix(&key[..]).and_then(|rest| rest.first()) {
+        let missing = between(error.cause(), "the key `", "` is missing");
+        return missing.is_none_or(|missing| missing == name);
+    }
+    // Keys beside it may have nothing to do.
+    let table = &guessed[..guessed.len().saturating_sub(1)];
+    if error.cause().contains("does nothing") && key.starts_with(table) {
+        return true;
+    }
+    let is_name = |part: &&String| part.parse::<usize>().is_err() && !key.contains(part);
+    guessed.iter().filter(is_name).any(|name| mentions(error, name))
+}
+
+fn mentions(error: &InputError, name: &str) -> bool {
+    let is_part = |c: char| c.is_alphanumeric() || "_-".contains(c);
+    let says = |text: &str| text.split(|c| !is_part(c)).any(|word| word == name);
+    // A remedy of the reader's names the world, and sections may have its name.
+    let is_of_the_reader = error.remedy().starts_with("see what");
+    says(error.cause()) || (!is_of_the_reader && says(error.remedy()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::Source;
+    use serde_json::json;
+
+    const TEXT: &str = "[[robots]]\ncuont = 3\nkind = \"cat\"\nat = [1, 2]\n";
+
+    /// Returns the texts to which repairs of an error lead.
+    fn repaired(part: &str, cause: &str, remedy: &str) -> Vec<String> {
+        let draft = Draft::new(Source::new("s.toml", TEXT, ""));
+        let start = TEXT.find(part).expect(part);
+        let error = draft.source().error(start..start + part.len(), cause, remedy);
+        let schema = json!({ "properties": { "robots": { "properties": {
+            "kind": { "examples": ["person"] }, "size": { "examples": [2] },
+        } } } });
+        let all = repairs(&draft, &error, &schema);
+        all.iter().filter_map(|one| one.applied_to(&draft)).map(|d| d.text().into()).collect()
+    }
+
+    #[test]
+    fn what_was_meant_comes_first_and_what_is_around_last() {
+        let texts = repaired("cuont", "unknown key `cuont`", "did you mean `count`?");
+        assert_eq!(texts[0], TEXT.replace("cuont", "count"));
+        assert_eq!(texts[1], TEXT.replace("cuont = 3", ""));
+        assert_eq!(texts.last().map(String::as_str), Some(""));
+        let texts = repaired("\"cat\"", "unknown kind `cat`", "did you mean `cart`?");
+        assert_eq!(texts[0], TEXT.replace("cat", "cart"));
+        assert_eq!(texts[1], TEXT.replace("cat", "person"));
+        let texts = repaired("[[robots]]", "the key `size` is missing", "add `size = ...`");
+        assert_eq!(texts[0], TEXT.replace("[[robots]]", "[[robots]]\nsize = 2"));
+    }
+
+    #[test]
+    fn what_may_follow_from_a_repair_is_known_by_its_key_and_by_its_words() {
+        let repair = |key: &str, what: What| Repair::guessed(&way(key), what);
+        let error = |key: &str, cause: &str| InputError::new("s", cause, "r").with_key(key);
+        let gone = repair("sensors.eye", What::Remove);
+        assert!(gone.may_lead_to(&error("robots.0.sensors.0", "unknown sensor `eye`")));
+        assert!(gone.may_lead_to(&InputError::new("s", "no robots", "add some")));
+        assert!(!gone.may_lead_to(&error("robots.0.effector", "unknown effector `ear`")));
+        assert!(!gone.may_lead_to(&error("robots.0.eye", "unknown key `eye`")));
+        let other = repair("robots.0.size", What::Replace("2".into()));
+        assert!(other.may_lead_to(&error("robots.0.size", "size = 2")));
+        assert!(other.may_lead_to(&error("robots.0", "no place is free")));
+        assert!(!other.may_lead_to(&error("robots.0", "the key `kind` is missing")));
+        assert!(!other.may_lead_to(&error("robots.1", "no place is free")));
+        assert!(other.may_lead_to(&error("people.0", "no place beside a size of 2")));
+        assert!(!other.may_lead_to(&error("people.0.size", "size = 0")));
+    }
+}
