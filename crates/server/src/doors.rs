@@ -1,4 +1,4 @@
-//! How many connections there may be: of one peer, so that it cannot keep out all others, and in all.
+//! The number of connections that there may be: of one peer, so that it cannot keep out all others, and in all.
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;

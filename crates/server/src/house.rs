@@ -25,7 +25,7 @@ pub(crate) struct House {
     pub(crate) means: Means,
     /// The rules of who may ask.
     pub(crate) guard: Guard,
-    /// Where results are made.
+    /// The place where results are made.
     pub(crate) workshop: Workshop,
     program: String,
     open: Vec<Named>,

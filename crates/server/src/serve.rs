@@ -179,7 +179,7 @@ mod tests {
         stream
     }
 
-    /// What is said until the connection ends; a cut one has said nothing more.
+    /// The words that are said until the connection ends; a cut one has said nothing more.
     fn heard(mut stream: std::net::TcpStream) -> String {
         let mut said = Vec::new();
         let _ = stream.read_to_end(&mut said);

@@ -130,7 +130,7 @@ most: number, } | { "do": "source",
  */
 session: number, } | { "do": "tables",
 /**
- * Which session.
+ * The session.
  */
 session: number, } | { "do": "runs",
 /**
@@ -164,7 +164,11 @@ session: number,
 /**
  * The text.
  */
-text: string, } | { "do": "save",
+text: string, } | { "do": "schema",
+/**
+ * The world's name.
+ */
+world: string, } | { "do": "save",
 /**
  * The session.
  */
@@ -395,7 +399,11 @@ value: unknown,
  * Files that a key of the text can name, as it would name them: those below its folder, and those
  * elsewhere that it names.
  */
-files: Array<string>, } | { "is": "saved",
+files: Array<string>, } | { "is": "schema",
+/**
+ * A JSON Schema.
+ */
+schema: unknown, } | { "is": "saved",
 /**
  * The file, which is the session's place from now on.
  */

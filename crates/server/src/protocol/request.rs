@@ -119,7 +119,7 @@ pub enum Call {
     },
     /// Asks for the names of the tables of a recording, which can be exported.
     Tables {
-        /// Which session.
+        /// The session.
         session: SessionId,
     },
     /// Asks for the runs of a sweep.

@@ -48,10 +48,10 @@ async fn made(house: &House, fields: &Fields) -> Result<Response, Failed> {
     Ok((about, bytes).into_response())
 }
 
-/// What is wanted of a run.
+/// The part of a run that is wanted, and its format.
 struct Wanted {
     form: Form,
-    /// What is added to the name of the run.
+    /// The text that is added to the name of the run.
     ending: String,
     media: &'static str,
     cycle: Option<Cycle>,

@@ -24,7 +24,7 @@ use crate::protocol::Problem;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 
-/// Why there is no result.
+/// The reason why there is no result.
 pub(super) struct Failed(StatusCode, Problem);
 
 impl Failed {
