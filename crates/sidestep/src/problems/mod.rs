@@ -17,7 +17,7 @@ mod tree;
 
 use crate::scenario::{Source, Worlds};
 use draft::Draft;
-use repair::{Repair, repairs};
+use repair::{Guess, Repair, repairs};
 use serde_json::Value;
 use sidestep_kernel::InputError;
 
@@ -47,7 +47,7 @@ struct Search<'a> {
     source: &'a Source,
     told: Vec<InputError>,
     /// Keys to which drafts give values, or none, that their author did not mean.
-    guessed: Vec<Vec<String>>,
+    guessed: Vec<Guess>,
     drafts: usize,
 }
 
@@ -79,7 +79,7 @@ impl<'a> Search<'a> {
     /// Tells an error, unless it was told before or may follow from what a draft says.
     fn tell(&mut self, draft: &Draft, error: &InputError) {
         let told = draft.in_the_given_text(self.source, error);
-        let follows = self.guessed.iter().any(|key| repair::may_follow(error, key));
+        let follows = self.guessed.iter().any(|guess| guess.may_lead_to(error));
         let place = |one: &InputError| (one.place().to_string(), one.position(), one.end());
         let is_known = |one: &InputError| {
             one == &told || (told.position().is_some() && place(one) == place(&told))
@@ -112,7 +112,7 @@ impl<'a> Search<'a> {
             }
         }
         let (repair, step) = forced?;
-        self.guessed.push(repair.target().to_vec());
+        self.guessed.push(repair.into());
         Some(step)
     }
 

@@ -104,14 +104,9 @@ impl Repair {
         Self { target: target.to_vec(), what, is_meant: false }
     }
 
-    /// Returns the key that it changes.
-    pub(super) fn target(&self) -> &[String] {
-        &self.target
-    }
-
-    /// Returns the key to which it gives a value, or none, that its author did not mean.
-    pub(super) fn guess(&self) -> Option<Vec<String>> {
-        (!self.is_meant).then(|| self.target.clone())
+    /// Returns what its author did not mean, if that is what it makes.
+    pub(super) fn guess(&self) -> Option<Guess> {
+        (!self.is_meant).then(|| self.clone().into())
     }
 
     /// Returns the draft with this change; none if it does not fit.
@@ -140,31 +135,54 @@ impl Repair {
 
     /// Whether an error of the draft with this change may only be there because of it.
     pub(super) fn may_lead_to(&self, next: &InputError) -> bool {
+        let guess = Guess::from(self.clone());
         let key = next.key().map(way).unwrap_or_default();
-        // What was put there may be wrong, too.
-        let is_inside = self.what != What::Remove && key.starts_with(&self.target);
-        is_inside || (!self.is_meant && may_follow(next, &self.target))
+        if self.is_meant { guess.holds(&key) } else { guess.may_lead_to(next) }
     }
 }
 
-/// Whether an error may only be there because of a value, or none, that was guessed for a key: one of a
-/// table around it, unless that misses another key, or one elsewhere that names it.
-pub(super) fn may_follow(error: &InputError, guessed: &[String]) -> bool {
-    let Some(key) = error.key().map(way) else { return true };
-    if error.cause().starts_with("unknown key") {
-        return false;
+/// A key to which a draft gives a value, or none, that its author did not mean.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Guess {
+    key: Vec<String>,
+    is_removed: bool,
+}
+
+impl From<Repair> for Guess {
+    fn from(repair: Repair) -> Self {
+        Self { key: repair.target, is_removed: repair.what == What::Remove }
     }
-    if let Some(name) = guessed.strip_prefix(&key[..]).and_then(|rest| rest.first()) {
-        let missing = between(error.cause(), "the key `", "` is missing");
-        return missing.is_none_or(|missing| missing == name);
+}
+
+impl Guess {
+    /// Whether a key is in the value that it gives. Where an element was removed, the next one has its
+    /// number.
+    fn holds(&self, key: &[String]) -> bool {
+        !self.is_removed && key.starts_with(&self.key)
     }
-    // Keys beside it may have nothing to do.
-    let table = &guessed[..guessed.len().saturating_sub(1)];
-    if error.cause().contains("does nothing") && key.starts_with(table) {
-        return true;
+
+    /// Whether an error may only be there because of this: one in the value, one of a table around it,
+    /// unless that misses another key, or one elsewhere that names it.
+    pub(super) fn may_lead_to(&self, error: &InputError) -> bool {
+        let Some(key) = error.key().map(way) else { return true };
+        if self.holds(&key) {
+            return true;
+        }
+        if error.cause().starts_with("unknown key") {
+            return false;
+        }
+        if let Some(name) = self.key.strip_prefix(&key[..]).and_then(|rest| rest.first()) {
+            let missing = between(error.cause(), "the key `", "` is missing");
+            return missing.is_none_or(|missing| missing == name);
+        }
+        // Keys beside it may have nothing to do.
+        let table = &self.key[..self.key.len().saturating_sub(1)];
+        if error.cause().contains("does nothing") && key.starts_with(table) {
+            return true;
+        }
+        let is_name = |part: &&String| part.parse::<usize>().is_err() && !key.contains(part);
+        self.key.iter().filter(is_name).any(|name| mentions(error, name))
     }
-    let is_name = |part: &&String| part.parse::<usize>().is_err() && !key.contains(part);
-    guessed.iter().filter(is_name).any(|name| mentions(error, name))
 }
 
 fn mentions(error: &InputError, name: &str) -> bool {

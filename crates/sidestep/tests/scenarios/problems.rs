@@ -83,40 +83,19 @@ impl Mistakes<'_> {
 
     fn value(&mut self, value: &Spanned<DeValue<'_>>, key: &[String]) {
         let span = value.span();
+        let last = key.last().map_or("", String::as_str);
         match value.get_ref() {
             DeValue::Table(table) => {
-                if self.text[span.clone()].starts_with('[') && !key.is_empty() {
+                let is_named = key.iter().any(|part| NAMES.contains(&part.as_str()));
+                if self.text[span.clone()].starts_with('[') && !is_named {
                     let unknown = [key, &["nonsense".to_string()]].concat();
-                    let is_named = key.iter().any(|part| NAMES.contains(&part.as_str()));
-                    if !is_named {
-                        let at = span.end..span.end;
-                        self.add(&unknown, "an unknown key", at, "\nnonsense = 1");
-                    }
+                    let at = span.end..span.end;
+                    self.add(&unknown, "an unknown key", at, "\nnonsense = 1");
                 }
                 self.table(table, key);
             }
-            DeValue::Array(many) => {
-                if key.iter().any(|part| part.contains("confusion")) {
-                    let doubled = format!("[0.75, {}", &self.text[span.start + 1..span.end]);
-                    self.add(key, "a bad row", span, doubled);
-                } else if key.last().is_some_and(|last| last == "sensors") {
-                    let at = many.first().expect("a sensor").span();
-                    let element = [key, &["0".to_string()]].concat();
-                    self.add(&element, "an unknown name", at, "\"nobody\"");
-                } else if !self.is_header(value) {
-                    self.add(key, "a wrong type", span, "true");
-                    for (i, one) in many.iter().enumerate() {
-                        if one.get_ref().is_table() {
-                            self.value(one, &[key, &[i.to_string()]].concat());
-                        }
-                    }
-                } else {
-                    for (i, one) in many.iter().enumerate() {
-                        self.value(one, &[key, &[i.to_string()]].concat());
-                    }
-                }
-            }
-            DeValue::String(_) if ["effector", "kind"].contains(&key.last().unwrap().as_str()) => {
+            DeValue::Array(many) => self.array(value, many, key),
+            DeValue::String(_) if ["effector", "kind"].contains(&last) => {
                 self.add(key, "an unknown name", span, "\"nobody\"");
             }
             DeValue::Integer(_) | DeValue::Float(_) => {
@@ -127,6 +106,30 @@ impl Mistakes<'_> {
             }
             DeValue::Boolean(_) => self.add(key, "a wrong type", span, "\"maybe\""),
             _ => self.add(key, "a wrong type", span, "[[]]"),
+        }
+    }
+
+    fn array(
+        &mut self,
+        value: &Spanned<DeValue<'_>>,
+        many: &[Spanned<DeValue<'_>>],
+        key: &[String],
+    ) {
+        let span = value.span();
+        if key.iter().any(|part| part.contains("confusion")) {
+            let doubled = format!("[0.75, {}", &self.text[span.start + 1..span.end]);
+            return self.add(key, "a bad row", span, doubled);
+        }
+        if key.last().is_some_and(|last| last == "sensors") {
+            let at = many.first().expect("a sensor").span();
+            let element = [key, &["0".to_string()]].concat();
+            return self.add(&element, "an unknown name", at, "\"nobody\"");
+        }
+        if !self.is_header(value) {
+            self.add(key, "a wrong type", span, "true");
+        }
+        for (i, one) in many.iter().enumerate().filter(|(_, one)| one.get_ref().is_table()) {
+            self.value(one, &[key, &[i.to_string()]].concat());
         }
     }
 
@@ -224,4 +227,13 @@ fn two_to_five_mistakes_are_all_told_at_their_keys_and_nothing_else_is() {
         }
     }
     assert!(wrong.is_empty(), "{right} are right\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn what_a_draft_was_given_is_never_told() {
+    let text = "format = 1\nworld = \"chain\"\n[chain]\ndimensions = 3\n[chains]\nconnectors = 4\n\
+                at_m = [0.0, 0.0]\nrod_m = 1.0\n[chains.tasks]\nkind = \"targets\"\n\
+                targets_m = [[1.0, 0.0]]\n";
+    let source = Source::new("c.toml", text, "");
+    assert_eq!(told(&source), ["chains.at_m", "chains.tasks.targets_m"]);
 }

@@ -2,6 +2,8 @@
 
 use serde_json::Value;
 
+type Words = serde_json::Map<String, Value>;
+
 /// Words without a condition.
 const NOTES: [&str; 10] = [
     "$schema",
@@ -32,35 +34,6 @@ fn check(root: &Value, schema: &Value, value: &Value, at: &str, told: &mut Vec<S
     };
     for (word, means) in words {
         let is_right = match word.as_str() {
-            "type" => is_of_type(means, value),
-            "const" => means == value,
-            "enum" => list(means).contains(value),
-            "minimum" => number(value).is_none_or(|x| x >= number(means).expect("a number")),
-            "maximum" => number(value).is_none_or(|x| x <= number(means).expect("a number")),
-            "exclusiveMinimum" => {
-                number(value).is_none_or(|x| x > number(means).expect("a number"))
-            }
-            "exclusiveMaximum" => {
-                number(value).is_none_or(|x| x < number(means).expect("a number"))
-            }
-            "multipleOf" => number(value).is_none_or(|x| x % number(means).expect("one") == 0.0),
-            "minItems" => {
-                value.as_array().is_none_or(|a| a.len() as u64 >= means.as_u64().unwrap())
-            }
-            "maxItems" => {
-                value.as_array().is_none_or(|a| a.len() as u64 <= means.as_u64().unwrap())
-            }
-            "maxLength" => value.as_str().is_none_or(|s| s.len() as u64 <= means.as_u64().unwrap()),
-            "pattern" => {
-                assert_eq!(means, "^[FLBR]*$", "the only pattern");
-                value.as_str().is_none_or(|s| s.chars().all(|c| "FLBR".contains(c)))
-            }
-            "required" => {
-                let missing = list(means).iter().filter_map(Value::as_str);
-                let missing = missing.filter(|key| value.is_object() && value.get(key).is_none());
-                told.extend(missing.map(|key| format!("{at}: {key} is missing")));
-                true
-            }
             "oneOf" => fits(root, means, value) == 1,
             "anyOf" => fits(root, means, value) >= 1,
             "$ref" => {
@@ -68,42 +41,76 @@ fn check(root: &Value, schema: &Value, value: &Value, at: &str, told: &mut Vec<S
                 check(root, root.pointer(target).expect(target), value, at, told);
                 true
             }
-            "items" => {
-                let first = words.get("prefixItems").map_or(0, |own| list(own).len());
-                for (i, one) in value.as_array().into_iter().flatten().enumerate().skip(first) {
-                    check(root, means, one, &format!("{at}/{i}"), told);
-                }
+            "required" => {
+                let missing = list(means).iter().filter_map(Value::as_str);
+                let missing = missing.filter(|key| value.is_object() && value.get(key).is_none());
+                told.extend(missing.map(|key| format!("{at}: {key} is missing")));
                 true
             }
-            "prefixItems" => {
-                let each = list(means).iter().zip(value.as_array().into_iter().flatten());
-                each.for_each(|(schema, one)| check(root, schema, one, at, told));
+            "items" | "prefixItems" => {
+                elements(root, words, value, at, told);
                 true
             }
-            "properties" => {
-                for (key, schema) in means.as_object().expect("keys") {
-                    if let Some(one) = value.get(key) {
-                        check(root, schema, one, &format!("{at}/{key}"), told);
-                    }
-                }
+            "properties" | "additionalProperties" => {
+                members(root, words, value, at, told);
                 true
             }
-            "additionalProperties" => {
-                let own = words.get("properties").and_then(Value::as_object);
-                for (key, one) in value.as_object().into_iter().flatten() {
-                    if own.is_none_or(|own| !own.contains_key(key)) {
-                        check(root, means, one, &format!("{at}/{key}"), told);
-                    }
-                }
-                true
-            }
-            note => {
-                assert!(NOTES.contains(&note), "the validator does not know `{note}`");
-                true
-            }
+            _ => allows(word, means, value),
         };
         if !is_right {
             told.push(format!("{at}: {value} against {word} {means}"));
+        }
+    }
+}
+
+/// Checks the elements of an array: the first ones have schemas of their own.
+fn elements(root: &Value, words: &Words, value: &Value, at: &str, told: &mut Vec<String>) {
+    let first = words.get("prefixItems").map_or(&[][..], list);
+    for (i, one) in value.as_array().into_iter().flatten().enumerate() {
+        if let Some(schema) = first.get(i).or(words.get("items")) {
+            check(root, schema, one, &format!("{at}/{i}"), told);
+        }
+    }
+}
+
+/// Checks the members of a table: those that have no schema of their own have a common one.
+fn members(root: &Value, words: &Words, value: &Value, at: &str, told: &mut Vec<String>) {
+    let own = words.get("properties").and_then(Value::as_object);
+    for (key, one) in value.as_object().into_iter().flatten() {
+        let schema = own.and_then(|own| own.get(key)).or(words.get("additionalProperties"));
+        if let Some(schema) = schema {
+            check(root, schema, one, &format!("{at}/{key}"), told);
+        }
+    }
+}
+
+/// Whether a word about the value itself allows it.
+fn allows(word: &str, means: &Value, value: &Value) -> bool {
+    let number = |holds: &dyn Fn(f64, f64) -> bool| {
+        value.as_f64().is_none_or(|x| holds(x, means.as_f64().expect("a number")))
+    };
+    let count = |holds: &dyn Fn(usize, usize) -> bool| {
+        let count = value.as_array().map(Vec::len).or(value.as_str().map(str::len));
+        count.is_none_or(|n| holds(n, means.as_u64().expect("a count") as usize))
+    };
+    match word {
+        "type" => is_of_type(means, value),
+        "const" => means == value,
+        "enum" => list(means).contains(value),
+        "minimum" => number(&|x, least| x >= least),
+        "maximum" => number(&|x, most| x <= most),
+        "exclusiveMinimum" => number(&|x, least| x > least),
+        "exclusiveMaximum" => number(&|x, most| x < most),
+        "multipleOf" => number(&|x, unit| x % unit == 0.0),
+        "minItems" => count(&|n, least| n >= least),
+        "maxItems" | "maxLength" => count(&|n, most| n <= most),
+        "pattern" => {
+            assert_eq!(means, "^[FLBR]*$", "the only pattern");
+            value.as_str().is_none_or(|s| s.chars().all(|c| "FLBR".contains(c)))
+        }
+        note => {
+            assert!(NOTES.contains(&note), "the validator does not know `{note}`");
+            true
         }
     }
 }
@@ -135,8 +142,4 @@ fn is_of_type(types: &Value, value: &Value) -> bool {
 
 fn list(value: &Value) -> &[Value] {
     value.as_array().expect("a list")
-}
-
-fn number(value: &Value) -> Option<f64> {
-    value.as_f64()
 }
