@@ -164,11 +164,7 @@ session: number,
 /**
  * The text.
  */
-text: string, } | { "do": "schema",
-/**
- * The world's name.
- */
-world: string, } | { "do": "save",
+text: string, } | { "do": "save",
 /**
  * The session.
  */
@@ -399,11 +395,7 @@ value: unknown,
  * Files that a key of the text can name, as it would name them: those below its folder, and those
  * elsewhere that it names.
  */
-files: Array<string>, } | { "is": "schema",
-/**
- * A JSON Schema.
- */
-schema: unknown, } | { "is": "saved",
+files: Array<string>, } | { "is": "saved",
 /**
  * The file, which is the session's place from now on.
  */
