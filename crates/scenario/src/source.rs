@@ -38,7 +38,7 @@ pub struct Preamble {
 }
 
 /// Words in errors about what may go on over many lines.
-const OPEN: [&str; 4] = ["array", "inline table", "multi-line", "string"];
+const OPEN: [&str; 4] = ["array", "inline table", "key-value pairs", "multi-line"];
 
 /// Keys of [`Head`].
 const HEAD: [&str; 5] = ["format", "world", "name", "seed", "cycles"];
@@ -114,7 +114,9 @@ impl Source {
     /// Returns what is no TOML: one error for each line, and none that only follows from an array, a
     /// table or a text without an end.
     pub fn syntax_errors(&self) -> Vec<InputError> {
-        let (_, errors) = DeTable::parse_recoverable(&self.text);
+        let (_, mut errors) = DeTable::parse_recoverable(&self.text);
+        // The reader tells what is wrong in an array before what is wrong above it.
+        errors.sort_by_key(|error| error.span().map(|span| span.start));
         let mut told: Vec<InputError> = Vec::new();
         for error in errors {
             let error = self.explained(&error, &[]);
@@ -270,7 +272,9 @@ mod tests {
         };
         assert_eq!(lines("a = 1\n[b]\nc = \"d\"\n"), [0; 0]);
         assert_eq!(lines("a = = 1\nb = 2\nc\n[d\ne = 3\n"), [1, 3, 4]);
-        assert_eq!(lines("a = 1 2\nb = [1,\n[c]\nd = 2\ne = 3\n").len(), 2);
+        assert_eq!(lines("a = \"b\nc = = 1\n"), [1, 2]);
+        assert_eq!(lines("a = 1 2\nb = { c = 1\nd = 2\ne = 3\n"), [1, 3]);
+        assert_eq!(lines("a = 1 2\nb = [1\nc = 2\nd = 3\n"), [1, 3]);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! What the commented scenario of a world says, put into its schema.
+//! Comments and values of a world's commented scenario, put into its schema.
 
 use super::places::places;
 use super::shown::{Shown, shown};

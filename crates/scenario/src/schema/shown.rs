@@ -15,7 +15,7 @@ use toml_edit::{DocumentMut, Item, Table, Value};
 pub(crate) struct Shown {
     /// The names on the way to it. Elements of arrays have no part of it.
     pub(crate) way: Vec<String>,
-    /// What comments say of it; may be empty.
+    /// Its comments; may be empty.
     pub(crate) words: String,
     /// Its value; none of a section.
     pub(crate) value: Option<serde_json::Value>,

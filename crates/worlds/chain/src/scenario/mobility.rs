@@ -12,7 +12,7 @@ use serde::Deserialize;
 pub(super) enum MobilitySection<const D: usize> {
     /// Anywhere.
     Free,
-    /// Where it is.
+    /// At the place where it begins.
     Fixed,
     /// On the line between two points.
     OnSegment([Place<D>; 2]),

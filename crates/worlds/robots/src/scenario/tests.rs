@@ -99,7 +99,7 @@ fn keys_that_do_nothing_are_refused_with_the_reason() {
     for (text, at, words) in [
         (behaviour("kind = \"wander\", goals = [[1, 1]]"), "goals", "a key of `goto`"),
         (behaviour("kind = \"goto\", a = [0, 0, 1, 1], goals = [[1, 1]]"), "a = [", "`shuttle`"),
-        (behaviour("kind = \"gotoo\", goals = [[1, 1]]"), "{ kind", "did you mean `goto`?"),
+        (behaviour("kind = \"gotoo\", goals = [[1, 1]]"), "\"gotoo\"", "did you mean `goto`?"),
         (behaviour("kind = \"external\", repeat = true"), "repeat", "does nothing"),
         (behaviour("kind = \"goto\", goals = []"), "goals", "is empty"),
         (behaviour("kind = \"replay\", actions = []"), "actions", "is empty"),
