@@ -244,6 +244,7 @@ export class Draft {
 
   /** Starts the run with this text. Returns whether the server agreed. */
   async run(): Promise<boolean> {
+    await this.#queue;
     if (this.isLocked) return false;
     const { text } = this;
     const worked = await this.session.restart(null, text);
@@ -254,6 +255,8 @@ export class Draft {
 
   /** Writes the text to its file, or to another, which is its own from then on. Returns whether it is there now. */
   async save(to: string | null, over: boolean): Promise<boolean> {
+    // A change that is on its way was made before.
+    await this.#queue;
     const { text } = this;
     const file = to ?? this.#file;
     const answer = await this.session.tell({ do: "save", text, to: file, over });

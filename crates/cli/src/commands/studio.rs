@@ -21,12 +21,12 @@ Examples:
   sidestep studio --addr 0.0.0.0           for others, who need its token
 
 The page may read what lies below the folders that are named, the folders of the files that are \
-named, or else the current folder. It writes nothing. Ctrl-C ends it.";
+named, or else the current folder. It writes what you save there, and nothing else. Ctrl-C ends it.";
 
 /// The time between two looks at whether to end.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Watch, steer and replay runs in the browser.
+/// Watch, steer, replay and edit in the browser.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct StudioArgs {
