@@ -41,7 +41,7 @@ pub(crate) const GROUPS: &[(&str, &[&str])] = &[
 pub(crate) enum Command {
     /// Run a scenario; record it with --out
     Run(run::RunArgs),
-    /// Watch, steer and replay runs in the browser
+    /// Watch, steer, replay and edit in the browser
     Studio(studio::StudioArgs),
     /// Validate a scenario and describe it, without running it
     Check(check::CheckArgs),
