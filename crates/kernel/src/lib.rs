@@ -14,6 +14,7 @@
 //! - [`stream`]: a draw is a function of (seed, entity, cycle, purpose, index) alone.
 //! - [`workers`], [`cycle`]: the same bits for every number of workers.
 //! - [`digest`], [`checkpoint`]: a state has one digest, and continues bit for bit.
+//! - [`control`]: what agents observe, and orders from outside, checked and recorded.
 //! - [`interrupt`]: a cycle that takes long can be left half done.
 //! - [`view`]: the scenery and the frames of any world; looking at them changes nothing.
 //! - [`math`], [`distr`], [`geometry`]: numbers that are the same on every platform.
@@ -22,6 +23,7 @@
 pub mod checkpoint;
 pub mod column;
 pub mod conflict;
+pub mod control;
 pub mod cycle;
 pub mod digest;
 pub mod distr;

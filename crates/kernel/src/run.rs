@@ -1,12 +1,13 @@
 //! The one simulation: a world, its state, the engine, and the rows to record.
 
 use crate::checkpoint::{self, CheckpointError, Header};
+use crate::control::{self, CellsMut, OrderBook, OrderError, OrderRow, Orders, Team, Teams};
 use crate::cycle::{Observer, PhaseTimes, Scratches};
 use crate::digest::Digest;
 use crate::engine::Engine;
 use crate::interrupt::Interrupt;
 use crate::plan::{Effort, GroupSizes, Plan};
-use crate::ports::{RecordError, Recorder, SystemClock, TableSchema};
+use crate::ports::{Buffer, RecordError, Recorder, RowBuffer, SystemClock, TableSchema};
 use crate::simulation::Simulation;
 use crate::units::Cycle;
 use crate::view::{Frame, Inspection, Look, PlaceRows, Scenery, Who};
@@ -32,6 +33,13 @@ pub struct Run<W: World> {
     clock: SystemClock,
     /// Whether rows are kept for a recorder.
     records: bool,
+    teams: Arc<Teams>,
+    /// Orders that are given as the run comes by,
+    ahead: OrderBook,
+    /// and the cycle for which that was done last.
+    obeyed: Option<Cycle>,
+    /// Orders that were given and wait to be recorded.
+    given: RowBuffer<OrderRow>,
 }
 
 impl<W: World> Run<W> {
@@ -49,7 +57,24 @@ impl<W: World> Run<W> {
         let clock = SystemClock::default();
         let groups_before = GroupSizes::default();
         let (cycle, records) = (0, false);
-        Self { world, plan, scenario, state, books, engine, groups_before, cycle, clock, records }
+        let teams = world.teams();
+        let (ahead, given) = (OrderBook::default(), RowBuffer::default());
+        Self {
+            world,
+            plan,
+            scenario,
+            state,
+            books,
+            engine,
+            groups_before,
+            cycle,
+            clock,
+            records,
+            teams,
+            ahead,
+            obeyed: None,
+            given,
+        }
     }
 
     /// Uses all workers even where one would be faster; for tests and benchmarks.
@@ -112,6 +137,81 @@ impl<W: World> Run<W> {
         let Self { world, books, engine, .. } = self;
         engine.crew_mut().for_each(|mate| world.gather(books, &mut mate.scratch));
         world.book(books);
+    }
+
+    /// Number of cycles that may run before rows must be handed over.
+    fn room(&self) -> u64 {
+        let room = self.world.room(&self.state, &self.books, self.cycle);
+        // Orders come from outside of cycles, so one more never makes it worse.
+        if self.given.is_full() { room.min(1) } else { room }
+    }
+
+    /// Runs up to `cycles` cycles in which no order is ahead.
+    fn stretch(&mut self, cycles: u64) -> u64 {
+        let cycles = cycles.min(self.room());
+        let Self { world, state, books, engine, clock, .. } = self;
+        let span = (self.cycle, cycles);
+        let done = match W::LOOKS_EACH_CYCLE {
+            false => {
+                engine.advance(world, state, span, clock);
+                cycles
+            }
+            true => {
+                let mut onlooker = Onlooker { world: &**world, books };
+                engine.advance_observed(world, state, span, clock, &mut onlooker)
+            }
+        };
+        self.cycle += done;
+        done
+    }
+
+    /// Gives an order that was checked, or refuses it whole.
+    fn give(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
+        let checked = self.checked(orders)?;
+        for order in &checked {
+            self.world.order(&mut self.state, order);
+        }
+        if self.given.is_kept() {
+            let names = self.teams.order_names();
+            let name = names.iter().position(|name| name == orders.order).unwrap_or(0) as u32;
+            for order in &checked {
+                let (cycle, agent) = (self.cycle, order.agent);
+                let row = |(part, &value): (u32, &f64)| OrderRow {
+                    cycle,
+                    agent,
+                    order: name,
+                    part,
+                    value,
+                };
+                self.given.extend((0..).zip(order.values).map(row));
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the orders to single agents, all of them found right.
+    fn checked<'a>(&self, orders: &Orders<'a>) -> Result<Vec<control::Order<'a>>, OrderError> {
+        let checked = self.teams.checked(orders)?;
+        for order in &checked {
+            self.world.check_order(order).map_err(|cause| {
+                let who = format!("{} {}", self.teams.noun(), order.agent);
+                let order = orders.order.into();
+                OrderError::Senseless { order, who, cause }
+            })?;
+        }
+        Ok(checked)
+    }
+
+    /// Gives the orders that are ahead for the present cycle.
+    fn obey(&mut self) {
+        if self.obeyed.replace(self.cycle) == Some(self.cycle) {
+            return;
+        }
+        let ahead = std::mem::take(&mut self.ahead);
+        for orders in ahead.due(self.cycle) {
+            self.give(&orders).expect("`follow` has checked it");
+        }
+        self.ahead = ahead;
     }
 
     /// Sets up all workers for gathering the rows and events that are now wanted.
@@ -184,20 +284,17 @@ impl<W: World> Simulation for Run<W> {
     }
 
     fn advance(&mut self, cycles: u64) -> u64 {
-        let cycles = cycles.min(self.world.room(&self.state, &self.books, self.cycle));
-        let Self { world, state, books, engine, clock, .. } = self;
-        let span = (self.cycle, cycles);
-        let done = match W::LOOKS_EACH_CYCLE {
-            false => {
-                engine.advance(world, state, span, clock);
-                cycles
+        let mut done = 0;
+        while done < cycles {
+            self.obey();
+            let next = self.ahead.next_after(self.cycle);
+            let wanted = next.map_or(cycles - done, |next| (next - self.cycle).min(cycles - done));
+            let made = self.stretch(wanted);
+            done += made;
+            if made < wanted {
+                break;
             }
-            true => {
-                let mut onlooker = Onlooker { world: &**world, books };
-                engine.advance_observed(world, state, span, clock, &mut onlooker)
-            }
-        };
-        self.cycle += done;
+        }
         done
     }
 
@@ -219,17 +316,23 @@ impl<W: World> Simulation for Run<W> {
         self.groups_before = groups;
         self.engine.crew_mut().for_each(|mate| mate.tally.groups = GroupSizes::default());
         self.cycle = cycle;
+        self.obeyed = None;
         Ok(())
     }
 
     fn begin_recording(&mut self) {
         self.records = true;
         self.world.begin_recording(&mut self.state, &mut self.books, self.cycle);
+        if self.teams.take_orders() {
+            self.given.begin(Some(control::table(self.teams.order_names().to_vec())));
+        }
         self.prepare();
     }
 
     fn schemas(&self) -> Vec<TableSchema> {
-        self.world.schemas(&self.books)
+        let mut schemas = self.world.schemas(&self.books);
+        schemas.extend(self.given.schema());
+        schemas
     }
 
     fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError> {
@@ -239,7 +342,12 @@ impl<W: World> Simulation for Run<W> {
             return Err(RecordError::new(format!("the recording of `{}`", self.plan.name), cause));
         }
         self.gather();
-        self.world.record(&mut self.state, &mut self.books, self.cycle, recorder)
+        self.world.record(&mut self.state, &mut self.books, self.cycle, recorder)?;
+        match self.given.take() {
+            None => Ok(()),
+            // Its table follows those of the world.
+            Some(block) => recorder.append(self.world.schemas(&self.books).len(), &block),
+        }
     }
 
     fn scenery(&self) -> Scenery {
@@ -263,6 +371,26 @@ impl<W: World> Simulation for Run<W> {
 
     fn inspect(&self, who: Who) -> Option<Inspection> {
         self.world.inspect(&self.state, &self.books, self.cycle, who)
+    }
+
+    fn teams(&self) -> &[Team] {
+        self.teams.all()
+    }
+
+    fn observe(&self, team: usize, room: &mut [CellsMut<'_>]) -> Result<(), OrderError> {
+        self.teams.check_room(team, room)?;
+        self.world.observe(&self.state, self.cycle, team, room);
+        Ok(())
+    }
+
+    fn order(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
+        self.give(orders)
+    }
+
+    fn follow(&mut self, orders: OrderBook) -> Result<(), OrderError> {
+        orders.iter().try_for_each(|(_, orders)| self.checked(&orders).map(drop))?;
+        (self.ahead, self.obeyed) = (orders, None);
+        Ok(())
     }
 
     fn place_rows(&self) -> Vec<PlaceRows> {

@@ -1,6 +1,7 @@
 //! The object-safe face of a run, through which the command, a server or a binding uses any world.
 
 use crate::checkpoint::CheckpointError;
+use crate::control::{CellsMut, OrderBook, OrderError, Orders, Team, Teams};
 use crate::cycle::PhaseTimes;
 use crate::digest::Digest;
 use crate::interrupt::Interrupt;
@@ -86,6 +87,38 @@ pub trait Simulation: Any + Send {
     /// Returns what a body perceives and decides in the cycle that comes next, and what will come of
     /// it; `None` for a body that is not there or of which nothing is to tell. No result depends on it.
     fn inspect(&self, who: Who) -> Option<Inspection>;
+
+    /// The teams of agents that observe, and may be ordered, alike.
+    fn teams(&self) -> &[Team] {
+        &[]
+    }
+
+    /// Writes what the agents of a team, in its order, observe in the cycle that comes next: one room for
+    /// each of its spaces. No result depends on it.
+    ///
+    /// # Errors
+    /// When there is no such team, or the room has another shape.
+    fn observe(&self, team: usize, _: &mut [CellsMut<'_>]) -> Result<(), OrderError> {
+        Err(OrderError::NoTeam { team, teams: 0 })
+    }
+
+    /// Orders something of several agents for the cycle that comes next. An order stands until its
+    /// agent has acted; a later one takes its place.
+    ///
+    /// # Errors
+    /// When one of them cannot be obeyed; nobody is ordered anything then.
+    fn order(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
+        Teams::default().checked(orders).map(drop)
+    }
+
+    /// Gives these orders, each before its cycle, whenever the run comes by there: also after
+    /// [`Simulation::restore`]. They take the place of those of an earlier call.
+    ///
+    /// # Errors
+    /// When one of them cannot be obeyed; all remain as they were then.
+    fn follow(&mut self, orders: OrderBook) -> Result<(), OrderError> {
+        orders.iter().try_for_each(|(_, orders)| Teams::default().checked(&orders).map(drop))
+    }
 
     /// The recorded tables and columns that hold the places of bodies.
     fn place_rows(&self) -> Vec<PlaceRows>;

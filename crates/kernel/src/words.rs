@@ -29,6 +29,15 @@ pub fn grouped(number: u64) -> String {
     head.into_iter().chain(groups).collect::<Vec<_>>().join(" ")
 }
 
+/// Returns a number with so many decimals; what rounds to 0 has no sign.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(size) if size.chars().all(|c| matches!(c, '0' | '.')) => size.into(),
+        _ => text,
+    }
+}
+
 /// Begin of a value that is a command to copy.
 const COMMAND: &str = "sidestep ";
 
@@ -97,6 +106,15 @@ mod tests {
         assert_eq!(aligned(&[line("look", &command)]), format!("  look  {command}\n"));
         assert_eq!(wrapped(&"x".repeat(99), 80), ["x".repeat(99)], "a word is never broken");
         assert_eq!(wrapped("a  b\nc", 80), ["a  b", "c"]);
+    }
+
+    #[test]
+    fn what_rounds_to_nothing_has_no_sign() {
+        assert_eq!(
+            [-1e-9, -0.0, 3.364e-13, -0.0005, -2.5].map(|x| fixed(x, 3)),
+            ["0.000", "0.000", "0.000", "-0.001", "-2.500"]
+        );
+        assert_eq!((fixed(-0.4, 0), fixed(f64::NAN, 2)), ("0".into(), "NaN".into()));
     }
 
     #[test]

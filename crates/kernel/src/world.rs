@@ -8,6 +8,7 @@
 
 use crate::checkpoint::CheckpointError;
 use crate::conflict::Groups;
+use crate::control::{CellsMut, Order, Teams};
 use crate::digest::Digest;
 use crate::plan::Effort;
 use crate::ports::{Clock, RecordError, Recorder, TableSchema};
@@ -18,6 +19,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// A worker's turn in one phase of one cycle: its inputs and its own buffers.
 pub struct Turn<'a, W: Phases> {
@@ -204,6 +206,27 @@ pub trait World: Phases<State: Send> + Send + 'static {
     fn inspect(&self, _: &Self::State, _: &Self::Books, _: Cycle, _: Who) -> Option<Inspection> {
         None
     }
+
+    /// Returns the teams of agents that observe, and may be ordered, alike.
+    fn teams(&self) -> Arc<Teams> {
+        Arc::default()
+    }
+
+    /// Returns why an order whose values are all within their bounds makes no sense all the same, and
+    /// what would be right.
+    ///
+    /// # Errors
+    /// With these words.
+    fn check_order(&self, _: &Order<'_>) -> Result<(), String> {
+        Ok(())
+    }
+
+    /// Notes an order for the next turn of its agent. It was checked.
+    fn order(&self, _: &mut Self::State, _: &Order<'_>) {}
+
+    /// Writes what the agents of a team observe in cycle `now` of the frozen state; there is one room
+    /// for each of [`crate::control::Team::observed`], and each is as large as it must be.
+    fn observe(&self, _: &Self::State, _: Cycle, _team: usize, _: &mut [CellsMut<'_>]) {}
 
     /// The recorded tables and columns that hold the places of bodies.
     fn place_rows(&self, _: &Self::Books) -> Vec<PlaceRows> {

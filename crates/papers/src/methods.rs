@@ -3,6 +3,7 @@
 use crate::cells;
 use crate::study::{Progress, all_of, setting};
 use serde::Serialize;
+use sidestep::experiment::sweep::seeds::remedy;
 use sidestep::kernel::{Digest, InputError, Simulation};
 use sidestep::scenario::{Seeds, Source};
 use sidestep::statistics::{Interval, wilson};
@@ -221,6 +222,9 @@ fn note(results: &[MethodResult]) -> String {
              the same state, to the bit. So there is no interval."
         ));
     }
+    if results.iter().all(|result| result.seeds != Seeds::Decide) {
+        words.extend(remedy("airspace"));
+    }
     words.join(" ")
 }
 
@@ -244,6 +248,7 @@ mod tests {
         }
         assert!(table.note.contains("no random number is drawn"), "{}", table.note);
         assert!(table.note.contains("nothing with pc: two runs"), "{}", table.note);
+        assert!(table.note.contains("airspace.position_noise_m"), "{}", table.note);
     }
 
     #[test]

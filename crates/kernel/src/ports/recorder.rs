@@ -85,6 +85,13 @@ impl MemoryRecorder {
         t.map_or(0, |t| self.tables[t].first().map_or(0, Values::len))
     }
 
+    /// Takes all rows out, by table, without a copy; the tables are empty then.
+    pub fn take(&mut self) -> Vec<(TableSchema, Vec<Values>)> {
+        let empty = Self::new(&self.schemas);
+        let tables = std::mem::replace(&mut self.tables, empty.tables);
+        self.schemas.iter().cloned().zip(tables).collect()
+    }
+
     /// Whether [`Recorder::finish`] was called.
     pub fn is_finished(&self) -> bool {
         self.finished

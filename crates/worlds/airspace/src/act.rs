@@ -40,14 +40,7 @@ pub(super) fn act(turn: &mut Turn<'_>, group: &[Slot]) {
 /// Flies a group for one `dt`; `group` are the airplanes in the air, by id.
 fn fly(turn: &mut Turn<'_>, group: &[Slot]) {
     let Turn { world, state, now, .. } = *turn;
-    let flown: Vec<Slot> =
-        group.iter().copied().filter(|&slot| !world.is_intruder(slot, now)).collect();
-    if world.shield {
-        entry::release(turn, &flown);
-        entry::admit(turn, &flown);
-        errors::name(turn, &flown);
-    }
-    orders::carry_out(turn, group, &flown);
+    let flown = begin(turn, group);
     let intruders = intruders(turn, group);
     let mut ways = ways(turn, &flown, &intruders).into_iter();
     let flights = group.iter().map(|&slot| {
@@ -62,6 +55,22 @@ fn fly(turn: &mut Turn<'_>, group: &[Slot]) {
     });
     let flights = flights.collect();
     step::step_all(turn, flights);
+}
+
+/// Does what comes before decisions: airplanes come in, names of pairs begin and end, and orders that
+/// are due are carried out. Returns the airplanes of a group that the method flies, by id; `group` are
+/// those in the air.
+pub(super) fn begin(turn: &mut Turn<'_>, group: &[Slot]) -> Vec<Slot> {
+    let (world, now) = (turn.world, turn.now);
+    let flown: Vec<Slot> =
+        group.iter().copied().filter(|&slot| !world.is_intruder(slot, now)).collect();
+    if world.shield {
+        entry::release(turn, &flown);
+        entry::admit(turn, &flown);
+        errors::name(turn, &flown);
+    }
+    orders::carry_out(turn, group, &flown);
+    flown
 }
 
 /// Returns the ways of the airplanes that the method flies.

@@ -1,5 +1,6 @@
 //! *Decide*: the choice of actions for the airplanes of a group, by the world's method.
 
+mod external;
 mod velocity;
 mod wishes;
 
@@ -70,8 +71,10 @@ pub(super) fn wanted(
     contacts: &mut [Contacts],
 ) -> Vec<Vec<Way>> {
     let world = turn.world;
-    if let Method::Mvp | Method::Orca = world.method {
-        return velocity::by_velocity(turn, group, intruders);
+    match world.method {
+        Method::Mvp | Method::Orca => return velocity::by_velocity(turn, group, intruders),
+        Method::External => return external::as_ordered(turn, group),
+        Method::Pc | Method::None => {}
     }
     let wishes = match world.method {
         _ if group.len() + intruders.len() < 2 => all_straight(world, group),

@@ -2,12 +2,12 @@
 
 use super::traffic::{bluesky_rules, from_bluesky, from_tracks, has_length, not_flown};
 use serde_json::{Value, json};
-use sidestep_import::bluesky::{self, ScnFile};
+use sidestep_import::bluesky::{self, ScnFile, UnresolvedPlace};
 use sidestep_import::traffic::{self, RecordedTraffic};
 use sidestep_kernel::InputError;
 use sidestep_kernel::words::{Lines, grouped};
 use sidestep_scenario::Foreign;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Forms of files, by the ends of their names.
@@ -70,7 +70,8 @@ fn told_of_bluesky(scn: &ScnFile, beside: &[InputError]) -> (Value, Lines) {
         "not_flown": not_flown(scn),
         "ignored": scn.ignored,
         "unresolved_places": scn.unresolved_places.len(),
-        "unresolved_names": unresolved_names(scn),
+        "unresolved_names": unresolved(scn).keys().collect::<Vec<_>>(),
+        "unresolved": unresolved(scn).into_values().flatten().map(use_as_json).collect::<Vec<_>>(),
         "aircraft_without_place": without_place(scn),
     });
     let mut lines = vec![("command lines".to_string(), grouped(scn.command_lines))];
@@ -78,7 +79,7 @@ fn told_of_bluesky(scn: &ScnFile, beside: &[InputError]) -> (Value, Lines) {
     lines.extend(counted("not flown", &not_flown(scn)));
     lines.extend(counted("display only", &scn.ignored));
     lines.extend(first_named("left out, place unknown", &without_place(scn)));
-    lines.extend(first_named("unknown way-points", &unresolved_names(scn)));
+    lines.extend(first_named("unknown way-points", &unresolved_uses(scn)));
     lines.extend(listed("unparsed", &scn.unparsed));
     lines.extend(listed("not carried out", &refused));
     (json, lines)
@@ -91,12 +92,36 @@ fn without_place(scn: &ScnFile) -> Vec<String> {
     unplaced.map(|one| format!("{} at {}", one.aircraft.id, one.place)).collect()
 }
 
-/// Returns the names of places to fly to that the file does not define, each once.
-fn unresolved_names(scn: &ScnFile) -> Vec<String> {
+/// Returns the places to fly to that the file does not define, by name, each with its uses.
+fn unresolved(scn: &ScnFile) -> BTreeMap<&str, Vec<&UnresolvedPlace>> {
     let creates = |command: &str| matches!(command, "CRE" | "CREATE");
     let uses = scn.unresolved_places.iter().filter(|used| !creates(&used.command));
-    let names: BTreeSet<&String> = uses.map(|used| &used.name).collect();
-    names.into_iter().cloned().collect()
+    let mut by_name: BTreeMap<&str, Vec<&UnresolvedPlace>> = BTreeMap::new();
+    uses.for_each(|used| by_name.entry(&used.name).or_default().push(used));
+    by_name
+}
+
+fn use_as_json(used: &UnresolvedPlace) -> Value {
+    json!({
+        "name": used.name,
+        "command": used.command,
+        "airplane": used.aircraft,
+        "line": used.line,
+    })
+}
+
+/// Returns each unknown place in words, with the command, the airplane and the line of its first use.
+fn unresolved_uses(scn: &ScnFile) -> Vec<String> {
+    let in_words = |(name, uses): (&str, Vec<&UnresolvedPlace>)| {
+        let UnresolvedPlace { command, aircraft, line, .. } = uses[0];
+        let whose = aircraft.as_ref().map_or(String::new(), |id| format!(" of {id}"));
+        let more = match uses.len() - 1 {
+            0 => String::new(),
+            more => format!(", and {} more", grouped(more as u64)),
+        };
+        format!("{name} ({command}{whose}, line {line}{more})")
+    };
+    unresolved(scn).into_iter().map(in_words).collect()
 }
 
 fn told_of_tracks(recorded: &RecordedTraffic) -> (Value, Lines) {

@@ -13,7 +13,6 @@ use super::perceive::{self, seen};
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use super::{Scratch, Turn};
-use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::ports::ManualClock;
 use sidestep_kernel::view::{self, Inspection, Kind, MarkShape, Role, Section, Table, Value, Who};
 use sidestep_kernel::{Cycle, EntityId, Slot};
@@ -44,7 +43,7 @@ impl AirspaceWorld {
     }
 
     /// Runs a cycle of the group of one airplane; returns the group, by id.
-    fn try_cycle(
+    pub(super) fn try_cycle(
         &self,
         state: &AirspaceState,
         now: Cycle,
@@ -53,9 +52,7 @@ impl AirspaceWorld {
     ) -> Vec<Slot> {
         let clock = &ManualClock::default();
         let turn = &mut Turn { world: self, state, now, clock, scratch };
-        let (all, groups) = (0..self.airplanes.len(), Groups::new(self.airplanes.len()));
-        perceive::claim(turn, all.clone());
-        join::join(turn, all, &groups);
+        let groups = join::groups(turn);
         let mut group = Vec::new();
         groups.members(groups.leader(id), &mut group);
         act::act(turn, &group);

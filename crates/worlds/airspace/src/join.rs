@@ -2,9 +2,18 @@
 
 use super::Turn;
 use super::flight::{Levels, Task, distance_m};
+use super::perceive::claim;
 use sidestep_kernel::Slot;
 use sidestep_kernel::conflict::Groups;
 use std::ops::Range;
+
+/// Begins a cycle for all: returns the groups that airplanes form in it.
+pub(super) fn groups(turn: &mut Turn<'_>) -> Groups {
+    let (all, groups) = (0..turn.world.airplanes.len(), Groups::new(turn.world.airplanes.len()));
+    claim(turn, all.clone());
+    join(turn, all, &groups);
+    groups
+}
 
 /// Joins each of `bodies` with those before it that it has to mind.
 pub(super) fn join(turn: &mut Turn<'_>, bodies: Range<usize>, groups: &Groups) {

@@ -33,6 +33,11 @@ impl Kind for Airspace {
         super::scenario::sections()
     }
 
+    fn draws(&self) -> &'static str {
+        "airspace.generator, airspace.position_noise_m, airspace.heading_noise_deg, airspace.network, and \
+         the search of method pc"
+    }
+
     fn meanings(&self) -> &'static [Meaning] {
         super::meanings::MEANINGS
     }

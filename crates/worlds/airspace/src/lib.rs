@@ -9,7 +9,7 @@
 //! perceive.rs -> join.rs -> decide.rs -> act.rs                            one cycle of dt
 //! flight/: motion, orders, tracks       objective.rs: what is minimized    behind it
 //! shield/: what is safe for ever        agents/, deploy/: who decides, over which network
-//! intruder.rs: airplanes that mind nobody
+//! intruder.rs: airplanes that mind nobody    outside.rs, wish.rs: decisions from outside
 //! baseline/: other methods              metrics.rs: the sums of a run
 //! ```
 
@@ -33,6 +33,7 @@ mod memory;
 pub mod metrics;
 mod notes;
 pub mod objective;
+mod outside;
 mod perceive;
 mod purpose;
 mod rows;
@@ -42,6 +43,7 @@ pub mod shield;
 pub mod state;
 pub mod traffic;
 mod view;
+pub mod wish;
 mod words;
 pub mod world;
 

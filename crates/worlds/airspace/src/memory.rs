@@ -2,13 +2,12 @@
 
 use super::deploy::Deployment;
 use super::flight::{Known, Point, distance_m};
-use super::join::join;
-use super::perceive::{claim, known};
+use super::join::groups;
+use super::perceive::known;
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use super::{Scratch, Turn};
 use sidestep_collectives::{Estimator, PairwiseGame};
-use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::ports::ManualClock;
 use sidestep_kernel::{Slot, interrupt};
 
@@ -65,11 +64,10 @@ fn table_bytes(world: &AirspaceWorld, group: &[Known]) -> u64 {
 /// Returns the size of the group that takes most memory at the start of a run, and its bytes.
 pub(super) fn largest_at_start(world: &AirspaceWorld, state: &AirspaceState) -> (usize, u64) {
     let n = world.airplanes.len();
-    let (groups, mut scratch) = (Groups::new(n), Scratch::default());
+    let mut scratch = Scratch::default();
     let clock = &ManualClock::default();
     let turn = &mut Turn { world, state, now: 0, clock, scratch: &mut scratch };
-    claim(turn, 0..n);
-    join(turn, 0..n, &groups);
+    let groups = groups(turn);
     let mut members = Vec::new();
     let leaders = (0..n as Slot).filter(|&slot| groups.is_leader(slot) && !groups.is_alone(slot));
     let taken = leaders.map(|leader| {

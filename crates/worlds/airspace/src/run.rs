@@ -10,11 +10,13 @@ use super::world::AirspaceWorld;
 use super::{Scratch, view, words};
 use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
+use sidestep_kernel::control::{CellsMut, Order, Teams};
 use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
 use sidestep_kernel::view::{Frame, Inspection, Log, Look, PlaceRows, Scenery, Who};
 use sidestep_kernel::words::{Lines, Said};
 use sidestep_kernel::{Cycle, Digest, Effort, EntityId, InputError, Plan, Run, World};
 use sidestep_scenario::Source;
+use std::sync::Arc;
 
 /// A run of an airspace.
 pub type AirspaceRun = Run<AirspaceWorld>;
@@ -194,6 +196,22 @@ impl World for AirspaceWorld {
         who: Who,
     ) -> Option<Inspection> {
         AirspaceWorld::inspect(self, state, now, who)
+    }
+
+    fn teams(&self) -> Arc<Teams> {
+        self.teams.clone()
+    }
+
+    fn check_order(&self, order: &Order<'_>) -> Result<(), String> {
+        self.wish(order).map_or(Ok(()), |wish| wish.check())
+    }
+
+    fn order(&self, state: &mut AirspaceState, order: &Order<'_>) {
+        self.note_order(state, order);
+    }
+
+    fn observe(&self, state: &AirspaceState, now: Cycle, team: usize, room: &mut [CellsMut<'_>]) {
+        AirspaceWorld::observe(self, state, now, team, room);
     }
 
     fn place_rows(&self, _: &Books) -> Vec<PlaceRows> {

@@ -185,6 +185,7 @@ impl Compiled {
                 None => airplane.altitude_m,
             },
             orders: [0; 2],
+            turn_rate_rad_s: 0.0,
         };
         let airplanes = self.world.airplanes.iter().zip(&self.fallbacks).map(record).collect();
         Snapshot {
@@ -194,6 +195,7 @@ impl Compiled {
             resolving: Vec::new(),
             named: self.too_close.clone(),
             held: Vec::new(),
+            wishes: Vec::new(),
         }
     }
 }

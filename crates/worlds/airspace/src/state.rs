@@ -1,22 +1,24 @@
 //! The state of a run, and its snapshot.
 
+mod neighborhood;
+mod snapshot;
+
 use super::agents::contact::Contacts;
 use super::baseline::mvp::Resolving;
-use super::flight::{Point, Pose, Stage};
+use super::flight::{Pose, Stage};
 use super::shield::{Named, Side};
+use super::wish::Wish;
 use super::world::{AirspaceWorld, Method};
-use serde::{Deserialize, Serialize};
+use neighborhood::Neighborhood;
 use sidestep_kernel::column::Shared;
-use sidestep_kernel::digest::Hasher;
-use sidestep_kernel::{Column, Cycle, Digest, EntityId, Slot};
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use sidestep_kernel::{Cycle, EntityId, Slot};
+pub use snapshot::{AirplaneRecord, PairRecord, Snapshot};
 use std::sync::{Mutex, PoisonError};
 
 /// Marks an airplane that has not arrived yet.
 pub const FLYING: u64 = u64::MAX;
 /// Flag set beside the time at which an airplane was removed, rather than arrived.
 const LEFT: u64 = 1 << 63;
-const NOBODY: u32 = u32::MAX;
 
 /// The end of a flight, with its step of `dtau` since the run's start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,6 +43,10 @@ pub struct AirspaceState {
     named: Box<[Mutex<Named>]>,
     /// Each airplane's pose on its stored orbit; empty where no gust takes it off that.
     held: Box<[Held]>,
+    /// The turn rate of each airplane in the step that it flew last, in radians per second.
+    turn_rates_rad_s: Box<[Shared<f64>]>,
+    /// The wish that was ordered of each airplane; empty unless airplanes are decided from outside.
+    wishes: Box<[Mutex<Option<Wish>>]>,
 }
 
 /// One airplane's share of the state.
@@ -95,6 +101,21 @@ impl Cell {
         self.heading_rad.set(pose.heading_rad);
     }
 
+    fn restore(&self, record: &AirplaneRecord) {
+        self.set_pose(record.pose);
+        self.arrived.set(record.arrived);
+        let [next, overrides, orbits, orbiting] = record.counts;
+        self.next.set(next);
+        self.overrides.set(overrides);
+        self.orbits.set(orbits);
+        self.orbiting.set(orbiting);
+        self.set_side(record.fallback);
+        self.altitude_m.set(record.altitude_m);
+        let [orders, waits] = record.orders;
+        self.orders.set(orders);
+        self.waits.set(waits);
+    }
+
     /// Returns whether it has not arrived yet.
     pub fn is_flying(&self) -> bool {
         self.arrived.get() == FLYING
@@ -141,60 +162,6 @@ impl Cell {
     }
 }
 
-/// The airplanes near each other: lists of airplanes by square of the plane, built anew each cycle.
-#[derive(Debug)]
-pub(super) struct Neighborhood {
-    side_m: f64,
-    /// For each bucket: cycle (upper half) and last airplane listed (lower half).
-    first: Box<[AtomicU64]>,
-    /// For each airplane: the one listed before it.
-    next: Column<u32>,
-}
-
-impl Neighborhood {
-    /// Returns lists for `n` airplanes that mind each other up to `side_m` meters away.
-    fn new(n: usize, side_m: f64) -> Self {
-        let buckets = (2 * n).next_power_of_two();
-        Self {
-            side_m,
-            first: (0..buckets).map(|_| AtomicU64::new(u64::MAX)).collect(),
-            next: Column::filled(n, NOBODY),
-        }
-    }
-
-    fn square(&self, at: Point) -> [i64; 2] {
-        at.map(|v| (v / self.side_m).floor() as i64)
-    }
-
-    fn bucket(&self, [x, y]: [i64; 2]) -> &AtomicU64 {
-        let mixed = (x as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
-            ^ (y as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F);
-        &self.first[(mixed >> 32) as usize & (self.first.len() - 1)]
-    }
-
-    /// Lists an airplane for this cycle.
-    pub(super) fn enter(&self, slot: Slot, at: Point, now: Cycle) {
-        let stamp = u64::from(now as u32) << 32;
-        let before = self.bucket(self.square(at)).swap(stamp | u64::from(slot), Relaxed);
-        let listed = before >> 32 == stamp >> 32;
-        self.next.set(slot as usize, if listed { before as u32 } else { NOBODY });
-    }
-
-    /// Calls `meet` for every airplane listed in this cycle in the squares around `at`, and
-    /// possibly for others.
-    pub(super) fn around(&self, at: Point, now: Cycle, mut meet: impl FnMut(Slot)) {
-        let [x, y] = self.square(at);
-        for square in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [x + dx, y + dy])) {
-            let first = self.bucket(square).load(Relaxed);
-            let mut slot = if first >> 32 == u64::from(now as u32) { first as u32 } else { NOBODY };
-            while slot != NOBODY {
-                meet(slot);
-                slot = self.next.get(slot as usize);
-            }
-        }
-    }
-}
-
 fn held<T>(shared: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -220,61 +187,6 @@ fn remembered<T: Clone + Default>(n: usize, saved: &[T]) -> Box<[Mutex<T>]> {
     (0..n).map(|i| Mutex::new(saved.get(i).cloned().unwrap_or_default())).collect()
 }
 
-/// One airplane in a snapshot.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct AirplaneRecord {
-    /// Pose at the start of the cycle.
-    pub pose: Pose,
-    /// See [`Cell::arrived`].
-    pub arrived: u64,
-    /// Number of way-points done with, overrides, orbits, and orbits in a row.
-    pub counts: [u32; 4],
-    /// Side of the stored fallback.
-    pub fallback: Side,
-    /// Altitude in meters.
-    pub altitude_m: f64,
-    /// Number of orders carried out, and of times that one had to wait.
-    pub orders: [u16; 2],
-}
-
-/// Closest approach and losses of a pair of airplanes.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct PairRecord {
-    /// Closest approach in meters.
-    pub nearest_m: f64,
-    /// Time in which they were nearer than their separation: in whole nanoseconds, so that the sum
-    /// does not depend on the order.
-    pub lost_ns: u64,
-    /// Number of separate losses of separation.
-    pub losses: u32,
-}
-
-impl PairRecord {
-    /// Adds another record of the same pair, in any order.
-    pub fn add(&mut self, other: Self) {
-        self.nearest_m = self.nearest_m.min(other.nearest_m);
-        self.lost_ns += other.lost_ns;
-        self.losses += other.losses;
-    }
-}
-
-/// A state by id: the content of a checkpoint, and the input of a digest.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Snapshot {
-    /// Number of cycles done.
-    pub cycle: Cycle,
-    /// The airplanes by id.
-    pub airplanes: Vec<AirplaneRecord>,
-    /// Each airplane's knowledge of others; empty where the network is reliable.
-    pub contacts: Vec<Contacts>,
-    /// The conflicts that each airplane resolves; empty unless the method is MVP.
-    pub resolving: Vec<Resolving>,
-    /// The pairs for which the shield promises nothing now, by ids.
-    pub named: Vec<(EntityId, EntityId)>,
-    /// Each airplane's pose on its stored orbit; empty where no gust takes it off that.
-    pub held: Vec<Pose>,
-}
-
 impl AirspaceState {
     /// Returns the state that a snapshot describes.
     pub(super) fn restore(world: &AirspaceWorld, snapshot: &Snapshot) -> Self {
@@ -283,18 +195,7 @@ impl AirspaceState {
         let farthest = all.clone().map(|i| world.look_m(i, i)).fold(1.0, f64::max);
         let airplanes: Box<[Cell]> = all.map(|_| Cell::default()).collect();
         for (cell, record) in airplanes.iter().zip(&snapshot.airplanes) {
-            cell.set_pose(record.pose);
-            cell.arrived.set(record.arrived);
-            let [next, overrides, orbits, orbiting] = record.counts;
-            cell.next.set(next);
-            cell.overrides.set(overrides);
-            cell.orbits.set(orbits);
-            cell.orbiting.set(orbiting);
-            cell.set_side(record.fallback);
-            cell.altitude_m.set(record.altitude_m);
-            let [orders, waits] = record.orders;
-            cell.orders.set(orders);
-            cell.waits.set(waits);
+            cell.restore(record);
         }
         let contacts = remembered(world.network.as_ref().map_or(0, |_| n), &snapshot.contacts);
         let is_mvp = world.method == Method::Mvp;
@@ -303,7 +204,22 @@ impl AirspaceState {
         let named = (0..n).map(|_| Mutex::default()).collect();
         let gusts = world.shield && world.disturbance.heading_rad > 0.0;
         let held = (0..if gusts { n } else { 0 }).map(|_| Held::default()).collect();
-        let state = Self { airplanes, neighborhood, contacts, resolving, named, held };
+        let turn_rates_rad_s: Box<[Shared<f64>]> = (0..n).map(|_| Shared::default()).collect();
+        for (rate, record) in turn_rates_rad_s.iter().zip(&snapshot.airplanes) {
+            rate.set(record.turn_rate_rad_s);
+        }
+        let is_external = world.method == Method::External;
+        let wishes = remembered(if is_external { n } else { 0 }, &snapshot.wishes);
+        let state = Self {
+            airplanes,
+            neighborhood,
+            contacts,
+            resolving,
+            named,
+            held,
+            turn_rates_rad_s,
+            wishes,
+        };
         let held = snapshot.held.iter().copied();
         let held = held.chain(snapshot.airplanes.iter().skip(snapshot.held.len()).map(|a| a.pose));
         (0..).zip(held).for_each(|(slot, pose)| state.set_held(slot, pose));
@@ -372,15 +288,36 @@ impl AirspaceState {
         put(&self.resolving, group, resolving);
     }
 
+    /// Takes out the wishes that were ordered of the airplanes of a group.
+    pub(super) fn take_wishes(&self, group: &[Slot]) -> Vec<Option<Wish>> {
+        take(&self.wishes, group)
+    }
+
+    /// Stores the wish that was ordered of an airplane, in place of any other.
+    pub(super) fn put_wish(&self, slot: Slot, wish: Wish) {
+        put(&self.wishes, &[slot], vec![Some(wish)]);
+    }
+
+    /// Returns the turn rate of an airplane in the step that it flew last, in radians per second.
+    pub(super) fn turn_rate_rad_s(&self, slot: Slot) -> f64 {
+        self.turn_rates_rad_s[slot as usize].get()
+    }
+
+    /// Stores the turn rate of the step that an airplane flew last.
+    pub(super) fn set_turn_rate_rad_s(&self, slot: Slot, omega_rad_s: f64) {
+        self.turn_rates_rad_s[slot as usize].set(omega_rad_s);
+    }
+
     /// Returns the state after `cycle` cycles.
     pub fn snapshot(&self, cycle: Cycle) -> Snapshot {
-        let record = |cell: &Cell| AirplaneRecord {
+        let record = |(cell, turn_rate): (&Cell, &Shared<f64>)| AirplaneRecord {
             pose: cell.pose(),
             arrived: cell.arrived.get(),
             counts: [cell.next.get(), cell.overrides.get(), cell.orbits.get(), cell.orbiting.get()],
             fallback: cell.side(),
             altitude_m: cell.altitude_m.get(),
             orders: [cell.orders.get(), cell.waits.get()],
+            turn_rate_rad_s: turn_rate.get(),
         };
         let resolving = self.resolving.iter().map(|resolving| held(resolving).clone()).collect();
         let contacts = self.contacts.iter().map(|contacts| held(contacts).clone()).collect();
@@ -390,9 +327,10 @@ impl AirspaceState {
             pairs
         });
         let named = named.collect();
+        let wishes = self.wishes.iter().map(|wish| held(wish).clone()).collect();
         let held = (0..self.held.len() as Slot).map(|slot| self.held(slot)).collect();
-        let airplanes = self.airplanes.iter().map(record).collect();
-        Snapshot { cycle, airplanes, contacts, resolving, named, held }
+        let airplanes = self.airplanes.iter().zip(&self.turn_rates_rad_s).map(record).collect();
+        Snapshot { cycle, airplanes, contacts, resolving, named, held, wishes }
     }
 
     /// Returns whether an airplane is there in a cycle: it has appeared and has not arrived.
@@ -403,45 +341,5 @@ impl AirspaceState {
     /// Returns the part of a flight that an airplane is on now.
     pub(super) fn stage<'a>(&self, world: &'a AirspaceWorld, slot: Slot) -> Stage<'a> {
         world.stage(slot, self.airplanes[slot as usize].orders.get().into())
-    }
-}
-
-impl Snapshot {
-    /// Returns the digest of this state (promise D1): every value by id.
-    pub fn digest(&self) -> Digest {
-        let mut hasher = Hasher::default();
-        hasher.u64(self.cycle);
-        hasher.u64(self.airplanes.len() as u64);
-        let hash_pose = |hasher: &mut Hasher, pose: &Pose| {
-            let Pose { at: [x, y], heading_rad } = *pose;
-            [x, y, heading_rad].iter().for_each(|v| hasher.u64(v.to_bits()));
-        };
-        self.held.iter().for_each(|pose| hash_pose(&mut hasher, pose));
-        for airplane in &self.airplanes {
-            hash_pose(&mut hasher, &airplane.pose);
-            hasher.u64(airplane.arrived);
-            airplane.counts.iter().for_each(|&n| hasher.u32(n));
-            hasher.u8(airplane.fallback as u8);
-            // Left out without orders, because the altitude then is the scenario's, or that of the
-            // track.
-            let [orders, waits] = airplane.orders;
-            if orders > 0 || waits > 0 {
-                hasher.u64(airplane.altitude_m.to_bits());
-                hasher.u32(u32::from(orders) << 16 | u32::from(waits));
-            }
-        }
-        for &(a, b) in &self.named {
-            hasher.u32(a);
-            hasher.u32(b);
-        }
-        if !self.contacts.is_empty() {
-            let known = postcard::to_stdvec(&self.contacts).expect("contacts are plain data");
-            known.iter().for_each(|&byte| hasher.u8(byte));
-        }
-        if !self.resolving.is_empty() {
-            let resolving = postcard::to_stdvec(&self.resolving).expect("conflicts are plain data");
-            resolving.iter().for_each(|&byte| hasher.u8(byte));
-        }
-        hasher.finish()
     }
 }

@@ -1,5 +1,8 @@
 //! A compiled airspace: everything that stays fixed during a run.
 
+#[cfg(test)]
+mod tests;
+
 use super::agents::network::Network;
 use super::baseline::Reactive;
 use super::deploy::Deployment;
@@ -13,8 +16,10 @@ use super::shield::{Bounds, Side, common_rates};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, Order, Settings};
+use sidestep_kernel::control::Teams;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId, Slot, interrupt};
+use std::sync::Arc;
 
 /// The methods by which airplanes choose their actions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -29,10 +34,12 @@ pub enum Method {
     Mvp,
     /// Straight to the way-point, without regard to others.
     None,
+    /// By orders of a caller of the library; along its flight plan without them.
+    External,
 }
 
 impl Method {
-    /// All methods.
+    /// The methods by which airplanes decide themselves.
     pub const ALL: [Self; 4] = [Self::Pc, Self::Orca, Self::Mvp, Self::None];
 
     /// Returns its name in files.
@@ -42,6 +49,7 @@ impl Method {
             Self::Orca => "orca",
             Self::Mvp => "mvp",
             Self::None => "none",
+            Self::External => "external",
         }
     }
 }
@@ -116,6 +124,8 @@ pub struct AirspaceWorld {
     pub(crate) alone_s: Vec<f64>,
     /// Sides of the first fallbacks.
     pub(crate) first_fallbacks: Vec<Side>,
+    /// The airplanes that decide, by what may be ordered of them.
+    pub(crate) teams: Arc<Teams>,
 }
 
 /// Number of steps after which a flight alone is taken to be endless.
@@ -146,6 +156,7 @@ impl AirspaceWorld {
         self.orbit_rad_s = self.orbits_rad_s();
         self.top_m_s = (0..self.airplanes.len()).map(|i| self.top_m_s(i)).collect();
         self.alone_s = (0..self.airplanes.len()).map(|i| self.alone_s(i)).collect();
+        self.teams = Arc::new(self.find_teams());
         self
     }
 
@@ -156,8 +167,7 @@ impl AirspaceWorld {
             held.filter(|_| self.shield).unwrap_or(airplane.model.omega_max_rad_s)
         };
         let mut rates: Vec<f64> = self.airplanes.iter().map(largest).collect();
-        // Whoever minds nobody all the time never orbits.
-        let orbits = |&i: &usize| self.shield && !self.is_intruder(i as Slot, Cycle::MAX - 1);
+        let orbits = |&i: &usize| self.shield && self.decides(i);
         let orbiting: Vec<usize> = (0..rates.len()).filter(orbits).collect();
         let largest: Vec<f64> = orbiting.iter().map(|&i| rates[i]).collect();
         orbiting.iter().zip(common_rates(&largest)).for_each(|(&i, rate)| rates[i] = rate);
@@ -192,7 +202,8 @@ impl AirspaceWorld {
         if airplane.track.as_ref().is_some_and(|track| track.ends_s() <= joins_s) {
             return 0.0;
         }
-        let is_endless = airplane.keeps_a_heading() && airplane.leaves_s == f64::INFINITY;
+        let is_endless =
+            airplane.keeps_a_heading(airplane.orders.len()) && airplane.leaves_s == f64::INFINITY;
         let air = self.air();
         let mut pose = airplane.track.as_ref().map_or(airplane.start, |t| t.pose_at(joins_s));
         let (mut orders, mut next) = (0, 0);
@@ -266,6 +277,12 @@ impl AirspaceWorld {
         self.airplanes[slot as usize].is_intruder || self.is_replayed(slot, now)
     }
 
+    /// Returns whether the method ever flies an airplane, unless its recorded way ends before.
+    pub(crate) fn decides(&self, i: usize) -> bool {
+        // Whoever minds nobody all the time never decides, and never orbits.
+        !self.is_intruder(i as Slot, Cycle::MAX - 1)
+    }
+
     /// Returns whether an airplane follows its recorded way in a cycle.
     pub fn is_replayed(&self, slot: Slot, now: Cycle) -> bool {
         self.airplanes[slot as usize].track.is_some() && now < self.joins_in(slot as usize)
@@ -291,7 +308,7 @@ impl AirspaceWorld {
         match self.method {
             Method::Mvp => self.mvp,
             Method::Orca => self.orca,
-            Method::Pc | Method::None => Reactive {
+            Method::Pc | Method::None | Method::External => Reactive {
                 look_ahead_s: self.timing.horizon as f64 * self.timing.dtau_s,
                 margin: self.objective.inflation,
             },
@@ -360,83 +377,5 @@ impl AirspaceWorld {
         let per_round = (block as u64).checked_mul(blocks_per_round)?;
         // Plus one for the final draw.
         per_round.checked_mul(self.settings.stop.max_rounds.into())?.checked_add(1)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::scenario::Compiled;
-    use proptest::prelude::*;
-    use sidestep_kernel::math;
-    use sidestep_scenario::Source;
-
-    proptest! {
-        /// Straight stretches that are not flown step by step end where the steps would have.
-        #[test]
-        fn a_flight_alone_takes_as_long_as_flying_it_step_by_step(
-            speed in 0.0f64..20.0, from_rad in -3.2f64..3.2, heading_deg in -180.0f64..180.0,
-            goals in prop::collection::vec(prop::array::uniform2(-40_000.0f64..40_000.0), 1..4),
-        ) {
-            let wind = [speed * math::cos(from_rad), speed * math::sin(from_rad)];
-            let text = format!(
-                "format = 1\nworld = \"airspace\"\n[airspace]\nwind_m_s = {wind:?}\n[[airplanes]]\n\
-                 at_m = [0, 0]\nheading_deg = {heading_deg:?}\nway_points_m = {goals:?}\n"
-            );
-            let world = Compiled::new(&Source::new("w", text, "")).expect("a scenario").world;
-            let air = world.air();
-            let pilot = air.pilot(&world.airplanes[0].model, &world.airplanes[0].mission);
-            let (mut pose, mut next, mut steps) = (world.airplanes[0].start, 0, 0);
-            while next < goals.len() {
-                let omega = air.steer(&pilot, pose, next);
-                pose = air.blown(pose.step(pilot.model.v_m_s, omega, 1.0));
-                next = pilot.next(pose, next);
-                steps += 1;
-            }
-            prop_assert_eq!(world.alone_s[0], f64::from(steps));
-        }
-
-        /// Flying to a way-point ends, wherever it lies and however the wind blows.
-        #[test]
-        fn nobody_circles_in_the_wind_for_ever(
-            speed in 0.0f64..30.0, from_rad in -3.2f64..3.2, x in -2000.0f64..2000.0,
-            y in -2000.0f64..2000.0,
-        ) {
-            let wind = [speed * math::cos(from_rad), speed * math::sin(from_rad)];
-            let text = format!(
-                "format = 1\nworld = \"airspace\"\n[airspace]\nwind_m_s = {wind:?}\n\
-                 tolerance_m = 20.0\n\
-                 [[airplanes]]\nat_m = [0, 0]\nheading_deg = 90\nway_points_m = [[{x}, {y}]]\n"
-            );
-            let world = Compiled::new(&Source::new("w", text, "")).expect("a scenario").world;
-            prop_assert!(world.alone_s[0] < 3000.0, "{wind:?}: {}", world.alone_s[0]);
-        }
-    }
-
-    #[test]
-    fn an_order_after_the_arrival_makes_no_flight_endless() {
-        let alone_s = |at_s: f64| {
-            let text = format!(
-                "format = 1\nworld = \"airspace\"\n[[airplanes]]\nat_m = [0, 0]\n\
-                 heading_deg = 0\nway_points_m = [[3500, 0]]\n\
-                 orders = [{{ at_s = {at_s:?}, heading_deg = 90.0 }}]\n"
-            );
-            Compiled::new(&Source::new("o", text, "")).expect("a scenario").world.alone_s[0]
-        };
-        assert!((90.0..=100.0).contains(&alone_s(500.0)), "{}", alone_s(500.0));
-        assert_eq!(alone_s(50.0), f64::INFINITY);
-    }
-
-    #[test]
-    fn against_any_wind_an_airplane_tracks_its_way() {
-        for wind in [[10.0, 0.0], [0.0, 10.0], [-7.0, 7.0]] {
-            let text = format!(
-                "format = 1\nworld = \"airspace\"\n[airspace]\nwind_m_s = {wind:?}\n\
-                 [[airplanes]]\nat_m = [0, 0]\nheading_deg = 90\nway_points_m = [[0, 9000]]\n"
-            );
-            let world = Compiled::new(&Source::new("w", text, "")).expect("a scenario").world;
-            let along = 35f64 * 35.0 - wind[0] * wind[0];
-            let expected_s = 8900.0 / (along.sqrt() + wind[1]);
-            assert!((world.alone_s[0] - expected_s).abs() < 12.0, "{wind:?}: {}", world.alone_s[0]);
-        }
     }
 }

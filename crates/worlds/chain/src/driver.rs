@@ -1,6 +1,9 @@
 //! Tasks of a chain's initiator, carried out one after the other: what moves the chain, and where
 //! to (slides R4, R9).
 
+pub(crate) mod errand;
+pub(crate) mod external;
+
 use super::events::EventKind;
 use super::motion::replan::Memory;
 use super::navigate::Navigator;
@@ -48,6 +51,8 @@ pub(crate) enum Driver<const D: usize> {
     Targets(Targets<D>),
     /// Find the way on wheels, with a laser; in the plane.
     Navigate(Arc<Navigator>),
+    /// Go where a caller orders, cycle by cycle.
+    External,
 }
 
 impl<const D: usize> Driver<D> {
@@ -59,6 +64,7 @@ impl<const D: usize> Driver<D> {
             Self::Script(_) => "script",
             Self::Targets(_) => "targets",
             Self::Navigate(_) => "navigate",
+            Self::External => "external",
         }
     }
 }

@@ -198,14 +198,14 @@ impl<const D: usize> Asked<'_, D> {
     /// Tells the wish of the initiator.
     fn wants(&self, told: &mut Inspection) {
         let (Some(task), Some(wish)) = (self.task(), self.notes.wish) else { return };
-        let at = self.before.chain.points()[task.agent];
+        let at = self.before.chain.points()[wish.of];
         let target = match &task.driver {
             Driver::Targets(targets) => targets.places.get(self.before.driving.next as usize),
             _ => None,
         };
         told.tell(
             Section::new("Wish")
-                .fact("of", self.connector(task.agent))
+                .fact("of", self.connector(wish.of))
                 .fact("what", wish.words)
                 .fact("to", wish.to.map(in_dimensions::<D, 3>))
                 .fact("way", wish.to.map(|to| Value::meters(distance(at, to))))

@@ -32,6 +32,10 @@ impl Kind for Chains {
         super::scenario::sections()
     }
 
+    fn draws(&self) -> &'static str {
+        "fields, anywhere = true of a chain, tasks of kind wander, navigator.noise_m, and planned ways"
+    }
+
     fn meanings(&self) -> &'static [Meaning] {
         super::meanings::MEANINGS
     }

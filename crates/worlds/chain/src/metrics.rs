@@ -203,8 +203,7 @@ impl Tally {
 
     /// Adds a veto.
     pub(crate) fn add_veto(&mut self, reason: Reason) {
-        let k = Reason::ALL.iter().position(|&all| all == reason);
-        self.vetoes[k.unwrap_or_default()] += 1;
+        self.vetoes[reason.number()] += 1;
     }
 }
 

@@ -23,6 +23,8 @@ pub(crate) struct Notes<const D: usize> {
 /// A driver's wish.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Wanted<const D: usize> {
+    /// The connector that wants it.
+    pub(crate) of: usize,
     /// In words.
     pub(crate) words: &'static str,
     /// The place that the initiator wants to reach.

@@ -18,11 +18,13 @@ impl<const D: usize> ChainWorld<D> {
 
     /// Returns the part of its present task that an initiator has finished: for scripts by motions,
     /// for targets by targets, for timed tasks by time; for wandering the part of the distance that
-    /// its speed allows in the whole run; for resting the part of the run.
+    /// its speed allows in the whole run; for resting and for orders from outside the part of the run.
     pub(crate) fn part_done(&self, body: &Body<D>, task: &Task<D>) -> f64 {
         let part = match &task.driver {
             _ if task.lasts_s.is_finite() => self.starts_s(body.driving.cycles) / task.lasts_s,
-            Driver::Rest => body.driving.cycles as f64 / self.cycles.max(1) as f64,
+            Driver::Rest | Driver::External => {
+                body.driving.cycles as f64 / self.cycles.max(1) as f64
+            }
             Driver::Wander(_) => self.way_part(body, task),
             Driver::Script(_) => f64::from(body.driving.next) / body.motions.len().max(1) as f64,
             Driver::Targets(targets) => {

@@ -14,11 +14,13 @@ use super::words;
 use super::world::ChainWorld;
 use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
+use sidestep_kernel::control::{CellsMut, Order, Teams};
 use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
 use sidestep_kernel::view::{Frame, Inspection, Log, Look, PlaceRows, Scenery, Who};
 use sidestep_kernel::words::{Lines, Said};
 use sidestep_kernel::{Cycle, Digest, Effort, EntityId, InputError, Plan, Run, Simulation, World};
 use sidestep_scenario::Source;
+use std::sync::Arc;
 
 /// A run of chains in `D` dimensions.
 pub type ChainRun<const D: usize> = Run<ChainWorld<D>>;
@@ -201,6 +203,22 @@ impl<const D: usize> World for ChainWorld<D> {
         who: Who,
     ) -> Option<Inspection> {
         ChainWorld::inspect(self, state, now, who)
+    }
+
+    fn teams(&self) -> Arc<Teams> {
+        self.teams.clone()
+    }
+
+    fn check_order(&self, order: &Order<'_>) -> Result<(), String> {
+        self.is_possible(order)
+    }
+
+    fn order(&self, state: &mut ChainState<D>, order: &Order<'_>) {
+        self.note_order(state, order);
+    }
+
+    fn observe(&self, state: &ChainState<D>, now: Cycle, team: usize, room: &mut [CellsMut<'_>]) {
+        ChainWorld::observe(self, state, now, team, room);
     }
 
     fn place_rows(&self, books: &Books) -> Vec<PlaceRows> {

@@ -347,7 +347,7 @@ impl<const D: usize> Compiler<'_, D> {
         let look_m = 4.0 * radius_m.fold(0.05, f64::max);
         let escape = self.escape(&chains, &ground.movers, dt_s);
         let joint_speed_m_s = self.joint_speed_m_s(&chains);
-        Ok(ChainWorld {
+        let world = ChainWorld {
             chains,
             cycles,
             escape,
@@ -358,7 +358,9 @@ impl<const D: usize> Compiler<'_, D> {
             rules: self.rules(escape.as_ref(), joint_speed_m_s * dt_s),
             look_m: section.look_m.map_or(look_m, f64::from),
             streams: Streams::new(Seed(self.head.seed)),
-        })
+            teams: Arc::default(),
+        };
+        Ok(ChainWorld { teams: Arc::new(world.find_teams()), ..world })
     }
 
     /// Runs the scripts once, so that they cannot fail during a run.
@@ -435,6 +437,7 @@ impl<const D: usize> Compiler<'_, D> {
             None => Ok(()),
             Some((key, ..)) => {
                 let remedy = "leave it out, or give what it belongs to";
+                let at = self.source.within(at, &[key]);
                 Err(self.source.error(at, format!("`{key}` does nothing {of}"), remedy))
             }
         }

@@ -1,5 +1,6 @@
 //! The changing state of a run, and its snapshot.
 
+use super::driver::external::External;
 use super::driver::{Driving, Task};
 use super::formation::{Robot, Solid};
 use super::metrics::Tally;
@@ -56,6 +57,8 @@ pub struct Body<const D: usize> {
     pub(crate) way_out: WayOut,
     /// The motions of the present script, which follow from the place where it started.
     pub(crate) motions: Vec<Motion>,
+    /// Orders from outside, and the answer to the last ones.
+    pub(crate) external: External,
     /// The way that it follows because local rules came no nearer.
     pub(crate) plan: Option<Plan<D>>,
     /// Motions that the chain has yet to follow; none whenever somebody looks.
@@ -116,6 +119,8 @@ pub struct Snapshot {
     pub plans: Vec<PlanRecord>,
     /// Chains that are on a way out of where they were caught, by id.
     pub(crate) ways_out: Vec<(u32, WayOut)>,
+    /// Orders from outside and answers, of chains that have any, by id.
+    pub(crate) externals: Vec<(u32, External)>,
 }
 
 impl<const D: usize> Body<D> {
@@ -132,6 +137,7 @@ impl<const D: usize> Body<D> {
             tally: Tally::default(),
             way_out: WayOut::default(),
             motions: Vec::new(),
+            external: External::default(),
             plan: None,
             put_off: PutOff::default(),
         };
@@ -201,20 +207,9 @@ impl<const D: usize> Body<D> {
         }
         let motions = spec.motions(&record.driving).map_err(|_| CheckpointError::Damaged)?;
         let (driving, scattered) = (record.driving.clone(), record.scattered.clone());
-        let (robots, robot_radius_m) = (record.robots.clone(), spec.robot_radius_m());
-        let (way_out, plan, put_off) = (WayOut::default(), None, PutOff::default());
-        Ok(Self {
-            chain,
-            driving,
-            scattered,
-            robots,
-            robot_radius_m,
-            tally,
-            way_out,
-            motions,
-            plan,
-            put_off,
-        })
+        let fresh = Self::new(spec).map_err(|_| CheckpointError::Damaged)?;
+        let robots = record.robots.clone();
+        Ok(Self { chain, driving, scattered, robots, tally, motions, ..fresh })
     }
 }
 
@@ -265,6 +260,11 @@ impl<const D: usize> ChainState<D> {
         for (slot, way_out) in &snapshot.ways_out {
             let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
             body.way_out = *way_out;
+        }
+        for (slot, external) in &snapshot.externals {
+            let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
+            let is_its_own = external.is_within(body.chain.points().len());
+            body.external = is_its_own.then_some(*external).ok_or(CheckpointError::Damaged)?;
         }
         Ok(Self::of(bodies.into_iter()))
     }
@@ -328,11 +328,13 @@ impl<const D: usize> ChainState<D> {
         let slots = 0..self.len();
         let plan = |slot| Some(self.body(slot).plan.as_ref()?.record(slot as EntityId));
         let ways_out = slots.clone().map(|slot| (slot as EntityId, self.body(slot).way_out));
+        let externals = slots.clone().map(|slot| (slot as EntityId, self.body(slot).external));
         Snapshot {
             cycle,
             chains: slots.clone().map(|slot| self.body(slot).record()).collect(),
             plans: slots.filter_map(plan).collect(),
             ways_out: ways_out.filter(|(_, way_out)| !way_out.is_none()).collect(),
+            externals: externals.filter(|(_, external)| !external.is_none()).collect(),
         }
     }
 
@@ -363,14 +365,18 @@ impl Snapshot {
     pub fn digest(&self) -> Digest {
         let mut hasher = Hasher::default();
         add(&mut hasher, &(self.cycle, &self.chains));
-        // Nothing is added for nobody, so that worlds without plans and ways out keep their digests.
-        if !self.plans.is_empty() {
-            add(&mut hasher, &self.plans);
-        }
-        if !self.ways_out.is_empty() {
-            add(&mut hasher, &self.ways_out);
-        }
+        // Nothing is added for nobody, so that worlds without plans, ways out and orders keep their digests.
+        add_any(&mut hasher, &self.plans);
+        add_any(&mut hasher, &self.ways_out);
+        add_any(&mut hasher, &self.externals);
         hasher.finish()
+    }
+}
+
+/// Adds a list to a digest, unless it is empty.
+fn add_any<T: Serialize>(hasher: &mut Hasher, list: &[T]) {
+    if !list.is_empty() {
+        add(hasher, &list);
     }
 }
 

@@ -5,7 +5,7 @@ use super::scenario::Compiled;
 use super::state::Snapshot;
 use serde_json::{Value, json};
 use sidestep_kernel::World;
-use sidestep_kernel::words::{Lines, Said, aligned, grouped, line};
+use sidestep_kernel::words::{Lines, Said, aligned, fixed, grouped, line};
 
 /// Returns the contents of a compiled scenario.
 pub(super) fn contents<const D: usize>(compiled: &Compiled<D>) -> Said {
@@ -76,12 +76,22 @@ pub(super) fn outcome(m: &Metrics) -> Lines {
     lines
 }
 
+/// Length below which a rod out of its limits is a matter of rounding, m.
+const ROUNDING_M: f64 = 1e-9;
+
+fn rods(violation_m: f64) -> String {
+    match violation_m <= ROUNDING_M {
+        true => "within their limits".into(),
+        false => format!("out of their limits by up to {} m", fixed(violation_m, 6)),
+    }
+}
+
 /// Returns how far the chains came, at what cost, and what they kept.
 fn motion(m: &Metrics) -> Lines {
     let clearance = match m.min_clearance_m {
         None => "nothing came near".into(),
         Some(c) if c.abs() < TOUCH_M => "touched".into(),
-        Some(c) => format!("{c:.4} m"),
+        Some(c) => format!("{} m", fixed(c, 4)),
     };
     let penetrations = match m.penetrations {
         0 => "none".into(),
@@ -93,7 +103,7 @@ fn motion(m: &Metrics) -> Lines {
         line("vetoes", vetoes(m)),
         line("penetrations", penetrations),
         line("least clearance", clearance),
-        line("rods", format!("within their limits to {:.1e} m", m.max_rod_violation_m)),
+        line("rods", rods(m.max_rod_violation_m)),
         line("effort", format!("{moved:.1} connectors moved per step, {turned} rods turned")),
         line("greatest speed", format!("{:.3} m/s", m.max_speed_m_s)),
     ]

@@ -13,6 +13,7 @@ use super::rods::rebuild::MayCome;
 use super::rods::rules::Rules;
 use super::script::Motion;
 use super::swarm::drive::Pose;
+use sidestep_kernel::control::Teams;
 use sidestep_kernel::math::atan2;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, InputError, Slot};
@@ -63,6 +64,8 @@ pub struct ChainWorld<const D: usize> {
     /// Distance around its parts in which a chain looks for its least clearance, meters.
     pub look_m: f64,
     pub(crate) streams: Streams,
+    /// Chains that observe, and may be ordered, alike.
+    pub(crate) teams: Arc<Teams>,
 }
 
 /// One chain and its tasks.

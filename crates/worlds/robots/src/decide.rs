@@ -6,6 +6,7 @@
 
 mod announce;
 pub(crate) mod ask;
+mod external;
 mod goto;
 mod patient;
 mod plan;
@@ -16,11 +17,12 @@ mod touch;
 mod wander;
 
 pub use announce::Announce;
+pub use external::External;
 pub use goto::{Avoidance, Goto, Shuttle};
 pub use patient::Patient;
 pub use plan::Planner;
 pub use random::Random;
-pub use replay::{External, ORDER, Replay};
+pub use replay::Replay;
 pub use sidestep::Trust;
 pub use wander::Wander;
 
@@ -167,6 +169,12 @@ pub trait Behaviour: std::fmt::Debug + Send + Sync {
     /// Returns whether its robots ask each other to make room. Then word 2 of the memory holds the
     /// robot's request, and the world writes the one that it hears into word 3.
     fn asks(&self) -> bool {
+        false
+    }
+
+    /// Returns whether it does what a caller orders ([`External`]) and looks at nothing, so that its robots
+    /// need not perceive twice.
+    fn is_external(&self) -> bool {
         false
     }
 

@@ -52,6 +52,8 @@ struct Looking<'a, T: BoxWord> {
 impl<'a, T: BoxWord> Looking<'a, T> {
     fn all(mut self) -> Inspection {
         let scratch = &mut self.scene.world.scratch();
+        // Who is decided from outside perceives within a cycle only for those who record it.
+        scratch.keep_readings = true;
         self.is_now();
         self.perceives(scratch);
         let bodies = 0..self.scene.world.bodies.len() as Slot;

@@ -52,6 +52,10 @@ impl Kind for Robots {
         super::scenario::sections(&self.own)
     }
 
+    fn draws(&self) -> &'static str {
+        "errors (a regime other than reliable), random places and doors, and behaviors that draw"
+    }
+
     fn meanings(&self) -> &'static [Meaning] {
         super::meanings::MEANINGS
     }
@@ -85,6 +89,10 @@ impl AnyCompiled for Compiled {
 
     fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {
         bundle::resolve(source, self)
+    }
+
+    fn reseeded(&self, seed: u64) -> Option<Result<Box<dyn AnyCompiled>, InputError>> {
+        Some(Compiled::reseeded(self, seed).map(|compiled| Box::new(compiled) as Box<_>))
     }
 
     fn start(&self, source: &Source, workers: usize) -> Box<dyn Simulation> {

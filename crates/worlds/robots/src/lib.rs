@@ -27,6 +27,7 @@ pub mod learn;
 mod meanings;
 pub mod metrics;
 mod odometry;
+mod outside;
 mod perceive;
 pub mod policy;
 mod purpose;

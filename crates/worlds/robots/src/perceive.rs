@@ -55,11 +55,7 @@ impl<T: BoxWord> Scene<'_, T> {
         scratch: &mut Scratch,
     ) -> (Decision, Memory) {
         let cell = self.cell(slot);
-        let nearest = self.sense(model, cell, scratch);
-        scratch.heard.clear();
-        if let Some(radio) = &self.world.radio {
-            self.listen(radio, slot, &mut scratch.heard);
-        }
+        let nearest = self.percept(model, slot, scratch);
         let percept = Percept {
             now: self.now,
             id: cell.id,
@@ -75,6 +71,23 @@ impl<T: BoxWord> Scene<'_, T> {
         let mut draws = self.world.streams.draws(cell.id, self.now, purpose::DECIDE);
         let decision = model.behaviour.decide(&percept, &mut memory, &mut draws);
         (decision, memory)
+    }
+
+    /// Fills the scratch with what a robot senses and hears, and returns the nearest class reported per
+    /// sector. Who is decided from outside was observed before the cycle: perceiving again would show
+    /// the same, and is left out unless readings are recorded.
+    #[inline(always)]
+    fn percept(&self, model: &RobotModel, slot: Slot, scratch: &mut Scratch) -> [u8; 4] {
+        scratch.heard.clear();
+        if model.is_external && !scratch.keep_readings {
+            scratch.readings.clear();
+            return [UNSEEN; 4];
+        }
+        let nearest = self.sense(model, self.cell(slot), scratch);
+        if let Some(radio) = &self.world.radio {
+            self.listen(radio, slot, &mut scratch.heard);
+        }
+        nearest
     }
 
     /// Records the parts of a decision beside the action: trips and broadcasts.
@@ -201,7 +214,7 @@ impl<T: BoxWord> Scene<'_, T> {
 
     /// Collects the last broadcasts of the robots in range, by sender; each reception may be lost.
     /// Robots that have said nothing yet are left out.
-    fn listen(&self, radio: &Radio, slot: Slot, heard: &mut Vec<Heard>) {
+    pub(super) fn listen(&self, radio: &Radio, slot: Slot, heard: &mut Vec<Heard>) {
         let (world, state, id) = (self.world, self.state, self.cell(slot).id);
         for &sender in &world.robots {
             let other = state.slot_of_id[sender as usize];

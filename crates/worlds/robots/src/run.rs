@@ -9,11 +9,13 @@ use super::world::RobotsWorld;
 use super::{Scratch, words};
 use serde_json::{Value, json};
 use sidestep_kernel::checkpoint::CheckpointError;
+use sidestep_kernel::control::{CellsMut, Order, Teams};
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep_kernel::view::{Frame, Inspection, Look, PlaceRows, Scenery, Who};
 use sidestep_kernel::words::{Lines, Said};
 use sidestep_kernel::{Cycle, Digest, Effort, EntityId, InputError, Plan, Run, World};
 use sidestep_scenario::Source;
+use std::sync::Arc;
 
 /// A run of a robots world.
 pub type RobotsRun = Run<RobotsWorld>;
@@ -61,14 +63,6 @@ impl Compiled {
         };
         let visited = vec![0; self.world.map.cells().len().div_ceil(8)];
         Snapshot { cycle: 0, bodies: self.start.iter().map(record).collect(), visited }
-    }
-}
-
-impl RobotsState {
-    /// Orders an action for the next cycle from a robot with the behavior `external`.
-    pub fn order(&self, robot: EntityId, action: u8) {
-        use super::decide::ORDER;
-        self.body(robot).memory[ORDER].set(u32::from(action) + 1);
     }
 }
 
@@ -164,6 +158,18 @@ impl World for RobotsWorld {
 
     fn inspect(&self, state: &RobotsState, _: &Books, now: Cycle, who: Who) -> Option<Inspection> {
         RobotsWorld::inspect(self, state, now, who)
+    }
+
+    fn teams(&self) -> Arc<Teams> {
+        Arc::clone(&self.teams)
+    }
+
+    fn order(&self, state: &mut RobotsState, order: &Order<'_>) {
+        self.note_order(state, order);
+    }
+
+    fn observe(&self, state: &RobotsState, now: Cycle, team: usize, room: &mut [CellsMut<'_>]) {
+        RobotsWorld::observe(self, state, now, team, room);
     }
 
     fn place_rows(&self, _: &Books) -> Vec<PlaceRows> {

@@ -8,6 +8,7 @@ use super::sensor::{Reading, ReadingTable, Row, SensorModel};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::Cycle;
+use sidestep_kernel::control::Teams;
 use sidestep_kernel::distr::{Chance, RowError};
 use sidestep_kernel::space::Position;
 use sidestep_kernel::stream::{Purpose, Streams};
@@ -100,6 +101,8 @@ pub struct RobotsWorld {
     pub types: Vec<BodyType>,
     pub(super) kind_rank: Vec<u8>,
     pub(super) radio: Option<Radio>,
+    /// The robots as a caller sees them.
+    pub(super) teams: Arc<Teams>,
     pub(super) robots: Vec<EntityId>,
     /// Whether there are robots that ask each other to make room.
     pub(super) has_asks: bool,
@@ -188,6 +191,16 @@ pub struct RobotModel {
     pub body: Arc<RobotBody>,
     /// The behavior, which chooses its actions.
     pub behaviour: Arc<dyn Behaviour>,
+    /// Whether it is decided from outside; asked once, as the answer is needed in every cycle.
+    pub(super) is_external: bool,
+}
+
+impl RobotModel {
+    /// Returns a robot type of this body and this mind.
+    pub fn new(body: Arc<RobotBody>, behaviour: Arc<dyn Behaviour>) -> Self {
+        let is_external = behaviour.is_external();
+        Self { body, behaviour, is_external }
+    }
 }
 
 /// Sensors and effectors of a robot type.

@@ -17,6 +17,11 @@ pub trait Buffer {
     /// Number of waiting rows.
     fn rows(&self) -> usize;
 
+    /// Whether rows must be recorded before more should be kept.
+    fn is_full(&self) -> bool {
+        self.rows() >= MAX_ROWS
+    }
+
     /// Takes all waiting rows as one block. `None` for a table that is not recorded.
     fn take(&mut self) -> Option<Vec<Values>>;
 }
@@ -31,7 +36,7 @@ pub trait Buffers {
 
     /// Whether rows must be recorded before more can be kept.
     fn is_full(&self) -> bool {
-        self.buffers().iter().any(|buffer| buffer.rows() >= MAX_ROWS)
+        self.buffers().iter().any(|buffer| buffer.is_full())
     }
 
     /// Returns the schemas of the recorded tables.

@@ -86,6 +86,11 @@ impl<T> Cells<T> {
         self.mask.0.as_deref()
     }
 
+    /// Returns the values as they lie in memory, and the mask of those that there are, without a copy.
+    pub fn into_parts(self) -> (Vec<T>, Option<Vec<bool>>) {
+        (self.values, self.mask.0)
+    }
+
     /// Keeps the cells at which `keep` (of the same length) is true.
     pub fn retain_rows(&mut self, keep: &[bool]) {
         retain(&mut self.values, keep);

@@ -79,6 +79,11 @@ fn store(turn: &mut Turn<'_>, flight: Flight<'_>) {
     let mut pose = flight.pose;
     scratch.flown.extend(rows(world, now, &flight));
     let is_disturbed = matches!(flight.course, Course::Way(..));
+    let turn_rate_rad_s = match &flight.course {
+        Course::Way(way, _) => way.omegas_rad_s.last().copied().unwrap_or_default(),
+        Course::Track(_) => 0.0,
+    };
+    state.set_turn_rate_rad_s(flight.slot, turn_rate_rad_s);
     // On its orbit it has moved the pose there already.
     if cell.orbiting.get() == 0 {
         state.set_held(flight.slot, Pose { heading_rad: wrap_angle(pose.heading_rad), ..pose });

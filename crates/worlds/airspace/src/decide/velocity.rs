@@ -38,13 +38,15 @@ pub(super) fn by_velocity(
         }
     }
     state.put_resolving(&slots, memory);
-    let with_others = |(known, way): (&Known, Way)| {
-        let turn_rad_s = way.omegas_rad_s.first().copied().unwrap_or_default();
-        let others = ways(world, *known, &by_turn(world, *known, turn_rad_s));
-        let others: Vec<Way> = others.into_iter().filter(|other| *other != way).collect();
-        [vec![way], others].concat()
-    };
-    group.iter().zip(wanted).map(with_others).collect()
+    group.iter().zip(wanted).map(|(known, way)| beside(world, *known, way)).collect()
+}
+
+/// Returns a way, and then those of the airplane's actions by how little they differ from it.
+pub(super) fn beside(world: &AirspaceWorld, known: Known, way: Way) -> Vec<Way> {
+    let turn_rad_s = way.omegas_rad_s.first().copied().unwrap_or_default();
+    let others = ways(world, known, &by_turn(world, known, turn_rad_s));
+    let others: Vec<Way> = others.into_iter().filter(|other| *other != way).collect();
+    [vec![way], others].concat()
 }
 
 /// Returns the heading that the method gives each airplane; `None` for one that is to fly to its
@@ -82,7 +84,7 @@ fn headings(
 }
 
 /// Flies one step toward a heading, or to the way-point, and returns its turn rate.
-fn step(world: &AirspaceWorld, known: &mut Known, heading_rad: Option<f64>) -> f64 {
+pub(super) fn step(world: &AirspaceWorld, known: &mut Known, heading_rad: Option<f64>) -> f64 {
     let Stage { model, mission, .. } = world.stage(known.slot, known.orders);
     let (air, pose) = (world.air(), known.pose);
     let pilot = air.pilot(model, mission);

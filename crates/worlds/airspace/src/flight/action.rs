@@ -2,6 +2,7 @@
 
 use super::motion::Model;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// An action: a turn rate, held for some time, and then proceeding to the way-point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -44,6 +45,23 @@ impl Action {
             Self::Leg { omega_rad_s, turn_s, .. } if before(turn_s) => Some(omega_rad_s),
             Self::Leg { until_s, .. } => before(until_s).then_some(0.0),
             Self::Proceed => None,
+        }
+    }
+}
+
+impl fmt::Display for Action {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let turn = |omega_rad_s: f64| match omega_rad_s {
+            0.0 => "straight on".into(),
+            _ => format!("{:+.1} °/s", omega_rad_s.to_degrees()),
+        };
+        match *self {
+            Self::Hold { omega_rad_s } => f.write_str(&turn(omega_rad_s)),
+            Self::Then { omega_rad_s, hold_s } => write!(f, "{} for {hold_s} s", turn(omega_rad_s)),
+            Self::Leg { omega_rad_s, turn_s, until_s } => {
+                write!(f, "{} for {turn_s} s, straight on until {until_s} s", turn(omega_rad_s))
+            }
+            Self::Proceed => f.write_str("to the way-point"),
         }
     }
 }

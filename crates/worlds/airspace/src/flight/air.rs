@@ -109,6 +109,17 @@ impl Air {
         actions.iter().map(|action| pilot.predict(*action, pose, next, &self.timing)).collect()
     }
 
+    /// Returns the seconds of the straight way over the ground to `goal`.
+    pub fn straight_s(&self, at: Point, goal: Point, v_m_s: f64) -> f64 {
+        if self.is_still() {
+            return distance_m(at, goal) / v_m_s;
+        }
+        let ([wx, wy], heading) = (self.wind_m_s, self.aim(at, goal, v_m_s));
+        let ground = [heading[0] - at[0] + wx, heading[1] - at[1] + wy];
+        let speed_m_s = math::hypot(ground[0], ground[1]).max(1e-3);
+        distance_m(at, goal) / speed_m_s
+    }
+
     /// Returns the mission as seen from the moving air: each way-point at its place when the
     /// airplane reaches it.
     fn drifted(&self, mission: &[Point], (mut at, next): (Point, usize), v_m_s: f64) -> Vec<Point> {
@@ -119,10 +130,7 @@ impl Air {
         let [wx, wy] = self.wind_m_s;
         let mut flown_s = 0.0;
         for goal in drifted.iter_mut().skip(next) {
-            let heading = self.aim(at, *goal, v_m_s);
-            let ground = [heading[0] - at[0] + wx, heading[1] - at[1] + wy];
-            let speed_m_s = math::hypot(ground[0], ground[1]).max(1e-3);
-            flown_s += distance_m(at, *goal) / speed_m_s;
+            flown_s += self.straight_s(at, *goal, v_m_s);
             at = *goal;
             *goal = [goal[0] - wx * flown_s, goal[1] - wy * flown_s];
         }

@@ -32,12 +32,13 @@ pub struct Airplane {
 }
 
 impl Airplane {
-    /// Returns whether its last order about where to fly leads to no way-point.
-    pub(crate) fn keeps_a_heading(&self) -> bool {
+    /// Returns whether the last one of its first `done` orders about where to fly leads to no
+    /// way-point.
+    pub(crate) fn keeps_a_heading(&self, done: usize) -> bool {
         let is_about_the_way = |order: &&FlightOrder| {
             matches!(order.task, Task::Heading(_) | Task::Proceed | Task::WayPoints(_))
         };
-        let last = self.orders.iter().rev().find(is_about_the_way);
+        let last = self.orders.iter().take(done).rev().find(is_about_the_way);
         last.is_some_and(|order| matches!(order.task, Task::Heading(_)))
     }
 

@@ -2,8 +2,9 @@
 
 use super::{Looking, airplane};
 use crate::agents::network::Traffic;
-use crate::flight::{Action, Point, Pose};
+use crate::flight::{Point, Pose};
 use crate::shield::{Side, Way};
+use crate::world::Method;
 use sidestep_kernel::view::{Inspection, MarkShape, Place, Role, Section, Table, Value};
 
 /// Points of a predicted way that are drawn, at most, beside those of the next `dt`.
@@ -17,8 +18,11 @@ impl Looking<'_> {
         let Some(own) = self.notes.own(&self.notes.group) else { return };
         let section = Section::new("Decides");
         let Some(decided) = &self.notes.decided else {
-            let wish = self.notes.wishes.first().map(|action| said(*action));
-            let wish = wish.unwrap_or_else(|| "the heading that the method gives it".into());
+            let wish = self.notes.wishes.first().map(|action| action.to_string());
+            let wish = wish.unwrap_or_else(|| match self.world.method {
+                Method::External => "the turn that was ordered".into(),
+                _ => "the heading that the method gives it".into(),
+            });
             return told.tell(section.fact("action", wish));
         };
         let actions = self.world.actions_of(self.id);
@@ -30,7 +34,7 @@ impl Looking<'_> {
             let is_chosen = k == decided.chosen;
             let expected = Value::number(decided.expected[k], "");
             table.row([
-                said(*action).into(),
+                action.to_string().into(),
                 chance.map_or(Value::None, Value::Share),
                 expected,
                 is_chosen.into(),
@@ -38,11 +42,11 @@ impl Looking<'_> {
             let ahead = options.predictions[k].points.iter().copied();
             let shape = self.line(&[own.pose.at].into_iter().chain(ahead).collect::<Vec<_>>());
             let role = if is_chosen { Role::Chosen } else { Role::Predicted };
-            told.weigh(role, said(*action), chance.unwrap_or(UNKNOWN), shape);
+            told.weigh(role, action.to_string(), chance.unwrap_or(UNKNOWN), shape);
         }
         told.tell(
             section
-                .fact("action", said(actions[decided.chosen]))
+                .fact("action", actions[decided.chosen].to_string())
                 .fact("rounds", Value::count(decided.rounds))
                 .fact("has settled", decided.converged)
                 .table(table),
@@ -163,22 +167,6 @@ impl Looking<'_> {
         if let Some(way) = way {
             told.mark(Role::Done, "what it flies", self.flown(way));
         }
-    }
-}
-
-/// Describes an action.
-fn said(action: Action) -> String {
-    let turn = |omega_rad_s: f64| match omega_rad_s {
-        0.0 => "straight on".into(),
-        _ => format!("{:+.1} °/s", omega_rad_s.to_degrees()),
-    };
-    match action {
-        Action::Hold { omega_rad_s } => turn(omega_rad_s),
-        Action::Then { omega_rad_s, hold_s } => format!("{} for {hold_s} s", turn(omega_rad_s)),
-        Action::Leg { omega_rad_s, turn_s, until_s } => {
-            format!("{} for {turn_s} s, straight on until {until_s} s", turn(omega_rad_s))
-        }
-        Action::Proceed => "to the way-point".into(),
     }
 }
 

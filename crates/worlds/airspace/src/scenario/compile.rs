@@ -80,7 +80,7 @@ impl Compiler<'_> {
         match (is_drawn, world.method) {
             (true, _) => Seeds::Decide,
             (false, Method::Pc) => Seeds::Perhaps,
-            (false, Method::Mvp | Method::Orca | Method::None) => Seeds::Nothing,
+            (false, Method::Mvp | Method::Orca | Method::None | Method::External) => Seeds::Nothing,
         }
     }
 
@@ -123,6 +123,7 @@ impl Compiler<'_> {
             top_m_s: Vec::new(),
             alone_s: Vec::new(),
             first_fallbacks: Vec::new(),
+            teams: Arc::default(),
         };
         Ok(world.prepared())
     }

@@ -1,6 +1,7 @@
 //! The present task of a chain, for one cycle: the wish of its driver.
 
 use super::Acting;
+use crate::driver::errand::Errand;
 use crate::driver::{Driver, Targets, Task, Wander, wander};
 use crate::events::EventKind;
 use crate::notes::Wanted;
@@ -8,6 +9,9 @@ use crate::rods::geometry::{Point, along, distance, in_dimensions, towards};
 use crate::script::Motion;
 use crate::swarm::drive::Pose;
 use crate::world::purpose;
+
+/// The words for a wish that is put off.
+const WAIT: &str = "wait, because parts get out of the way";
 
 /// A driver's wish in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,6 +24,8 @@ enum Wish<const D: usize> {
     Follow,
     /// A robot on wheels at another pose.
     Steer(Pose),
+    /// The order of a caller.
+    Obey(Errand<D>),
     /// Its task is done.
     Done,
 }
@@ -41,6 +47,7 @@ impl<const D: usize> Acting<'_, D> {
             }
             Wish::Follow => self.follow_plan(task),
             Wish::Steer(pose) => self.go_on_wheels(task, pose),
+            Wish::Obey(errand) => self.obey(task, errand),
             Wish::Done => return self.next_task(EventKind::Done),
         }
         if is_late {
@@ -50,10 +57,15 @@ impl<const D: usize> Acting<'_, D> {
 
     /// Returns a wish in words.
     fn wanted(&self, task: &Task<D>, wish: Wish<D>) -> Wanted<D> {
+        let mut of = task.agent;
         let (words, to) = match wish {
             Wish::Rest => ("rest", None),
-            Wish::Go(to) if self.gives_way => ("wait, because parts get out of the way", Some(to)),
+            Wish::Go(to) if self.gives_way => (WAIT, Some(to)),
             Wish::Go(to) => ("go", Some(to)),
+            Wish::Obey(errand) => {
+                of = errand.first;
+                (if self.gives_way { WAIT } else { "go, as ordered" }, Some(errand.to[0]))
+            }
             Wish::Follow => {
                 let plan = self.body.plan.as_ref().and_then(|plan| plan.way.front());
                 ("follow its plan", plan.map(|posture| posture[task.agent]))
@@ -61,7 +73,7 @@ impl<const D: usize> Acting<'_, D> {
             Wish::Steer(pose) => ("steer", Some(in_dimensions(pose.at))),
             Wish::Done => ("its task is done", None),
         };
-        Wanted { words, to }
+        Wanted { of, words, to }
     }
 
     /// Returns where the initiator wants to be at the end of the cycle.
@@ -70,6 +82,7 @@ impl<const D: usize> Acting<'_, D> {
         let step_m = task.speed_m_s * self.world.dt_s;
         match &task.driver {
             Driver::Rest => Wish::Rest,
+            Driver::External => self.ordered(task, step_m).map_or(Wish::Rest, Wish::Obey),
             Driver::Navigate(navigator) => {
                 if self.has_arrived(task, navigator) {
                     return Wish::Done;

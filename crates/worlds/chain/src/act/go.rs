@@ -40,7 +40,6 @@ impl<const D: usize> Acting<'_, D> {
 
     /// Requests a motion of the whole chain.
     fn climb(&mut self, task: &Task<D>, to: Point<D>) -> Climbed<D> {
-        let at = self.body.chain.points()[task.agent];
         let motion = Motion::Connector { k: task.agent, to };
         let request = Request { motion, source: task.source(), mode: Mode::Exact };
         let situation = self.situation(task);
@@ -54,14 +53,18 @@ impl<const D: usize> Acting<'_, D> {
             &situation,
         );
         self.body.driving.ladder = ladder.memory;
-        // There is no way out of the range of coordinates.
-        let (by, reason) = (task.agent, Reason::Limit);
-        let beyond = Veto { by, from: by, reason, obstacle: None, reached: at };
+        let beyond = self.beyond(task.agent);
         let (climbed, objection) = climbed.unwrap_or((Climbed::Vetoed(beyond), Some(beyond)));
         if let Some(veto) = &objection {
             self.vetoed(veto);
         }
         climbed
+    }
+
+    /// Returns the objection of an initiator that would leave the range of coordinates.
+    pub(super) fn beyond(&self, by: usize) -> Veto<D> {
+        let reached = self.body.chain.points()[by];
+        Veto { by, from: by, reason: Reason::Limit, obstacle: None, reached }
     }
 
     /// Returns the distance of an initiator from its target, if it has one.
@@ -175,6 +178,7 @@ impl<const D: usize> Acting<'_, D> {
             self.body.driving.told = self.body.driving.told.or(Some(EventKind::Veto));
         }
         self.body.driving.objection = objection;
+        self.is_told(veto);
     }
 
     /// Gives up a task that made no progress for too long. Around a target there is always some way

@@ -26,7 +26,7 @@ impl<const D: usize> Acting<'_, D> {
     fn leads_in_range(&self, task: &Task<D>) -> bool {
         let most_m = MAX_COORDINATE_M - 2.0 * task.speed_m_s * self.world.dt_s;
         task.agent == 0
-            && !matches!(task.driver, Driver::Navigate(_))
+            && !matches!(task.driver, Driver::Navigate(_) | Driver::External)
             && self.body.chain.points()[0].iter().all(|x| x.abs() < most_m)
     }
 

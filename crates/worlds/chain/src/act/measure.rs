@@ -1,11 +1,10 @@
 //! Measures of a chain at the end of each of its cycles.
 
 use super::Acting;
+use crate::clearance::least_clearance;
 use crate::events::EventKind;
 use crate::metrics::PENETRATION_M;
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{Bounds, distance};
-use crate::rods::obstacle::Obstacles;
+use crate::rods::geometry::distance;
 
 impl<const D: usize> Acting<'_, D> {
     /// Measures the chain after its cycle.
@@ -33,37 +32,4 @@ impl<const D: usize> Acting<'_, D> {
             self.tell(kind, part, (-least_m).max(0.0));
         }
     }
-}
-
-/// Returns the least distance of any connector, and of any rod if rods count, from obstacles, up to
-/// `look_m`, and the connector at or before that part.
-fn least_clearance<const D: usize>(
-    chain: &Chain<D>,
-    obstacles: &Obstacles<D>,
-    look_m: f64,
-    with_rods: bool,
-) -> (f64, usize) {
-    if obstacles.is_empty() {
-        return (look_m, 0);
-    }
-    let points = chain.points();
-    let mut least = (look_m, 0);
-    let mut tell = |apart_m: f64, part: usize| {
-        if apart_m < least.0 {
-            least = (apart_m, part);
-        }
-    };
-    // One query serves a rod and its ends, because obstacles near one of them are mostly near all.
-    for k in 0..points.len() {
-        let end = if with_rods { (k + 1).min(points.len() - 1) } else { k };
-        let radii_m = [k, end].map(|i| chain.connectors()[i].radius_m);
-        let rod_m = chain.rods().get(k).map_or(0.0, |rod| rod.radius_m);
-        let near = Bounds::of(&[points[k], points[end]]).grown(radii_m[0].max(radii_m[1]) + look_m);
-        obstacles.visit(&near, |o| {
-            let ball_m = o.core.nearest_to_point(points[k]).distance_m - radii_m[0];
-            let rod_m = o.core.nearest_to_segment([points[k], points[end]]).distance_m - rod_m;
-            tell(ball_m.min(rod_m) - o.radius_m, k);
-        });
-    }
-    least
 }

@@ -1,8 +1,8 @@
 //! Phase *act*: the actions of one chain in a cycle.
 //!
 //! ```text
-//! broken.rs -> bounds.rs (out of the way) -> drive.rs -> go.rs, wheels.rs -> bounds.rs (back into the claim)
-//!           -> follow.rs -> measure.rs
+//! broken.rs -> bounds.rs (out of the way) -> drive.rs -> go.rs, wheels.rs, obey.rs
+//!           -> bounds.rs (back into the claim) -> follow.rs -> measure.rs
 //! broken.rs -> drive.rs -> go.rs, later.rs         where nothing can object
 //!              drive.rs -> plan.rs                 where local rules come no nearer
 //! ```
@@ -14,10 +14,13 @@ mod follow;
 mod go;
 mod later;
 mod measure;
+mod obey;
 mod plan;
 mod wheels;
 
 use super::driver::Task;
+use super::driver::errand::Errand;
+use super::driver::external::Orders;
 use super::events::{Event, EventKind};
 use super::notes::Notes;
 use super::rods::geometry::{Bounds, in_dimensions};
@@ -35,6 +38,10 @@ pub(crate) struct Acting<'a, const D: usize> {
     now: Cycle,
     /// Decision of its navigator.
     decision: Option<Decision>,
+    /// Orders from outside,
+    orders: Orders,
+    /// and the errand on which they send it.
+    errand: Option<Errand<D>>,
     /// The box that it stays in.
     claim: Bounds<D>,
     /// Whether its initiator gives way to parts that get out of something's way.
@@ -70,6 +77,8 @@ pub(crate) fn act_one<const D: usize>(
         slot,
         now,
         decision: state.decision(slot as usize),
+        orders: Orders::default(),
+        errand: None,
         claim,
         gives_way: false,
         body: &mut body,
@@ -83,6 +92,7 @@ impl<'a, const D: usize> Acting<'a, D> {
     /// Makes one cycle of the chain, which stays in its claim.
     fn act(&mut self) {
         self.change();
+        self.take_orders();
         self.puts_off = self.may_put_off();
         if self.puts_off {
             self.drive();
@@ -99,6 +109,7 @@ impl<'a, const D: usize> Acting<'a, D> {
             self.get_out_of_the_way();
             self.drive();
             self.keep_to_bounds();
+            self.answer();
         }
         self.scratch.robots_gap_m = f64::INFINITY;
         self.follow();

@@ -269,6 +269,7 @@ impl Plan {
             rungs: Rungs::default(),
             look_m: LOOK_M,
             streams: Streams::new(Seed(around.seed)),
+            teams: Arc::default(),
         }
     }
 }

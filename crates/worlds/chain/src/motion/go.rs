@@ -15,7 +15,7 @@ use sidestep_kernel::InputError;
 ///
 /// # Errors
 /// As [`Propagator::propagate`].
-pub(super) fn go<const D: usize>(
+pub(crate) fn go<const D: usize>(
     propagator: &mut Propagator<D>,
     chain: &mut Chain<D>,
     obstacles: &Obstacles<D>,

@@ -7,5 +7,5 @@
 //! ```
 
 pub(crate) mod escape;
-mod go;
+pub(crate) mod go;
 pub(crate) mod replan;

@@ -111,6 +111,11 @@ impl Reason {
         Self::OutOfReach,
     ];
 
+    /// Returns its number among all, from 0.
+    pub(crate) fn number(self) -> usize {
+        self as usize
+    }
+
     /// Returns its name in files.
     pub fn name(self) -> &'static str {
         match self {

@@ -39,7 +39,8 @@ impl<const D: usize> Compiler<'_, D> {
         let model = Model::load(&self.source.path(s.urdf.as_ref()))?;
         let link = |name: &Option<String>, key: &str, preset: usize| match name {
             Some(name) => {
-                model.link(key, name).map_err(|error| self.source.error_of(at.clone(), &error))
+                let at = || self.source.within(at.clone(), &[key]);
+                model.link(key, name).map_err(|error| self.source.error_of(at(), &error))
             }
             None => Ok(preset),
         };
@@ -48,7 +49,10 @@ impl<const D: usize> Compiler<'_, D> {
         let serial = SerialChain::new(&model, base, tip, &s.urdf)
             .map_err(|error| self.source.error_of(at.clone(), &error))?;
         let values = self.values(s, &model, &serial, at.clone())?;
-        serial.check_limits("joints", &values).map_err(|error| self.source.error_of(at, &error))?;
+        let at = || self.source.within(at, &["joints", "posture"]);
+        serial
+            .check_limits("joints", &values)
+            .map_err(|error| self.source.error_of(at(), &error))?;
         Ok(Arm::new(serial, at_m, values))
     }
 
@@ -60,7 +64,10 @@ impl<const D: usize> Compiler<'_, D> {
         serial: &SerialChain,
         at: Range<usize>,
     ) -> Result<Vec<f64>, InputError> {
-        let told = |error: InputError| self.source.error_of(at.clone(), &error);
+        let told = |error: InputError| {
+            let at = self.source.within(at.clone(), &["joints", "posture"]);
+            self.source.error_of(at, &error)
+        };
         match (&s.joints, &s.posture, &s.srdf) {
             (Some(values), None, None) => {
                 serial.check_count("joints", values).map_err(told)?;
@@ -74,6 +81,7 @@ impl<const D: usize> Compiler<'_, D> {
             (None, None, None) => Ok(serial.rest()),
             _ => {
                 let remedy = "give joints = [...], or srdf and posture, or none of them";
+                let at = self.source.within(at.clone(), &["posture", "srdf", "joints"]);
                 Err(self.source.error(at, "a posture given in two ways, or half", remedy))
             }
         }

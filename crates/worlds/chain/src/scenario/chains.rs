@@ -27,6 +27,19 @@ use std::sync::Arc;
 const ROOM: f64 = 1.2;
 /// Room for robots that follow their connectors on wheels, meters.
 const MARGIN_M: f64 = 0.08;
+/// Keys of a chain that an arm has none of, and the arm.
+const BESIDE_ARMS: [&str; 10] = [
+    "connectors",
+    "points_m",
+    "rod_m",
+    "along",
+    "heading_deg",
+    "max_bend_deg",
+    "within_m",
+    "robots",
+    "count",
+    "arm",
+];
 /// Most sub-steps of an initiator in a cycle.
 const MAX_STEPS: f64 = 1e5;
 /// Most connectors of all chains together: some 3 GB.
@@ -117,7 +130,8 @@ impl<const D: usize> Compiler<'_, D> {
             if total > MAX_CONNECTORS {
                 let cause = format!("{total} connectors in all");
                 let remedy = format!("give at most {MAX_CONNECTORS}: connectors times count");
-                return Err(self.source.error(section.span(), cause, remedy));
+                let at = self.source.within(section.span(), &["connectors", "points_m", "count"]);
+                return Err(self.source.error(at, cause, remedy));
             }
         }
         Ok(())
@@ -136,7 +150,7 @@ impl<const D: usize> Compiler<'_, D> {
             None if s.count > 1 => {
                 let remedy = "add apart_m = [...], the way from one to the next";
                 return Err(self.source.error(
-                    section.span(),
+                    self.source.within(section.span(), &["count"]),
                     format!("{} chains at one place", s.count),
                     remedy,
                 ));
@@ -169,6 +183,7 @@ impl<const D: usize> Compiler<'_, D> {
         }
         if D != 2 && robots.is_some() {
             let remedy = "set chain.dimensions = 2, or leave robots out";
+            let at = self.source.within(at, &["robots"]);
             return Err(self.source.error(at, "robots on wheels in space", remedy));
         }
         Ok(ChainSpec { name: s.name.clone(), start, tasks, changes, arm, robots })
@@ -186,7 +201,7 @@ impl<const D: usize> Compiler<'_, D> {
             s.tasks.0.iter().map(|task| self.task(task, start)).collect::<Result<Vec<_>, _>>()?;
         let is_endless = |task: &Task<D>| {
             let has_an_end = match &task.driver {
-                Driver::Rest | Driver::Wander(_) => false,
+                Driver::Rest | Driver::Wander(_) | Driver::External => false,
                 Driver::Navigate(navigator) => navigator.goal.is_some(),
                 Driver::Script(_) | Driver::Targets(_) => true,
             };
@@ -197,7 +212,8 @@ impl<const D: usize> Compiler<'_, D> {
             return Err(self.source.error(s.tasks.0[k].span(), cause, "add lasts_s"));
         }
         if tasks.is_empty() {
-            let remedy = "add [[chains.tasks]] with a kind: rest, wander, script or targets";
+            let remedy = "add [[chains.tasks]] with a kind: rest, wander, script, targets or \
+                          external";
             return Err(self.source.error(at, "a chain without a task", remedy));
         }
         Ok(tasks)
@@ -219,7 +235,24 @@ impl<const D: usize> Compiler<'_, D> {
             let remedy = "let it break once";
             return Err(self.source.error(at, "a chain that breaks more than once", remedy));
         }
+        self.breaks_before_it_is_whole_again(s)?;
         Ok(changes)
+    }
+
+    /// Refuses to join what has not been broken by then.
+    fn breaks_before_it_is_whole_again(&self, s: &ChainSection<D>) -> Result<(), InputError> {
+        let broken_s =
+            s.changes.0.iter().filter_map(|change| change.get_ref().breaks_at_s()).next();
+        let is_early = |joins_s: f64| broken_s.is_none_or(|broken_s| joins_s < broken_s);
+        let joins_at_s = |change: &Spanned<ChangeSection<D>>| change.get_ref().joins_at_s();
+        match s.changes.0.iter().find(|change| joins_at_s(change).is_some_and(is_early)) {
+            None => Ok(()),
+            Some(change) => {
+                let at = self.source.within(change.span(), &["reform"]);
+                let remedy = "break the chain before: a change with scatter = [first, last]";
+                Err(self.source.error(at, "reform of a chain that is whole", remedy))
+            }
+        }
     }
 
     /// Refuses a speed that would take too many sub-steps per cycle to be practical.
@@ -250,10 +283,12 @@ impl<const D: usize> Compiler<'_, D> {
         let least_m = chain.rods().iter().map(|rod| rod.min_m).fold(f64::INFINITY, f64::min);
         if least_m < 2.0 * radius_m {
             let cause = format!("robots of radius {radius_m} m as near as {least_m} m");
+            let at = self.source.within(at, &["rod_m", "robots"]);
             return Err(self.source.error(at, cause, "give longer rods, or smaller robots"));
         }
         if chain.connectors().iter().any(|connector| connector.radius_m < radius_m) {
             let remedy = "give robots.margin_m of 0 or more";
+            let at = self.source.within(at, &["robots"]);
             return Err(self.source.error(at, "connectors smaller than their robots", remedy));
         }
         Ok(())
@@ -307,6 +342,7 @@ impl<const D: usize> Compiler<'_, D> {
             }
             (Some(_), Some(_)) => {
                 let remedy = "give robots.radius_m and robots.margin_m instead";
+                let at = self.source.within(at, &["radius_m"]);
                 Err(self.source.error(at, "radius_m beside robots", remedy))
             }
         }
@@ -336,6 +372,7 @@ impl<const D: usize> Compiler<'_, D> {
         if D != 3 || is_shaped || is_turned || s.count != 1 {
             let remedy = "set chain.dimensions = 3, and leave out connectors, points_m, rod_m, \
                           along, heading_deg, max_bend_deg, anywhere, robots and count";
+            let at = self.source.within(at, &BESIDE_ARMS);
             return Err(self.source.error(at, "an arm has its shape from its URDF file", remedy));
         }
         let base_m = s.at_m.map_or([0.0; D], Place::get);
@@ -382,11 +419,13 @@ impl<const D: usize> Compiler<'_, D> {
     ) -> Result<Vec<Point<D>>, InputError> {
         let (Some(site), Some(connectors)) = (site, s.connectors) else {
             let remedy = "name a ground.map or a ground.stage, and give connectors";
+            let at = self.source.within(at, &["anywhere"]);
             return Err(self.source.error(at, "a chain anywhere on no map", remedy));
         };
         if s.at_m.is_some() || s.points_m.is_some() || s.along.is_some() || s.heading_deg.is_some()
         {
             let remedy = "leave out at_m, points_m, along and heading_deg";
+            let at = self.source.within(at, &["at_m", "points_m", "along", "heading_deg"]);
             return Err(self.source.error(at, "a chain placed in two ways", remedy));
         }
         let obstacles = Obstacles::new(site.obstacles(0), rod.max_m.max(1e-3))
@@ -414,9 +453,11 @@ impl<const D: usize> Compiler<'_, D> {
         if let Some(given) = &s.points_m {
             if s.connectors.is_some() || s.at_m.is_some() {
                 let remedy = "give points_m alone, or connectors and at_m";
+                let at = self.source.within(at, &["points_m"]);
                 return Err(self.source.error(at, "a chain placed in two ways", remedy));
             }
             if given.is_empty() {
+                let at = self.source.within(at, &["points_m"]);
                 return Err(self.source.error(at, "points_m = []", "give one point or more"));
             }
             return Ok(given.iter().map(|place| place.get()).collect());
@@ -427,6 +468,7 @@ impl<const D: usize> Compiler<'_, D> {
                 let cause =
                     format!("connectors = {}", given.map_or("nothing".into(), |n| n.to_string()));
                 let remedy = "give a number from 1 to 10000000, or points_m";
+                let at = self.source.within(at, &["connectors"]);
                 return Err(self.source.error(at, cause, remedy));
             }
         };
@@ -466,7 +508,9 @@ impl<const D: usize> Compiler<'_, D> {
         let n = connectors.len();
         let Some(connector) = connectors.get_mut(s.connector) else {
             let cause = format!("connector = {} of a chain of {n}", s.connector);
-            return Err(self.source.error(limit.span(), cause, "count from 0"));
+            let remedy = format!("count from 0: the last connector is {}", n - 1);
+            let at = self.source.within(limit.span(), &["connector"]);
+            return Err(self.source.error(at, cause, remedy));
         };
         connector.failed = s.failed.unwrap_or(connector.failed);
         if let Some(given) = &s.mobility {

@@ -43,6 +43,18 @@ pub(super) struct ChangeSection<const D: usize> {
     speed_m_s: Option<Measure>,
 }
 
+impl<const D: usize> ChangeSection<D> {
+    /// Returns the time at which it breaks the chain, if it does.
+    pub(super) fn breaks_at_s(&self) -> Option<f64> {
+        self.scatter.is_some().then(|| self.at_s.get())
+    }
+
+    /// Returns the time at which it joins the chain again, if it does.
+    pub(super) fn joins_at_s(&self) -> Option<f64> {
+        (self.reform == Some(true)).then(|| self.at_s.get())
+    }
+}
+
 impl<const D: usize> Compiler<'_, D> {
     /// Returns a change of `chain`.
     pub(super) fn change(
@@ -76,8 +88,13 @@ impl<const D: usize> Compiler<'_, D> {
             return Ok(What::Reform { may_come, speed_m_s: s.speed_m_s.map_or(0.5, f64::from) });
         }
         let Some(connector) = s.connector.filter(|&k| k < n) else {
-            let cause = format!("a change of connector {:?} of {n}", s.connector);
-            return Err(self.source.error(at, cause, "give connector, counted from 0"));
+            let cause = match s.connector {
+                Some(connector) => format!("connector = {connector} of a chain of {n}"),
+                None => "a change of no connector".into(),
+            };
+            let at = self.source.within(at, &["connector"]);
+            let remedy = format!("give connector, counted from 0: the last is {}", n - 1);
+            return Err(self.source.error(at, cause, remedy));
         };
         let what = match (s.failed, s.max_bend_deg, &s.mobility) {
             (Some(failed), ..) => What::Failed { connector, failed },
@@ -96,6 +113,8 @@ impl<const D: usize> Compiler<'_, D> {
         if others.into_iter().chain([throws, joins]).filter(|is_given| *is_given).count() != 1 {
             let remedy = "give one of failed, max_bend_deg, mobility, scatter = [first, last], \
                           reform = true";
+            let given = ["reform", "scatter", "mobility", "max_bend_deg", "failed"];
+            let at = self.source.within(at, &given);
             return Err(self.source.error(at, "a change that is not one thing", remedy));
         }
         let keys = [
@@ -123,7 +142,8 @@ impl<const D: usize> Compiler<'_, D> {
             }
             _ => Ok(()),
         };
-        tried.map_err(|error| self.source.error_of(at, &error))
+        let at = || self.source.within(at, &["max_bend_deg", "mobility"]);
+        tried.map_err(|error| self.source.error_of(at(), &error))
     }
 
     fn scatter(
@@ -136,6 +156,7 @@ impl<const D: usize> Compiler<'_, D> {
         if first == 0 || first > last || last + 1 >= n {
             let cause = format!("scatter = [{first}, {last}] of a chain of {n}");
             let remedy = "leave a whole end on both sides: at least connectors 0 and the last";
+            let at = self.source.within(at, &["scatter"]);
             return Err(self.source.error(at, cause, remedy));
         }
         let by_m = s.by_m.map_or(1.0, f64::from);

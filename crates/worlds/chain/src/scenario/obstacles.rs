@@ -252,7 +252,8 @@ impl<const D: usize> Compiler<'_, D> {
             return self.add_outline(s, corners, at, all);
         }
         let body = Obstacle::still(id, self.core(s, at.clone())?, s.radius_m);
-        body.check().map_err(|error| self.source.error_of(at.clone(), &error))?;
+        let of_shape = || self.source.within(at.clone(), &["radius_m", "size_m"]);
+        body.check().map_err(|error| self.source.error_of(of_shape(), &error))?;
         all.next_id += 1;
         match self.course(s, at.clone())? {
             None => all.still.push(body),
@@ -288,6 +289,7 @@ impl<const D: usize> Compiler<'_, D> {
         let moves = s.velocity_m_s.is_some() || s.patrol_m.is_some();
         if D != 2 || corners.len() < 3 || moves || s.at_m.is_some() || s.ends_m.is_some() {
             let remedy = "give three corners or more, in two dimensions, and nothing that moves";
+            let at = self.source.within(at, &["corners_m"]);
             return Err(self.source.error(at, "this is no polygon", remedy));
         }
         let corners: Vec<Point<2>> = corners.iter().map(|corner| fitted(corner.get())).collect();
@@ -300,6 +302,11 @@ impl<const D: usize> Compiler<'_, D> {
         match (s.at_m, s.ends_m, s.size_m) {
             (Some(center), None, None) => Ok(Core::Point(center.get())),
             (None, Some(ends), None) => Ok(Core::Segment(ends.map(Place::get))),
+            (Some(_), None, Some(size)) if size.get().contains(&0.0) => {
+                let at = self.source.within(at, &["size_m"]);
+                let remedy = "give every side a length, or leave size_m out for a ball";
+                Err(self.source.error(at, "a box of no size", remedy))
+            }
             (Some(center), None, Some(size)) => {
                 let half_m = size.get().map(|x| 0.5 * x.abs());
                 let axes = turned(s.turn_deg.unwrap_or(0.0));
@@ -333,6 +340,7 @@ impl<const D: usize> Compiler<'_, D> {
             },
             _ => {
                 let remedy = "give velocity_m_s, or it and bounces_m, or patrol_m and speed_m_s";
+                let at = self.source.within(at, &["patrol_m", "bounces_m"]);
                 return Err(self.source.error(at, "an obstacle that moves in two ways", remedy));
             }
         };
@@ -389,6 +397,7 @@ impl<const D: usize> Compiler<'_, D> {
             None => Ok(limits.map(|limits| limits.least..=limits.greatest)),
             Some(x) => {
                 let cause = format!("a radius_m or a speed_m_s of {x}");
+                let at = self.source.within(at, &["radius_m", "speed_m_s"]);
                 Err(self.source.error(at, cause, "give numbers from 0 to 1e6"))
             }
         }

@@ -32,6 +32,8 @@ enum Kind {
     Targets,
     /// On wheels, with a laser, along walls.
     Navigate,
+    /// To where a caller orders, cycle by cycle.
+    External,
 }
 
 /// The planner of ways among obstacles.
@@ -105,6 +107,7 @@ impl<const D: usize> Compiler<'_, D> {
         if s.connector >= n {
             let cause = format!("connector = {} of a chain of {n}", s.connector);
             let remedy = format!("count from 0: the last connector is {}", n - 1);
+            let at = self.source.within(at, &["connector"]);
             return Err(self.source.error(at, cause, remedy));
         }
         self.has_only_its_own(s, plans, at.clone())?;
@@ -131,8 +134,10 @@ impl<const D: usize> Compiler<'_, D> {
                 Driver::Script(Arc::new(script))
             }
             Kind::Targets => Driver::Targets(self.targets(s, at)?),
+            Kind::External => Driver::External,
             Kind::Navigate if D != 2 => {
                 let remedy = "set chain.dimensions = 2, or give another kind";
+                let at = self.source.within(at, &["kind"]);
                 return Err(self.source.error(
                     at,
                     "only who drives in the plane navigates",
@@ -159,6 +164,7 @@ impl<const D: usize> Compiler<'_, D> {
             }
             _ => {
                 let remedy = "give script = \"\"\"...\"\"\" or script_file = \"...\"";
+                let at = self.source.within(at, &["script_file", "kind"]);
                 Err(self.source.error(at, "a task of kind script needs one script", remedy))
             }
         }
@@ -177,6 +183,7 @@ impl<const D: usize> Compiler<'_, D> {
                     true => "the script leads further than 1e6 m".into(),
                     false => format!("the script comes to more than {MAX_MOTIONS} motions"),
                 };
+                let at = self.source.within(at, &["script", "script_file"]);
                 return Err(self.source.error(at, cause, "go less far, or repeat less often"));
             }
         }
@@ -186,6 +193,7 @@ impl<const D: usize> Compiler<'_, D> {
     fn targets(&self, s: &TaskSection<D>, at: Range<usize>) -> Result<Targets<D>, InputError> {
         let Some(given) = s.targets_m.as_ref().filter(|list| !list.is_empty()) else {
             let remedy = "add targets_m = [[x, y], ...]";
+            let at = self.source.within(at, &["targets_m", "kind"]);
             return Err(self.source.error(at, "a task of kind targets needs targets", remedy));
         };
         let places = given.iter().map(|place| place.get()).collect();
@@ -211,6 +219,10 @@ impl<const D: usize> Compiler<'_, D> {
         ];
         let keys = keys.map(|(key, is_given, kind)| (key, is_given, kind == s.kind));
         let of = format!("in a task of kind {:?}", s.kind).to_lowercase();
+        self.has_no_idle_key(&keys, &of, at.clone())?;
+        // A caller sees each veto, and decides itself when to give up.
+        let is_patient = s.kind != Kind::External;
+        let keys = [("patience_s", s.patience_s.is_some(), is_patient)];
         self.has_no_idle_key(&keys, &of, at.clone())?;
         let keys = [("plans_after_s", s.plans_after_s.is_some(), plans)];
         self.has_no_idle_key(&keys, "without a planner", at)

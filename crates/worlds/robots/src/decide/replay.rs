@@ -1,4 +1,4 @@
-//! Actions that are known in advance, or handed in by a caller.
+//! Actions that are known in advance.
 
 use super::{Behaviour, Decision, Memory, Percept};
 use crate::effector::{ActionId, STAY};
@@ -24,23 +24,5 @@ impl Behaviour for Replay {
             memory.words[0] = 0;
         }
         self.actions[step].into()
-    }
-}
-
-/// Does the action that the caller ordered before the cycle; stays when there is no order.
-///
-/// The world stores the order in word 3 of the memory as `action + 1`, and removes it afterwards.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct External;
-
-/// Index of the memory's word that holds the order.
-pub const ORDER: usize = 3;
-
-impl Behaviour for External {
-    fn decide(&self, _: &Percept<'_>, memory: &mut Memory, _: &mut Draws) -> Decision {
-        match std::mem::take(&mut memory.words[ORDER]) {
-            0 => STAY.into(),
-            order => ((order - 1) as ActionId).into(),
-        }
     }
 }

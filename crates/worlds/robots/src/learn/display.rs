@@ -4,6 +4,7 @@ use std::fmt::{Formatter, Result};
 
 use super::holdout::Fit;
 use super::{Estimate, ThinRow};
+use sidestep_kernel::words::{LINE_COLS, fixed, wrapped};
 use sidestep_statistics::{Moments, holm};
 
 /// The names of a table's rows and columns.
@@ -12,9 +13,13 @@ pub(super) struct Heading {
     pub(super) column: &'static str,
 }
 
-/// Writes warnings, one per line.
+/// Writes warnings, in lines that every terminal has room for.
 pub(super) fn warnings(f: &mut Formatter<'_>, warnings: &[String]) -> Result {
-    warnings.iter().try_for_each(|warning| writeln!(f, "WARNING: {warning}"))
+    warnings.iter().try_for_each(|warning| writeln!(f, "{}", warned(warning)))
+}
+
+fn warned(warning: &str) -> String {
+    wrapped(&format!("WARNING: {warning}"), LINE_COLS).join("\n")
 }
 
 /// Writes named moments, one per line; those without values are left out.
@@ -44,7 +49,7 @@ fn six(value: f64) -> String {
         a if a < 1000.0 => 1,
         _ => 0,
     };
-    format!("{value:.decimals$}")
+    fixed(value, decimals)
 }
 
 /// Writes estimates, one table for each name; cells without counts are left out.
@@ -125,13 +130,13 @@ fn verdicts(fits: &[Fit]) -> Vec<String> {
     let differs = tested.iter().zip(adjusted).filter(|(_, p)| p.is_some_and(|p| p < LEVEL));
     let mut words: Vec<String> = differs
         .map(|(fit, _)| {
-            format!(
-                "WARNING: {}: the parts of the log differ by more than chance (p {}).\nWhat was \
-                 learned may not hold elsewhere: the robot or its place changed\nmeanwhile, or \
-                 events depend on each other.",
+            warned(&format!(
+                "{}: the parts of the log differ by more than chance (p {}). What was learned may \
+                 not hold elsewhere: the robot or its place changed meanwhile, or events depend on \
+                 each other.",
                 fit.table,
                 shown_p(fit.p_value)
-            )
+            ))
         })
         .collect();
     let untested = fits.len() - tested.len();
@@ -173,15 +178,23 @@ mod tests {
         many.push(fit(0.0067, 4));
         assert!(told(&many).starts_with("Both parts of the log agree"), "{}", told(&many));
         assert_eq!(told(&[fit(1.0, 0)]), "Too few counts to test: 1 of 1 tables.");
-        let lines = told(&[fit(0.00001, 4)]);
+        let lines = told(&[Fit { table: "a_table_of_turns".into(), ..fit(0.00001, 4) }]);
         assert!(lines.lines().all(|line| line.chars().count() <= 80), "{lines}");
+    }
+
+    #[test]
+    fn warnings_are_broken_into_lines_of_80_columns() {
+        let told =
+            warned(&"near obstacles outcomes are seen too rarely, so learn in the open ".repeat(4));
+        assert!(told.lines().count() > 3 && told.starts_with("WARNING: near"), "{told}");
+        assert!(told.lines().all(|line| line.chars().count() <= 80), "{told}");
     }
 
     #[test]
     fn numbers_take_six_characters() {
         assert_eq!(
-            [0.02489, -0.2346, -90.0, 123.456].map(six),
-            ["0.025", "-0.235", "-90.00", "123.5"]
+            [0.02489, -0.2346, -90.0, 123.456, -1e-9].map(six),
+            ["0.025", "-0.235", "-90.00", "123.5", "0.000"]
         );
     }
 }

@@ -4,10 +4,13 @@ mod bodies;
 pub(super) mod idle;
 mod map;
 mod people_and_doors;
+mod placer;
 mod remarks;
 mod robots;
 
 use self::map::{load_map, padded};
+use self::placer::Placed;
+pub(super) use self::placer::Placer;
 use super::kinds::Kinds;
 use super::located::Located;
 use super::placing::{Floor, Obstacle};
@@ -67,6 +70,7 @@ pub struct Compiled {
     pub record: RecordSection,
     /// Surprises found by compiling.
     pub remarks: Vec<Remark>,
+    pub(crate) placer: Arc<Placer>,
 }
 
 impl Compiled {
@@ -76,6 +80,18 @@ impl Compiled {
     /// With place, line, column, cause and remedy for anything that is wrong in it.
     pub fn new(source: &Source, own: &Behaviours, order: StorageOrder) -> Result<Self, InputError> {
         Compiler::new(source, own)?.compile(order)
+    }
+
+    /// Returns the same scenario with another seed, without reading or tabulating anything again: what
+    /// compiling it with that seed would give, but for the remarks, which stay those of the first seed.
+    ///
+    /// # Errors
+    /// When this seed finds no free place for somebody.
+    pub fn reseeded(&self, seed: u64) -> Result<Self, InputError> {
+        let streams = Streams::new(Seed(seed));
+        let placed = self.placer.place(&streams)?;
+        let world = RobotsWorld { streams, bodies: placed.bodies, ..(*self.world).clone() };
+        Ok(Self { world: Arc::new(world), start: placed.start.into(), seed, ..self.clone() })
     }
 }
 
@@ -91,11 +107,6 @@ struct Compiler<'a> {
     effectors: Effectors,
     streams: Streams,
     types: Vec<BodyType>,
-    bodies: Vec<Body>,
-    start: Vec<((u32, u32), u8)>,
-    floor: Floor,
-    /// Spans by id, to name the other body when two bodies stand on each other.
-    spans: Vec<Range<usize>>,
     /// Number of rings of wall to put around the map.
     border: u32,
     /// Largest distance in boxes from a body to a box that it claims.
@@ -116,7 +127,6 @@ impl<'a> Compiler<'a> {
         let mut remarks = remarks::on_effectors(&file, &effectors);
         remarks.extend(remarks::on_radio(&file));
         let streams = Streams::new(Seed(head.seed));
-        let floor = Floor::new(&map);
         let border = border(&file, &effectors);
         Ok(Self {
             source,
@@ -126,10 +136,6 @@ impl<'a> Compiler<'a> {
             effectors,
             streams,
             types: Vec::new(),
-            bodies: Vec::new(),
-            start: Vec::new(),
-            floor,
-            spans: Vec::new(),
             border,
             reach: 0,
             remarks,
@@ -143,39 +149,30 @@ impl<'a> Compiler<'a> {
     fn compile(mut self, order: StorageOrder) -> Result<Compiled, InputError> {
         let robots = self.file.robots.0.len();
         let groups = self.groups()?;
-        // Doors and bodies with a given place are placed first, because draws must find the
-        // remaining free boxes. Ids go robots, people, doors, whatever is placed first.
-        let mut first_id = 0;
-        let mut firsts: Vec<EntityId> = Vec::new();
-        for group in &groups {
-            firsts.push(first_id);
-            first_id += group.count as EntityId;
-        }
-        let n = first_id as usize;
-        self.bodies = vec![Body { id: 0, ty: 0, period: 1, phase: 0 }; n];
-        self.start = vec![((0, 0), 0); n];
-        self.spans = vec![0..0; n];
-        for given in [true, false] {
-            for (group, &first) in groups.iter().zip(&firsts) {
-                if group.places.is_empty() != given {
-                    self.add_group(group, first)?;
-                }
-            }
-        }
-        self.warn_of_goals(groups.iter().zip(firsts).take(robots));
-        self.finish(order)
+        let sizes = self.types.iter().map(|ty| ty.size).collect();
+        let (source, map) = (Arc::clone(&self.source), Arc::clone(&self.map));
+        let placer = Placer { source, map, groups, sizes };
+        let placed = placer.place(&self.streams)?;
+        let firsts = placer.first_ids();
+        self.warn_of_goals(placer.groups.iter().zip(firsts).take(robots), &placed);
+        self.finish(order, placer, placed)
     }
 
-    fn finish(self, order: StorageOrder) -> Result<Compiled, InputError> {
+    fn finish(
+        self,
+        order: StorageOrder,
+        placer: Placer,
+        placed: Placed,
+    ) -> Result<Compiled, InputError> {
         let is_robot = |b: &&Body| matches!(self.types[usize::from(b.ty)].role, Role::Robot(_));
-        let robots = self.bodies.iter().filter(is_robot).map(|b| b.id).collect();
+        let robots = placed.bodies.iter().filter(is_robot).map(|b| b.id).collect();
         let stride = self.stride();
         let rows = self.map.height() + 2 * self.border;
         let radio = self.radio();
         let asks = |ty: &BodyType| matches!(&ty.role, Role::Robot(model) if model.behaviour.asks());
         let has_asks = self.types.iter().any(asks);
         let kind_rank = self.kind_rank()?;
-        let world = RobotsWorld {
+        let mut world = RobotsWorld {
             walls: padded(&self.map, self.border, stride, rows),
             regime: self.file.regime,
             obstacle_rule: self.file.obstacle_rule,
@@ -183,9 +180,10 @@ impl<'a> Compiler<'a> {
             kinds: self.kinds.names(),
             map: self.map,
             types: self.types,
-            bodies: self.bodies,
+            bodies: placed.bodies,
             kind_rank,
             radio,
+            teams: Arc::default(),
             robots,
             has_asks,
             storage: order,
@@ -194,16 +192,18 @@ impl<'a> Compiler<'a> {
             stride,
             reach: self.reach,
         };
+        world.teams = Arc::new(world.find_teams());
         let mut remarks = self.remarks;
         remarks.extend(crate::law::no_contacts(&world));
         Ok(Compiled {
             world: Arc::new(world),
-            start: self.start.into(),
+            start: placed.start.into(),
             name: self.head.name,
             seed: self.head.seed,
             cycles: self.head.cycles.unwrap_or(CYCLES),
             record: self.file.record,
             remarks,
+            placer: Arc::new(placer),
         })
     }
 

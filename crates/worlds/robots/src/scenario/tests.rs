@@ -1,7 +1,7 @@
 //! Scenarios that are refused, and the words for their authors.
 
 use super::*;
-use sidestep_kernel::InputError;
+use sidestep_kernel::{InputError, Simulation as _};
 use sidestep_scenario::{Compiled as _, Remark, Severity, Source};
 use std::path::Path;
 
@@ -215,4 +215,28 @@ fn an_author_is_told_what_will_surprise() {
     assert_eq!(remarks(&text("", "[robots]\ncount = 1\n"), Path::new("")), []);
     let radio = remarks(&text("", "[robots]\ncount = 2\n[radio]\nrange_m = 9\n"), Path::new(""));
     assert_eq!(radio.iter().map(|remark| remark.key.as_str()).collect::<Vec<_>>(), ["radio"]);
+}
+
+#[test]
+fn another_seed_gives_what_compiling_with_it_would() {
+    let text = "format = 1\nworld = \"robots\"\nseed = SEED\n[map]\nascii = \"\"\"\nMAP\"\"\"\n\
+                [[robots]]\ncount = 9\nperiod = 3\n[[robots]]\nat = [[1, 1], [3, 1]]\n\
+                [[people]]\ncount = 4\n[doors]\nat = [[6, 0]]\nrandom = { p_open = 0.1, p_close = 0.1 }\n";
+    let text = text.replace("MAP", &"................\n".repeat(7));
+    let compiled = |seed: u64| {
+        let source = Source::new("s", text.replace("SEED", &seed.to_string()), "");
+        Compiled::new(&source, &Behaviours::new(), StorageOrder::Spatial).expect("valid")
+    };
+    let source = Source::new("s", text.clone(), "");
+    let first = compiled(1);
+    for seed in [2, 99, u64::MAX >> 1] {
+        let (again, anew) = (first.reseeded(seed).expect("there is room"), compiled(seed));
+        assert_eq!((again.seed, &again.start), (seed, &anew.start));
+        let digest = |compiled: Compiled| {
+            let mut run = compiled.start(&source, 1);
+            run.advance(50);
+            run.digest()
+        };
+        assert_eq!(digest(again), digest(anew), "seed {seed}");
+    }
 }

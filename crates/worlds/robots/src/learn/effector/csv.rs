@@ -201,13 +201,9 @@ struct Columns {
 
 impl Columns {
     fn find(table: &CsvTable) -> Result<Self, InputError> {
-        Ok(Self {
-            action: table.column("action")?,
-            ahead: table.column("ahead_boxes")?,
-            left: table.column("left_boxes")?,
-            turn: table.column("turn_deg")?,
-            contact: table.find("contact"),
-        })
+        let [action, ahead, left, turn] =
+            table.columns(["action", "ahead_boxes", "left_boxes", "turn_deg"])?;
+        Ok(Self { action, ahead, left, turn, contact: table.find("contact") })
     }
 
     fn displacement(&self, place: &str, row: CsvRow<'_>) -> Result<Displacement, InputError> {

@@ -77,13 +77,9 @@ impl Columns {
         } else {
             ["true_class", "reported_class"]
         };
-        Ok(Self {
-            truth: table.column("true")?,
-            reported: table.column("reported")?,
-            true_at: table.column(true_at)?,
-            reported_at: table.column(reported_at)?,
-            in_meters,
-        })
+        let [truth, reported, true_at, reported_at] =
+            table.columns(["true", "reported", true_at, reported_at])?;
+        Ok(Self { truth, reported, true_at, reported_at, in_meters })
     }
 }
 

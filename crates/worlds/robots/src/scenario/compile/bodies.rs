@@ -4,6 +4,7 @@ use super::super::{Period, Placing, Side};
 use super::*;
 
 /// Bodies that a scenario describes together.
+#[derive(Debug)]
 pub(super) struct Group {
     pub(super) count: u64,
     /// Given places; drawn inside `region` where empty.
@@ -16,6 +17,7 @@ pub(super) struct Group {
 }
 
 /// One type for all of a group, or one for each body.
+#[derive(Debug)]
 pub(super) enum TypeOf {
     All(u16),
     Each(Vec<u16>),
@@ -47,90 +49,6 @@ impl Compiler<'_> {
             return Err(self.source.error(None, "the scenario has no bodies", remedy));
         }
         Ok(groups)
-    }
-
-    pub(super) fn add_group(&mut self, group: &Group, first: EntityId) -> Result<(), InputError> {
-        for k in 0..group.count as usize {
-            let id = first + k as EntityId;
-            let ty = match &group.ty {
-                TypeOf::All(ty) => *ty,
-                TypeOf::Each(types) => types[k],
-            };
-            let size = self.types[usize::from(ty)].size;
-            let (at, span) = match group.places.get(k) {
-                Some(place) => (self.given_place(place, id, size)?, place.span()),
-                None => (self.drawn_place(group, k, id, size)?, group.span.clone()),
-            };
-            let facing = group.places.get(k).and_then(|place| place.get_ref().facing);
-            let facing = facing.unwrap_or_else(|| {
-                self.streams.block(id, 0, purpose::PLACE, u16::MAX)[0] as u8 % 4
-            });
-            let phase = group
-                .phase
-                .unwrap_or_else(|| self.streams.draws(id, 0, purpose::PHASE).below(group.period));
-            self.start[id as usize] = (at, facing);
-            self.spans[id as usize] = span;
-            self.bodies[id as usize] =
-                Body { id, ty, period: group.period, phase: phase % group.period };
-        }
-        Ok(())
-    }
-
-    fn given_place(
-        &mut self,
-        place: &Spanned<Placing>,
-        id: EntityId,
-        size: (u32, u32),
-    ) -> Result<(u32, u32), InputError> {
-        let at = place.get_ref().at;
-        match self.floor.place(id, at, size) {
-            Ok(()) => Ok(at),
-            Err(obstacle) => Err(self.in_the_way(place.span(), at, size, obstacle)),
-        }
-    }
-
-    fn drawn_place(
-        &mut self,
-        group: &Group,
-        k: usize,
-        id: EntityId,
-        size: (u32, u32),
-    ) -> Result<(u32, u32), InputError> {
-        let region = group.region.unwrap_or_else(|| self.floor.region());
-        self.floor.draw_place(&self.streams, id, size, region).ok_or_else(|| {
-            let (width, height) = size;
-            let cause = format!(
-                "no free place is left for number {} of these {} bodies of {width} x {height} boxes",
-                k + 1,
-                group.count,
-            );
-            let remedy = "give fewer or smaller bodies, or a larger map or region";
-            self.source.error(group.span.clone(), cause, remedy)
-        })
-    }
-
-    fn in_the_way(
-        &self,
-        span: Range<usize>,
-        at: (u32, u32),
-        size: (u32, u32),
-        obstacle: Obstacle,
-    ) -> InputError {
-        let body = format!("a body of {} x {} boxes at [{}, {}]", size.0, size.1, at.0, at.1);
-        let cause = match obstacle {
-            Obstacle::Outside => {
-                let (width, height) = (self.map.width(), self.map.height());
-                format!("{body} leaves the map of {width} x {height} boxes")
-            }
-            Obstacle::Wall(c, r) => format!("{body} stands in the wall at [{c}, {r}]"),
-            Obstacle::Body(id, c, r) => {
-                let other = self.source.error(self.spans[id as usize].clone(), "", "").position();
-                let line = other.map_or(String::new(), |(line, _)| format!(" (line {line})"));
-                format!("{body} stands on body {id}{line} at [{c}, {r}]")
-            }
-        };
-        let remedy = "place it in free boxes; `sidestep map FILE --box B` shows them";
-        self.source.error(span, cause, remedy)
     }
 
     /// Returns the number of bodies: given, or that of the given places.

@@ -101,10 +101,11 @@ impl Compiler<'_> {
     pub(super) fn warn_of_goals<'g>(
         &mut self,
         groups: impl Iterator<Item = (&'g Group, EntityId)>,
+        placed: &Placed,
     ) {
         for (k, (group, first)) in groups.enumerate() {
             let ids = first..first + group.count as EntityId;
-            let missed: Vec<usize> = ids.map(|id| self.goals_out_of_reach(id)).collect();
+            let missed: Vec<usize> = ids.map(|id| self.goals_out_of_reach(placed, id)).collect();
             let robots = missed.iter().filter(|goals| **goals > 0).count();
             if robots > 0 {
                 let (all, goals) = (group.count, missed.iter().sum::<usize>());
@@ -117,12 +118,13 @@ impl Compiler<'_> {
         }
     }
 
-    fn goals_out_of_reach(&self, id: EntityId) -> usize {
-        let Role::Robot(model) = &self.types[usize::from(self.bodies[id as usize].ty)].role else {
+    fn goals_out_of_reach(&self, placed: &Placed, id: EntityId) -> usize {
+        let Role::Robot(model) = &self.types[usize::from(placed.bodies[id as usize].ty)].role
+        else {
             return 0;
         };
         // Ways lead back as well, so whoever reaches a goal from its start reaches it from others.
-        let (col, row) = self.start[id as usize].0;
+        let (col, row) = placed.start[id as usize].0;
         model.behaviour.ways().iter().filter(|way| !way.reaches_goal(col, row)).count()
     }
 }

@@ -20,7 +20,7 @@ impl Compiler<'_> {
         let body = Arc::new(self.robot_body(s, size)?);
         let behaviour = self.behaviour(s.behaviour.as_ref(), size, &body)?;
         let actions = Arc::clone(&body.actions);
-        let role = Role::Robot(RobotModel { body, behaviour });
+        let role = Role::Robot(RobotModel::new(body, behaviour));
         let ty = self.body_type(&s.kind, (size, size), actions, role)?;
         let ty = TypeOf::All(self.add_type(ty, &span)?);
         Ok(Group {
@@ -64,7 +64,7 @@ impl Compiler<'_> {
                 return Err(InputError::new(&place, cause, remedy).at(row.line, 1));
             }
             let behaviour: Arc<dyn Behaviour> = Arc::new(Goto { goals, repeat: false, avoidance });
-            let model = RobotModel { body: Arc::clone(&body), behaviour };
+            let model = RobotModel::new(Arc::clone(&body), behaviour);
             let actions = Arc::clone(&body.actions);
             let ty = self.body_type(&s.kind, (size, size), actions, Role::Robot(model))?;
             types.push(self.add_type(ty, span)?);

@@ -1,0 +1,23 @@
+//! Decisions from outside: what agents observe, and the orders that a caller gives them.
+//!
+//! ```text
+//! teams() ──> Space, Space, ...           what goes in and out, of all agents that are alike
+//! observe(team) ──> one array per space   of the frozen state, before a cycle
+//! order(agents, values)                   checked, noted in the state, recorded in the table `orders`
+//! follow(OrderBook)                       the same orders again, each before its cycle
+//! ```
+//!
+//! An order is part of the state as soon as it is given: a checkpoint has it, and so has the digest. A run
+//! that was decided from outside is therefore a function of its scenario, its seed and its table `orders`.
+
+mod book;
+mod error;
+mod space;
+mod team;
+
+pub use book::OrderBook;
+pub use error::OrderError;
+pub use space::{Bounds, CellsMut, Space};
+pub use team::{Order, Orders, Team, Teams};
+
+pub(crate) use book::{OrderRow, table};

@@ -1,0 +1,206 @@
+//! Agents that are alike, and orders to them.
+
+use super::error::OrderError;
+use super::space::{CellsMut, Space};
+use crate::units::EntityId;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Agents that observe, and are ordered, alike.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Team {
+    /// Name, by which a caller knows it: the kind of its agents, and a number where there are several.
+    pub name: String,
+    /// Its agents, rising; rows of arrays are in this order.
+    pub agents: Vec<EntityId>,
+    /// Spaces of their observations.
+    pub observed: Vec<Space>,
+    /// Spaces of orders to them; empty for agents that decide for themselves.
+    pub ordered: Vec<Space>,
+}
+
+/// One order to several agents: one row of values for each.
+#[derive(Debug, Clone, Copy)]
+pub struct Orders<'a> {
+    /// Name of the space.
+    pub order: &'a str,
+    /// Receivers.
+    pub agents: &'a [EntityId],
+    /// Their values, one agent after the other.
+    pub values: &'a [f64],
+}
+
+/// One order to one agent, found right by its space.
+#[derive(Debug, Clone, Copy)]
+pub struct Order<'a> {
+    /// Number of the team.
+    pub team: usize,
+    /// Number of the space among those in which the team is ordered.
+    pub space: usize,
+    /// The receiver.
+    pub agent: EntityId,
+    /// The values.
+    pub values: &'a [f64],
+}
+
+/// The teams of a world, and who is in which.
+#[derive(Debug, Clone, Default)]
+pub struct Teams {
+    all: Vec<Team>,
+    /// Number of each entity's team, by id; [`NONE`] for those that are in none.
+    team_of: Vec<u32>,
+    /// The noun for an agent.
+    noun: &'static str,
+    /// Names of all orders, each once.
+    order_names: Vec<String>,
+}
+
+/// Stands for no team.
+const NONE: u32 = u32::MAX;
+
+impl Teams {
+    /// Returns these teams; nobody is in two of them. `noun` is that for an agent. A name that comes again
+    /// gets a number: `robot`, `robot 2`.
+    pub fn new(mut all: Vec<Team>, noun: &'static str) -> Self {
+        give_names(&mut all);
+        let last = all.iter().flat_map(|team| &team.agents).max();
+        let mut team_of = vec![NONE; last.map_or(0, |&last| last as usize + 1)];
+        for (k, team) in (0..).zip(&all) {
+            team.agents.iter().for_each(|&agent| team_of[agent as usize] = k);
+        }
+        let mut order_names: Vec<String> = Vec::new();
+        for space in all.iter().flat_map(|team| &team.ordered) {
+            if !order_names.contains(&space.name) {
+                order_names.push(space.name.clone());
+            }
+        }
+        Self { all, team_of, noun, order_names }
+    }
+
+    /// The teams.
+    pub fn all(&self) -> &[Team] {
+        &self.all
+    }
+
+    /// The noun for an agent.
+    pub(crate) fn noun(&self) -> &'static str {
+        self.noun
+    }
+
+    /// Returns whether anybody takes orders.
+    pub(crate) fn take_orders(&self) -> bool {
+        self.all.iter().any(|team| !team.ordered.is_empty())
+    }
+
+    /// The names of all orders, each once.
+    pub(crate) fn order_names(&self) -> &[String] {
+        &self.order_names
+    }
+
+    /// Returns the orders to single agents, all of them found right.
+    pub(crate) fn checked<'a>(&self, orders: &Orders<'a>) -> Result<Vec<Order<'a>>, OrderError> {
+        let &Orders { order, agents, values } = orders;
+        let Some(&first) = agents.first() else { return self.nobody(orders) };
+        let width = self.space(order, first)?.2.width();
+        if values.len() != agents.len() * width {
+            let expected = format!("{} x {width}", agents.len());
+            return Err(OrderError::Shape { order: order.into(), expected, found: values.len() });
+        }
+        let mut checked = Vec::with_capacity(agents.len());
+        for (k, &agent) in agents.iter().enumerate() {
+            let (team, number, space) = self.space(order, agent)?;
+            if space.width() != width {
+                let expected = format!("{} values for {} {agent}", space.width(), self.noun);
+                return Err(OrderError::Shape { order: order.into(), expected, found: width });
+            }
+            let values = &values[k * width..(k + 1) * width];
+            if let Some(&value) = values.iter().find(|&&value| !space.holds(value)) {
+                let who = format!("{} {agent}", self.noun);
+                let (order, expected) = (order.into(), space.words());
+                return Err(OrderError::Value { order, who, value, expected });
+            }
+            checked.push(Order { team, space: number, agent, values });
+        }
+        Ok(checked)
+    }
+
+    /// An order to nobody is right if it has no values.
+    fn nobody<'a>(&self, orders: &Orders<'_>) -> Result<Vec<Order<'a>>, OrderError> {
+        match orders.values {
+            [] => Ok(Vec::new()),
+            values => {
+                let (order, expected) = (orders.order.into(), "0".into());
+                Err(OrderError::Shape { order, expected, found: values.len() })
+            }
+        }
+    }
+
+    /// Returns an agent's team, and the number of the space of this order in it, and the space.
+    fn space(&self, order: &str, agent: EntityId) -> Result<(usize, usize, &Space), OrderError> {
+        let who = || format!("{} {agent}", self.noun);
+        let team = self.team_of.get(agent as usize).filter(|&&team| team != NONE);
+        let Some(team) = team.map(|&team| team as usize) else {
+            let last = self.team_of.len().checked_sub(1).map(|last| last as EntityId);
+            return Err(OrderError::NoAgent { who: who(), noun: self.noun, last });
+        };
+        let ordered = &self.all[team].ordered;
+        if ordered.is_empty() {
+            return Err(OrderError::Decides { who: who() });
+        }
+        let number = ordered.iter().position(|space| space.name == order).ok_or_else(|| {
+            let known = ordered.iter().map(|space| space.name.clone()).collect();
+            OrderError::Unknown { order: order.into(), who: who(), known }
+        })?;
+        Ok((team, number, &ordered[number]))
+    }
+
+    /// Checks that there is room for exactly what a team observes.
+    pub(crate) fn check_room(&self, team: usize, room: &[CellsMut<'_>]) -> Result<(), OrderError> {
+        let Some(Team { agents, observed, .. }) = self.all.get(team) else {
+            return Err(OrderError::NoTeam { team, teams: self.all.len() });
+        };
+        let fits = |(space, room): (&Space, &CellsMut<'_>)| {
+            room.len() == agents.len() * space.width()
+                && space.is_whole() == matches!(room, CellsMut::Whole(_))
+        };
+        if observed.len() == room.len() && observed.iter().zip(room).all(fits) {
+            return Ok(());
+        }
+        let expected = observed.iter().map(|space| {
+            let sort = if space.is_whole() { "whole" } else { "real" };
+            format!("{} of {} x {} {sort} values", space.name, agents.len(), space.width())
+        });
+        Err(OrderError::Room { expected: expected.collect::<Vec<_>>().join(", ") })
+    }
+}
+
+/// Gives a number to each name that comes again.
+fn give_names(teams: &mut [Team]) {
+    let mut taken = BTreeSet::new();
+    // The next number to try of each name, since thousands of teams may have one.
+    let mut next: BTreeMap<String, u32> = BTreeMap::new();
+    for team in teams {
+        let plain = team.name.clone();
+        let number = next.entry(plain.clone()).or_insert(2);
+        while !taken.insert(team.name.clone()) {
+            team.name = format!("{plain} {number}");
+            *number += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_two_teams_have_one_name() {
+        let team = |name: &str| {
+            let (observed, ordered) = (Vec::new(), Vec::new());
+            Team { name: name.into(), agents: Vec::new(), observed, ordered }
+        };
+        let all = ["snake", "snake 2", "snake", "crane", "snake"].map(team).to_vec();
+        let teams = Teams::new(all, "chain");
+        let names: Vec<_> = teams.all().iter().map(|team| &team.name[..]).collect();
+        assert_eq!(names, ["snake", "snake 2", "snake 3", "crane", "snake 4"]);
+    }
+}

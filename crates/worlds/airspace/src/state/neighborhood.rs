@@ -1,0 +1,61 @@
+//! Airplanes near each other.
+
+use crate::flight::Point;
+use sidestep_kernel::{Column, Cycle, Slot};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+const NOBODY: u32 = u32::MAX;
+
+/// The airplanes near each other: lists of airplanes by square of the plane, built anew each cycle.
+#[derive(Debug)]
+pub(in super::super) struct Neighborhood {
+    side_m: f64,
+    /// For each bucket: cycle (upper half) and last airplane listed (lower half).
+    first: Box<[AtomicU64]>,
+    /// For each airplane: the one listed before it.
+    next: Column<u32>,
+}
+
+impl Neighborhood {
+    /// Returns lists for `n` airplanes that mind each other up to `side_m` meters away.
+    pub(super) fn new(n: usize, side_m: f64) -> Self {
+        let buckets = (2 * n).next_power_of_two();
+        Self {
+            side_m,
+            first: (0..buckets).map(|_| AtomicU64::new(u64::MAX)).collect(),
+            next: Column::filled(n, NOBODY),
+        }
+    }
+
+    fn square(&self, at: Point) -> [i64; 2] {
+        at.map(|v| (v / self.side_m).floor() as i64)
+    }
+
+    fn bucket(&self, [x, y]: [i64; 2]) -> &AtomicU64 {
+        let mixed = (x as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+            ^ (y as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F);
+        &self.first[(mixed >> 32) as usize & (self.first.len() - 1)]
+    }
+
+    /// Lists an airplane for this cycle.
+    pub(in super::super) fn enter(&self, slot: Slot, at: Point, now: Cycle) {
+        let stamp = u64::from(now as u32) << 32;
+        let before = self.bucket(self.square(at)).swap(stamp | u64::from(slot), Relaxed);
+        let listed = before >> 32 == stamp >> 32;
+        self.next.set(slot as usize, if listed { before as u32 } else { NOBODY });
+    }
+
+    /// Calls `meet` for every airplane listed in this cycle in the squares around `at`, and
+    /// possibly for others.
+    pub(in super::super) fn around(&self, at: Point, now: Cycle, mut meet: impl FnMut(Slot)) {
+        let [x, y] = self.square(at);
+        for square in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [x + dx, y + dy])) {
+            let first = self.bucket(square).load(Relaxed);
+            let mut slot = if first >> 32 == u64::from(now as u32) { first as u32 } else { NOBODY };
+            while slot != NOBODY {
+                meet(slot);
+                slot = self.next.get(slot as usize);
+            }
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! Snapshots of a state by id, and their digests.
+
+use crate::agents::contact::Contacts;
+use crate::baseline::mvp::Resolving;
+use crate::flight::Pose;
+use crate::shield::Side;
+use crate::wish::Wish;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::digest::Hasher;
+use sidestep_kernel::{Cycle, Digest, EntityId};
+
+/// One airplane in a snapshot.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct AirplaneRecord {
+    /// Pose at the start of the cycle.
+    pub pose: Pose,
+    /// See [`super::Cell::arrived`].
+    pub arrived: u64,
+    /// Number of way-points done with, overrides, orbits, and orbits in a row.
+    pub counts: [u32; 4],
+    /// Side of the stored fallback.
+    pub fallback: Side,
+    /// Altitude in meters.
+    pub altitude_m: f64,
+    /// Number of orders carried out, and of times that one had to wait.
+    pub orders: [u16; 2],
+    /// Turn rate in the step that it flew last, in radians per second.
+    pub turn_rate_rad_s: f64,
+}
+
+/// Closest approach and losses of a pair of airplanes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PairRecord {
+    /// Closest approach in meters.
+    pub nearest_m: f64,
+    /// Time in which they were nearer than their separation: in whole nanoseconds, so that the sum
+    /// does not depend on the order.
+    pub lost_ns: u64,
+    /// Number of separate losses of separation.
+    pub losses: u32,
+}
+
+impl PairRecord {
+    /// Adds another record of the same pair, in any order.
+    pub fn add(&mut self, other: Self) {
+        self.nearest_m = self.nearest_m.min(other.nearest_m);
+        self.lost_ns += other.lost_ns;
+        self.losses += other.losses;
+    }
+}
+
+/// A state by id: the content of a checkpoint, and the input of a digest.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Snapshot {
+    /// Number of cycles done.
+    pub cycle: Cycle,
+    /// The airplanes by id.
+    pub airplanes: Vec<AirplaneRecord>,
+    /// Each airplane's knowledge of others; empty where the network is reliable.
+    pub contacts: Vec<Contacts>,
+    /// The conflicts that each airplane resolves; empty unless the method is MVP.
+    pub resolving: Vec<Resolving>,
+    /// The pairs for which the shield promises nothing now, by ids.
+    pub named: Vec<(EntityId, EntityId)>,
+    /// Each airplane's pose on its stored orbit; empty where no gust takes it off that.
+    pub held: Vec<Pose>,
+    /// The wish that was ordered of each airplane; empty unless airplanes are decided from outside.
+    pub wishes: Vec<Option<Wish>>,
+}
+
+impl Snapshot {
+    /// Returns the digest of this state (promise D1): every value by id.
+    pub fn digest(&self) -> Digest {
+        let mut hasher = Hasher::default();
+        hasher.u64(self.cycle);
+        hasher.u64(self.airplanes.len() as u64);
+        let hash_pose = |hasher: &mut Hasher, pose: &Pose| {
+            let Pose { at: [x, y], heading_rad } = *pose;
+            [x, y, heading_rad].iter().for_each(|v| hasher.u64(v.to_bits()));
+        };
+        self.held.iter().for_each(|pose| hash_pose(&mut hasher, pose));
+        for airplane in &self.airplanes {
+            hash_pose(&mut hasher, &airplane.pose);
+            hasher.u64(airplane.arrived);
+            airplane.counts.iter().for_each(|&n| hasher.u32(n));
+            hasher.u8(airplane.fallback as u8);
+            // Left out without orders, because the altitude then is the scenario's, or that of the
+            // track.
+            let [orders, waits] = airplane.orders;
+            if orders > 0 || waits > 0 {
+                hasher.u64(airplane.altitude_m.to_bits());
+                hasher.u32(u32::from(orders) << 16 | u32::from(waits));
+            }
+        }
+        for &(a, b) in &self.named {
+            hasher.u32(a);
+            hasher.u32(b);
+        }
+        if !self.contacts.is_empty() {
+            let known = postcard::to_stdvec(&self.contacts).expect("contacts are plain data");
+            known.iter().for_each(|&byte| hasher.u8(byte));
+        }
+        if !self.resolving.is_empty() {
+            let resolving = postcard::to_stdvec(&self.resolving).expect("conflicts are plain data");
+            resolving.iter().for_each(|&byte| hasher.u8(byte));
+        }
+        // Turn rates say nothing about what comes next, unless somebody outside decides by them.
+        if !self.wishes.is_empty() {
+            self.airplanes.iter().for_each(|a| hasher.u64(a.turn_rate_rad_s.to_bits()));
+            let wishes = postcard::to_stdvec(&self.wishes).expect("wishes are plain data");
+            wishes.iter().for_each(|&byte| hasher.u8(byte));
+        }
+        hasher.finish()
+    }
+}

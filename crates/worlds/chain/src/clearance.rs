@@ -1,0 +1,92 @@
+//! Distances of a chain's parts from the obstacles around them.
+
+use super::rods::chain::Chain;
+use super::rods::geometry::{Bounds, Point, scaled, sub};
+use super::rods::obstacle::Obstacles;
+
+/// The surroundings of a connector and of the rod behind it, as far as somebody looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Near<const D: usize> {
+    /// Gap between the connector and the nearest obstacle, meters; negative inside it.
+    pub(crate) gap_m: f64,
+    /// The way from the connector's middle to that obstacle's surface; zero if nothing is near.
+    pub(crate) way: Point<D>,
+    /// Gap between the rod and the obstacle nearest to it, meters.
+    pub(crate) rod_gap_m: f64,
+}
+
+/// Returns what is nearer than `look_m` to connector `k`, and to the rod behind it if rods count.
+pub(crate) fn near<const D: usize>(
+    chain: &Chain<D>,
+    obstacles: &Obstacles<D>,
+    k: usize,
+    look_m: f64,
+    with_rods: bool,
+) -> Near<D> {
+    let (points, connectors) = (chain.points(), chain.connectors());
+    let mut near = Near { gap_m: look_m, way: [0.0; D], rod_gap_m: look_m };
+    // One query serves a rod and its ends, because obstacles near one of them are mostly near all.
+    let end = if with_rods { (k + 1).min(points.len() - 1) } else { k };
+    let (at, radii_m) = (points[k], [k, end].map(|i| connectors[i].radius_m));
+    let rod_m = chain.rods().get(k).map_or(0.0, |rod| rod.radius_m);
+    let room = Bounds::of(&[at, points[end]]).grown(radii_m[0].max(radii_m[1]) + look_m);
+    obstacles.visit(&room, |o| {
+        let nearest = o.core.nearest_to_point(at);
+        let gap_m = nearest.distance_m - radii_m[0] - o.radius_m;
+        if gap_m < near.gap_m {
+            let part = 1.0 - o.radius_m / nearest.distance_m;
+            let way =
+                if part.is_finite() { scaled(sub(nearest.on_core, at), part) } else { [0.0; D] };
+            (near.gap_m, near.way) = (gap_m, way);
+        }
+        let rod_gap_m = o.core.nearest_to_segment([at, points[end]]).distance_m - rod_m;
+        near.rod_gap_m = near.rod_gap_m.min(rod_gap_m - o.radius_m);
+    });
+    near
+}
+
+/// Returns the least distance of any connector, and of any rod if rods count, from obstacles, up to
+/// `look_m`, and the connector at or before that part.
+pub(crate) fn least_clearance<const D: usize>(
+    chain: &Chain<D>,
+    obstacles: &Obstacles<D>,
+    look_m: f64,
+    with_rods: bool,
+) -> (f64, usize) {
+    if obstacles.is_empty() {
+        return (look_m, 0);
+    }
+    let mut least = (look_m, 0);
+    for k in 0..chain.points().len() {
+        let near = near(chain, obstacles, k, look_m, with_rods);
+        let apart_m = near.gap_m.min(near.rod_gap_m);
+        if apart_m < least.0 {
+            least = (apart_m, k);
+        }
+    }
+    least
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rods::chain::{Connector, Rod};
+    use crate::rods::obstacle::Obstacle;
+
+    #[test]
+    fn gaps_are_told_of_each_connector_and_each_rod_with_the_way_to_what_is_there() {
+        let rod = Rod::fixed(2.0, 0.05);
+        let chain = Chain::straight([0.0, 0.0], [1.0, 0.0], 1, rod, Connector::free(0.1)).unwrap();
+        let disc = Obstacle::ball(0, [1.0, 0.5], 0.2);
+        let wall = Obstacle::capsule(1, [[-0.5, -1.0], [-0.5, 1.0]], 0.0);
+        let obstacles = Obstacles::new(vec![disc, wall], 1.0).unwrap();
+        let told = |k| near(&chain, &obstacles, k, 0.6, true);
+        assert!((told(0).gap_m - 0.4).abs() < 1e-12);
+        assert_eq!(told(0).way, [-0.5, 0.0]);
+        assert!((told(0).rod_gap_m - 0.25).abs() < 1e-12, "half way along it");
+        assert_eq!((told(1).gap_m, told(1).way), (0.6, [0.0, 0.0]), "nothing is near");
+        let (least_m, part) = least_clearance(&chain, &obstacles, 0.6, true);
+        assert!((least_m - 0.25).abs() < 1e-12 && part == 0);
+        assert!((least_clearance(&chain, &obstacles, 0.6, false).0 - 0.4).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,118 @@
+//! Orders from outside, and what came of the last ones.
+
+use super::Objection;
+use serde::{Deserialize, Serialize};
+
+/// The share of the state that belongs to whoever decides from outside.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct External {
+    /// Orders for the next cycle.
+    pub(crate) orders: Orders,
+    /// The answer to those of the last one.
+    pub(crate) answer: Answer,
+}
+
+/// Orders for one cycle; a later one takes the place of an earlier one of its name.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct Orders {
+    /// The connector that goes to a place; by default the one that leads.
+    pub(crate) connector: Option<u32>,
+    /// The rod that goes to two places; by default the one behind the leading connector.
+    pub(crate) rod: Option<u32>,
+    /// The last target of either sort; without one nothing moves.
+    pub(crate) target: Option<Target>,
+    /// Whether the chain goes as far as it can where it cannot go all the way.
+    pub(crate) goes_far: bool,
+}
+
+/// Places to which something shall go; in the plane the last coordinate is 0.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) enum Target {
+    /// A connector.
+    Connector([f64; 3]),
+    /// Both ends of a rod.
+    Rod([[f64; 3]; 2]),
+}
+
+/// The answer to orders.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct Answer {
+    /// The outcome.
+    pub(crate) came: Came,
+    /// The places that were to be reached within the cycle: of a rod's ends, or twice that of a connector.
+    pub(crate) wish_m: [[f64; 3]; 2],
+    /// The place that the first of them has reached, or could have reached.
+    pub(crate) reached_m: [f64; 3],
+    /// The part of the cycle's way that was done.
+    pub(crate) done_share: f64,
+    /// The objection, if there was one.
+    pub(crate) veto: Option<Objection>,
+    /// The obstacle because of which.
+    pub(crate) obstacle: Option<u32>,
+}
+
+/// Outcome of orders.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub(crate) enum Came {
+    /// There was no order to go anywhere.
+    #[default]
+    NoOrder,
+    /// All of the cycle's way was done.
+    Moved,
+    /// Some of it.
+    CutShort,
+    /// Nothing of it.
+    Vetoed,
+    /// It waited, because parts got out of the way of something.
+    Waited,
+    /// Its task takes no orders, or the chain was broken.
+    Unheard,
+}
+
+impl Came {
+    /// Their names, in their order.
+    pub(crate) const NAMES: [&str; 6] =
+        ["no-order", "moved", "cut-short", "vetoed", "waited", "unheard"];
+}
+
+impl External {
+    /// Whether there is nothing to keep.
+    pub(crate) fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Whether it belongs to a chain of `n` connectors.
+    pub(crate) fn is_within(&self, n: usize) -> bool {
+        let Orders { connector, rod, .. } = self.orders;
+        let is_there = |k: Option<u32>, most: usize| k.is_none_or(|k| (k as usize) < most);
+        is_there(connector, n) && is_there(rod, n.saturating_sub(1))
+    }
+}
+
+impl Orders {
+    /// The order that names a connector.
+    pub(crate) const CONNECTOR: &str = "connector";
+    /// The order that gives its target.
+    pub(crate) const TO: &str = "to_m";
+    /// The order that names a rod.
+    pub(crate) const ROD: &str = "rod";
+    /// The order that gives the targets of its ends.
+    pub(crate) const ROD_TO: &str = "rod_to_m";
+    /// The order that says what a veto on the way does.
+    pub(crate) const REACH: &str = "reach";
+
+    /// Notes an order by its name.
+    pub(crate) fn note(&mut self, order: &str, values: &[f64]) {
+        let place = |at: &[f64]| std::array::from_fn(|i| at.get(i).copied().unwrap_or_default());
+        match (order, values) {
+            (Self::TO, at) => self.target = Some(Target::Connector(place(at))),
+            (Self::ROD_TO, ends) => {
+                let (first, second) = ends.split_at(ends.len() / 2);
+                self.target = Some(Target::Rod([place(first), place(second)]));
+            }
+            (Self::CONNECTOR, &[k]) => self.connector = Some(k as u32),
+            (Self::ROD, &[k]) => self.rod = Some(k as u32),
+            (_, values) => self.goes_far = values == [1.0],
+        }
+    }
+}

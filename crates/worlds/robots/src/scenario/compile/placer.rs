@@ -1,0 +1,155 @@
+//! Places of bodies at the start: those that the scenario gives, and those that a seed draws.
+
+use super::bodies::{Group, TypeOf};
+use super::*;
+use crate::scenario::Placing;
+
+/// The part of a scenario on which the places at the start depend: another seed needs no more of it.
+#[derive(Debug)]
+pub(crate) struct Placer {
+    pub(super) source: Arc<Source>,
+    pub(super) map: Arc<GridMap>,
+    pub(super) groups: Vec<Group>,
+    /// Width and height in boxes of each type of bodies.
+    pub(super) sizes: Vec<(u32, u32)>,
+}
+
+/// Bodies, and their places and facings at the start, by id.
+pub(super) struct Placed {
+    pub(super) bodies: Vec<Body>,
+    pub(super) start: Vec<((u32, u32), u8)>,
+}
+
+impl Placer {
+    /// Returns the first id of each group: robots, people, doors, whatever is placed first.
+    pub(super) fn first_ids(&self) -> Vec<EntityId> {
+        let mut next = 0;
+        let first = |group: &Group| {
+            let first = next;
+            next += group.count as EntityId;
+            first
+        };
+        self.groups.iter().map(first).collect()
+    }
+
+    /// Places everybody, with the draws of `streams`.
+    pub(super) fn place(&self, streams: &Streams) -> Result<Placed, InputError> {
+        let n = self.groups.iter().map(|group| group.count as usize).sum();
+        let mut round = Round {
+            placer: self,
+            streams,
+            floor: Floor::new(&self.map),
+            spans: vec![0..0; n],
+            bodies: vec![Body { id: 0, ty: 0, period: 1, phase: 0 }; n],
+            start: vec![((0, 0), 0); n],
+        };
+        // Doors and bodies with a given place are placed first, because draws must find the
+        // remaining free boxes.
+        for given in [true, false] {
+            for (group, first) in self.groups.iter().zip(self.first_ids()) {
+                if group.places.is_empty() != given {
+                    round.add_group(group, first)?;
+                }
+            }
+        }
+        Ok(Placed { bodies: round.bodies, start: round.start })
+    }
+}
+
+/// One round of placing.
+struct Round<'a> {
+    placer: &'a Placer,
+    streams: &'a Streams,
+    floor: Floor,
+    /// Spans by id, to name the other body when two bodies stand on each other.
+    spans: Vec<Range<usize>>,
+    bodies: Vec<Body>,
+    start: Vec<((u32, u32), u8)>,
+}
+
+impl Round<'_> {
+    fn add_group(&mut self, group: &Group, first: EntityId) -> Result<(), InputError> {
+        for k in 0..group.count as usize {
+            let id = first + k as EntityId;
+            let ty = match &group.ty {
+                TypeOf::All(ty) => *ty,
+                TypeOf::Each(types) => types[k],
+            };
+            let size = self.placer.sizes[usize::from(ty)];
+            let (at, span) = match group.places.get(k) {
+                Some(place) => (self.given_place(place, id, size)?, place.span()),
+                None => (self.drawn_place(group, k, id, size)?, group.span.clone()),
+            };
+            let facing = group.places.get(k).and_then(|place| place.get_ref().facing);
+            let facing = facing.unwrap_or_else(|| {
+                self.streams.block(id, 0, purpose::PLACE, u16::MAX)[0] as u8 % 4
+            });
+            let phase = group
+                .phase
+                .unwrap_or_else(|| self.streams.draws(id, 0, purpose::PHASE).below(group.period));
+            self.start[id as usize] = (at, facing);
+            self.spans[id as usize] = span;
+            self.bodies[id as usize] =
+                Body { id, ty, period: group.period, phase: phase % group.period };
+        }
+        Ok(())
+    }
+
+    fn given_place(
+        &mut self,
+        place: &Spanned<Placing>,
+        id: EntityId,
+        size: (u32, u32),
+    ) -> Result<(u32, u32), InputError> {
+        let at = place.get_ref().at;
+        match self.floor.place(id, at, size) {
+            Ok(()) => Ok(at),
+            Err(obstacle) => Err(self.in_the_way(place.span(), at, size, obstacle)),
+        }
+    }
+
+    fn drawn_place(
+        &mut self,
+        group: &Group,
+        k: usize,
+        id: EntityId,
+        size: (u32, u32),
+    ) -> Result<(u32, u32), InputError> {
+        let region = group.region.unwrap_or_else(|| self.floor.region());
+        self.floor.draw_place(self.streams, id, size, region).ok_or_else(|| {
+            let (width, height) = size;
+            let cause = format!(
+                "no free place is left for number {} of these {} bodies of {width} x {height} boxes",
+                k + 1,
+                group.count,
+            );
+            let remedy = "give fewer or smaller bodies, or a larger map or region";
+            self.placer.source.error(group.span.clone(), cause, remedy)
+        })
+    }
+
+    fn in_the_way(
+        &self,
+        span: Range<usize>,
+        at: (u32, u32),
+        size: (u32, u32),
+        obstacle: Obstacle,
+    ) -> InputError {
+        let body = format!("a body of {} x {} boxes at [{}, {}]", size.0, size.1, at.0, at.1);
+        let cause = match obstacle {
+            Obstacle::Outside => {
+                let (width, height) = (self.placer.map.width(), self.placer.map.height());
+                format!("{body} leaves the map of {width} x {height} boxes")
+            }
+            Obstacle::Wall(c, r) => format!("{body} stands in the wall at [{c}, {r}]"),
+            Obstacle::Body(id, c, r) => {
+                let other =
+                    self.placer.source.error(self.spans[id as usize].clone(), "", "").position();
+                let line = other.map_or(String::new(), |(line, _)| format!(" (line {line})"));
+                format!("{body} stands on body {id}{line} at [{c}, {r}]")
+            }
+        };
+        let remedy = "place it in free boxes; `sidestep map FILE --box B` shows them";
+        self.placer.source.error(span, cause, remedy)
+    }
+}
