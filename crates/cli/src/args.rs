@@ -1,6 +1,7 @@
 //! The command line: options of every command, and examples.
 
 use crate::commands::{Command, GROUPS};
+use crate::console::prose_columns;
 use clap::builder::Styles;
 use clap::{CommandFactory, FromArgMatches, Parser};
 use std::ffi::OsString;
@@ -56,7 +57,8 @@ fn without_help_of_help(words: impl Iterator<Item = OsString>) -> Vec<OsString> 
 
 /// Returns the command line, whose help lists the commands by what people do with them.
 pub(crate) fn command() -> clap::Command {
-    let command = Cli::command();
+    // Without a terminal, clap would take 100 columns.
+    let command = Cli::command().term_width(prose_columns().into());
     let listed = listed(&command);
     command.help_template(format!(
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{listed}{}\n{{options}}{{after-help}}",

@@ -6,11 +6,11 @@ use std::fmt::Display;
 use std::io::{IsTerminal, Write};
 use std::ops::Range;
 
-pub(crate) use sidestep::kernel::words::{LINE_COLS, aligned, grouped, wrapped};
+pub(crate) use sidestep::kernel::words::{LINE_COLS, aligned, fixed, grouped, wrapped};
 pub(crate) use sidestep_session::report::duration;
 
-/// Columns of text if the terminal does not report its width.
-const DEFAULT_COLS: u16 = 100;
+/// Most columns of prose: longer lines are hard to read.
+const MOST_COLS: u16 = 100;
 
 /// The destination of a command's output.
 #[derive(Debug, Clone, Copy)]
@@ -59,7 +59,8 @@ impl Console {
 
     /// Prints a warning: something is wrong, but the command goes on.
     pub(crate) fn warn(self, text: impl Display) {
-        let _ = writeln!(std::io::stderr(), "warning: {text}");
+        let lines = wrapped(&format!("warning: {text}"), usize::from(prose_columns()));
+        let _ = writeln!(std::io::stderr(), "{}", lines.join("\n"));
     }
 
     /// Prints the reason why the command failed.
@@ -68,9 +69,17 @@ impl Console {
     }
 }
 
-/// Returns the number of columns that text may take.
+/// Returns the number of columns that text may take: those of the terminal; without one, as the variable
+/// `COLUMNS` says, or [`LINE_COLS`].
 pub(crate) fn columns() -> u16 {
-    terminal_size::terminal_size().map_or(DEFAULT_COLS, |(width, _)| width.0)
+    let told = || std::env::var("COLUMNS").ok()?.parse().ok().filter(|columns| *columns > 0);
+    let terminal = terminal_size::terminal_size().map(|(width, _)| width.0);
+    terminal.or_else(told).unwrap_or(LINE_COLS as u16)
+}
+
+/// Returns the number of columns that prose may take.
+pub(crate) fn prose_columns() -> u16 {
+    columns().min(MOST_COLS)
 }
 
 /// Writes to standard output. A reader that has closed the pipe (`| head`) is not an error.

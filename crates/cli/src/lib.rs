@@ -23,6 +23,7 @@ mod plan;
 mod progress;
 mod report;
 mod sweep;
+mod viewers;
 mod watch;
 
 use exit::ExitCode;

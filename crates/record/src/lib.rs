@@ -20,7 +20,10 @@ pub mod whole;
 pub use folder::{Existing, NewRun, ResumePoint, RunFolder, RunView};
 pub use format::FormatVersion;
 pub use manifest::{Manifest, Status};
-pub use mcap::{BagSchema, BagWriter, McapEnd, McapOrigin, McapRecorder, McapRun, is_mcap};
+pub use mcap::{
+    BagSchema, BagWriter, LiveFrames, LiveServer, McapEnd, McapOrigin, McapRecorder, McapRun,
+    Playback, Playing, Steering, is_mcap, live,
+};
 pub use parquet::ParquetRecorder;
 pub use read::{Table, for_each_block, read_table, tables};
 pub use schema::Origin;

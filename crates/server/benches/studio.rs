@@ -142,6 +142,7 @@ fn studio(folder: &Path, text: &str) -> (Studio, Page) {
         port: Some(0),
         read_only: false,
         workers: 1,
+        foxglove: None,
     };
     let studio = Studio::start(options).unwrap_or_else(|e| panic!("{e}"));
     let mut page = Page::of(&studio);

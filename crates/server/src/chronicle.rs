@@ -22,14 +22,34 @@ pub(crate) struct Chronicle {
     /// Numbers of events that were not kept, about when.
     lost: Vec<(Cycle, u64)>,
     /// Those since the last frame that was sent.
-    fresh: Vec<Entry>,
-    fresh_left_out: u64,
+    fresh: Fresh,
+    /// Those since the last frame that viewers beside the page were shown, if there may be any.
+    others: Option<Fresh>,
+}
+
+/// The last events of those that somebody was not told yet.
+#[derive(Debug, Default)]
+struct Fresh {
+    entries: Vec<Entry>,
+    left_out: u64,
+}
+
+impl Fresh {
+    fn note(&mut self, log: &[Entry], left_out: u64) {
+        let last = &log[log.len().saturating_sub(MOST_IN_FRAME)..];
+        let too_many = (self.entries.len() + last.len()).saturating_sub(MOST_IN_FRAME);
+        self.entries.drain(..too_many);
+        self.entries.extend_from_slice(last);
+        self.left_out += left_out + (log.len() - last.len() + too_many) as u64;
+    }
 }
 
 impl Chronicle {
     /// Takes over what happened before a frame.
     pub(crate) fn note(&mut self, frame: &mut Frame) {
-        self.freshen(&frame.log, frame.log_left_out);
+        for fresh in [Some(&mut self.fresh), self.others.as_mut()].into_iter().flatten() {
+            fresh.note(&frame.log, frame.log_left_out);
+        }
         self.note_ahead(frame);
     }
 
@@ -60,19 +80,22 @@ impl Chronicle {
         self.frontier
     }
 
-    /// Keeps the last ones for the next frame that is sent.
-    fn freshen(&mut self, log: &[Entry], left_out: u64) {
-        let last = &log[log.len().saturating_sub(MOST_IN_FRAME)..];
-        let too_many = (self.fresh.len() + last.len()).saturating_sub(MOST_IN_FRAME);
-        self.fresh.drain(..too_many);
-        self.fresh.extend_from_slice(last);
-        self.fresh_left_out += left_out + (log.len() - last.len() + too_many) as u64;
-    }
-
     /// Takes the last events since the last call, and the number of those that are not among them.
     pub(crate) fn take_fresh(&mut self) -> (Vec<Event>, u64) {
-        let events = self.fresh.drain(..).map(|entry| event(&entry)).collect();
-        (events, std::mem::take(&mut self.fresh_left_out))
+        let Fresh { entries, left_out } = std::mem::take(&mut self.fresh);
+        (entries.iter().map(event).collect(), left_out)
+    }
+
+    /// Keeps events for viewers beside the page, too.
+    pub(crate) fn keep_for_viewers(&mut self) {
+        self.others.get_or_insert_default();
+    }
+
+    /// Takes the last events for them, and the number of those that are not among them.
+    pub(crate) fn take_for_viewers(&mut self) -> (Vec<Entry>, u64) {
+        let Fresh { entries, left_out } =
+            self.others.as_mut().map(std::mem::take).unwrap_or_default();
+        (entries, left_out)
     }
 
     /// Returns at most so many of the events of some cycles.

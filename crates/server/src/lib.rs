@@ -45,10 +45,10 @@ use house::{House, MOST_ASIDES};
 use keyframes::Budget;
 use protocol::{Named, Problem};
 use serve::Patience;
-use session::Means;
+use session::{Means, Showcase};
 use sidestep::kernel::InputError;
 use sidestep::scenario::Worlds;
-use sidestep_session::Error;
+use sidestep_session::{Error, ViewersAt};
 use std::net::{IpAddr, SocketAddr, TcpListener};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -84,6 +84,8 @@ pub struct Options {
     pub read_only: bool,
     /// The number of worker threads of each session.
     pub workers: usize,
+    /// The settled address at which viewers of Foxglove's protocol watch the session that was opened last.
+    pub foxglove: Option<ViewersAt>,
 }
 
 /// A server that runs, until it is ended or dropped.
@@ -114,9 +116,10 @@ impl Studio {
         let guard = Guard::new(address, &options.host).map_err(failed)?;
         let token = guard.token().map(String::from);
         let (ending, ends) = watch::channel(false);
-        let Options { worlds, workers, read_only, program, .. } = options;
+        let Options { worlds, workers, read_only, program, foxglove, .. } = options;
         let budget = Arc::new(Budget::new(ALL_KEYFRAME_BYTES, KEYFRAME_BYTES));
-        let means = Means { worlds, files, workers, read_only, budget };
+        let showcase = foxglove.map(|at| Arc::new(Showcase::new(at)));
+        let means = Means { worlds, files, workers, read_only, budget, showcase };
         let house = Arc::new(House::new(means, guard, program, open, ends));
         let runtime =
             Builder::new_current_thread().enable_all().max_blocking_threads(MOST_ASIDES).build();

@@ -1,6 +1,7 @@
 //! The port: found and bound; and the address by which others reach it.
 
 use sidestep::kernel::InputError;
+use sidestep_session::next_free;
 use std::io;
 use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs, UdpSocket};
 
@@ -23,9 +24,7 @@ pub(crate) fn bind(host: &str, port: Option<u16>) -> Result<TcpListener, InputEr
     };
     match at(port) {
         bound if is_taken(&bound) => {
-            let after = (port..port.saturating_add(PORTS)).skip(1);
-            let free = after.into_iter().find(|port| at(*port).is_ok());
-            let remedy = match free {
+            let remedy = match next_free(ip, port) {
                 Some(free) => format!("give --port {free}, which is free, or leave it out"),
                 None => "leave it out, and a free one is taken".into(),
             };

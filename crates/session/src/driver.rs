@@ -2,11 +2,13 @@
 
 use crate::Error;
 use crate::film::Film;
+use crate::live::Steered;
 use crate::recording::{Recording, next};
 use crate::watcher::{Progress, Watched, Watcher};
 use cpu_time::ProcessTime;
 use sidestep::kernel::Cycle;
 use sidestep::kernel::Simulation;
+use sidestep::kernel::ports::Recorder;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::{Duration, Instant};
 
@@ -24,13 +26,25 @@ pub struct Effort {
     pub cpu: Duration,
 }
 
+impl std::ops::AddAssign for Effort {
+    fn add_assign(&mut self, more: Self) {
+        self.cycles += more.cycles;
+        self.wall += more.wall;
+        self.cpu += more.cpu;
+    }
+}
+
 /// The destinations of a run's rows and frames.
 #[derive(Default)]
 pub struct Sinks<'a> {
     /// Rows and checkpoints.
     pub recording: Option<&'a mut Recording>,
+    /// Rows alone, for who keeps them in memory; they are handed over once, so there is no recording then.
+    pub rows: Option<&'a mut dyn Recorder>,
     /// The recording or animation that takes frames.
     pub film: Option<&'a mut dyn Film>,
+    /// The viewers that watch it, and may hold it.
+    pub viewers: Option<&'a mut Steered>,
 }
 
 /// Drives the run up to cycle `until`, or until the watcher asks to stop; the run's cycle shows
@@ -81,22 +95,30 @@ fn slices(
     }
     watched.at(Progress::Cycles { from, done: from, until });
     while run.cycle() < until && !run.is_over() && watcher.go_on() {
-        slice(run, until, &mut sinks, &mut pace)?;
+        let allowed = sinks.viewers.as_mut().map_or(until, |viewers| viewers.attend(run));
+        let allowed = allowed.saturating_sub(run.cycle());
+        if allowed > 0 {
+            slice(run, until, &mut sinks, &mut pace, allowed)?;
+        }
         watched.at(Progress::Cycles { from, done: run.cycle(), until });
+    }
+    if let Some(viewers) = &mut sinks.viewers {
+        viewers.end(run);
     }
     Ok(Effort { cycles: run.cycle() - from, wall: wall.elapsed(), cpu: cpu.elapsed() })
 }
 
-/// Advances a little, and passes on rows and frames that are due.
+/// Advances a little, by at most `allowed` cycles, and passes on rows and frames that are due.
 fn slice(
     run: &mut dyn Simulation,
     until: Cycle,
     sinks: &mut Sinks<'_>,
     pace: &mut Pace,
+    allowed: Cycle,
 ) -> Result<(), Error> {
     let rows_due = sinks.recording.as_ref().map_or(until, |r| r.next_stop(run.cycle()).min(until));
     let frame_due = sinks.film.as_ref().map_or(until, |f| next(f.every(), run.cycle()).min(until));
-    let asked = pace.cycles().min(rows_due.min(frame_due) - run.cycle());
+    let asked = pace.cycles().min(allowed).min(rows_due.min(frame_due) - run.cycle());
     let started = Instant::now();
     let done = match sinks.film.as_mut().and_then(|film| Some((film.follows_every()?, film))) {
         Some((step, film)) => followed(run, asked, step, &mut **film),
@@ -109,6 +131,11 @@ fn slice(
         && (done < asked || is_due(rows_due, run))
     {
         recording.take(run)?;
+    }
+    if let Some(rows) = &mut sinks.rows
+        && (done < asked || is_due(until, run))
+    {
+        run.record(&mut **rows)?;
     }
     if let Some(film) = &mut sinks.film
         && is_due(frame_due, run)

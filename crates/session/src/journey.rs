@@ -3,11 +3,13 @@
 use crate::driver::{Effort, Sinks, drive};
 use crate::film::{Ending, Film, McapFilm};
 use crate::identity::Maker;
+use crate::live::{Steered, ViewersAt};
+use crate::orders::has_orders;
 use crate::recording::{Recording, restore};
 use crate::summary::{Cost, Status, Summary, SummaryFile};
 use crate::{Error, Watcher, picture};
 use sidestep::VERSION;
-use sidestep::kernel::ports::RecordError;
+use sidestep::kernel::ports::{MemoryRecorder, RecordError, Recorder, TableSchema, Values};
 use sidestep::kernel::{Cycle, InputError, Simulation};
 use sidestep::scenario::{Compiled, Foreign, Source, Worlds};
 use sidestep_record::{Existing, McapRecorder, RunFolder};
@@ -20,11 +22,16 @@ pub struct Journey {
     run: Box<dyn Simulation>,
     recording: Option<Recording>,
     film: Option<McapFilm>,
+    /// Rows that are kept in memory.
+    rows: Option<MemoryRecorder>,
+    viewers: Option<Steered>,
     workers: usize,
     /// The cycle to stop at, if before the planned end.
     until: Option<Cycle>,
     /// The report about the file that the scenario was made from.
     told: Option<Foreign>,
+    /// Its cost so far.
+    effort: Effort,
 }
 
 /// The places where a run is recorded.
@@ -68,7 +75,7 @@ impl Journey {
         keep.check()?;
         if keep.folder.is_none() && keep.mcap.is_none() {
             let run = compiled.start(source, workers);
-            return Ok(Self { run, recording: None, film: None, workers, until: None, told });
+            return Ok(Self::new(run, None, None, workers).told(told));
         }
         let resolved = compiled.resolve(source)?;
         let (mut run, recording) = match keep.folder {
@@ -85,7 +92,7 @@ impl Journey {
             None => None,
             Some((file, every)) => Some(McapFilm::begin(file, every, resolved, run.as_mut())?),
         };
-        Ok(Self { run, recording, film, workers, until: None, told })
+        Ok(Self::new(run, recording, film, workers).told(told))
     }
 
     /// Returns a stopped run at the point where its folder can continue, to go on to its end or to
@@ -112,8 +119,52 @@ impl Journey {
         let mut run = worlds.compile(&source)?.start(&source, workers);
         restore(run.as_mut(), &point, path)?;
         check_end(until, run.cycle(), run.plan().cycles)?;
+        refuse_without_orders(run.as_ref(), path)?;
         let recording = Some(Recording::begin(folder, run.as_mut())?);
-        Ok(Self { run, recording, film: None, workers, until, told: None })
+        Ok(Self { until, ..Self::new(run, recording, None, workers) })
+    }
+
+    fn new(
+        run: Box<dyn Simulation>,
+        recording: Option<Recording>,
+        film: Option<McapFilm>,
+        workers: usize,
+    ) -> Self {
+        let effort = Effort::default();
+        Self {
+            run,
+            recording,
+            film,
+            rows: None,
+            viewers: None,
+            workers,
+            until: None,
+            told: None,
+            effort,
+        }
+    }
+
+    fn told(self, told: Option<Foreign>) -> Self {
+        Self { told, ..self }
+    }
+
+    /// The run.
+    pub fn simulation(&self) -> &dyn Simulation {
+        self.run.as_ref()
+    }
+
+    /// The run, for who gives it orders, or restores another state of it.
+    pub fn simulation_mut(&mut self) -> &mut dyn Simulation {
+        self.run.as_mut()
+    }
+
+    /// Shows the run to viewers while it goes on.
+    ///
+    /// # Errors
+    /// When the address cannot be had.
+    pub fn show(&mut self, at: &ViewersAt) -> Result<(), Error> {
+        self.viewers = Some(Steered::start(at, self.run.as_mut())?);
+        Ok(())
     }
 
     /// Returns the number of cycles done since the run's start.
@@ -121,19 +172,72 @@ impl Journey {
         self.run.cycle()
     }
 
+    /// Keeps the rows of all tables in memory from now on.
+    ///
+    /// # Errors
+    /// When they go to a folder already: rows are handed over once.
+    pub fn keep_rows(&mut self) -> Result<(), InputError> {
+        if let Some(recording) = &self.recording {
+            let folder = recording.folder().path().display();
+            let remedy = "read the tables from there when the run is finished";
+            return Err(InputError::new(folder, "the rows of this run go to a folder", remedy));
+        }
+        if self.rows.is_none() {
+            self.run.begin_recording();
+            self.rows = Some(MemoryRecorder::new(&self.run.schemas()));
+        }
+        Ok(())
+    }
+
+    /// Whether the rows of all tables are kept in memory.
+    pub fn keeps_rows(&self) -> bool {
+        self.rows.is_some()
+    }
+
+    /// Takes the rows that were kept in memory so far; none if they are not kept.
+    ///
+    /// # Errors
+    /// When the last ones cannot be handed over.
+    pub fn take_rows(&mut self) -> Result<Vec<(TableSchema, Vec<Values>)>, RecordError> {
+        let Some(rows) = &mut self.rows else { return Ok(Vec::new()) };
+        self.run.record(rows)?;
+        Ok(rows.take())
+    }
+
     /// Drives the run to its end, or until the watcher asks to stop, and stores everything.
     ///
     /// # Errors
     /// When something cannot be stored; a bug of the simulation.
-    pub fn travel(self, watcher: &dyn Watcher) -> Result<Summary, Error> {
-        let Self { mut run, mut recording, mut film, workers, until, told } = self;
-        let until = until.unwrap_or(run.plan().cycles);
+    pub fn travel(mut self, watcher: &dyn Watcher) -> Result<Summary, Error> {
+        let until = self.until.unwrap_or(self.run.plan().cycles);
+        self.advance_to(until, watcher)?;
+        self.finish(watcher)
+    }
+
+    /// Drives the run to cycle `until`, or until the watcher asks to stop; [`Self::finish`] stores the rest.
+    /// Frames for viewers start anew with every call.
+    ///
+    /// # Errors
+    /// When something cannot be stored; a bug of the simulation.
+    pub fn advance_to(&mut self, until: Cycle, watcher: &dyn Watcher) -> Result<(), Error> {
+        let Self { run, recording, film, rows, viewers, effort, .. } = self;
         let sinks = Sinks {
             recording: recording.as_mut(),
+            rows: rows.as_mut().map(|rows| rows as &mut dyn Recorder),
             film: film.as_mut().map(|film| film as &mut dyn Film),
+            viewers: viewers.as_mut(),
         };
         let driven = drive_guarded(run.as_mut(), until, sinks, watcher);
-        let effort = driven.map_err(|e| broken_by(e, run.as_ref(), recording.as_ref()))?;
+        *effort += driven.map_err(|e| broken_by(e, run.as_ref(), recording.as_ref()))?;
+        Ok(())
+    }
+
+    /// Stores everything: a run at its planned end is complete, another can be resumed.
+    ///
+    /// # Errors
+    /// When something cannot be stored.
+    pub fn finish(self, watcher: &dyn Watcher) -> Result<Summary, Error> {
+        let Self { mut run, recording, film, workers, told, effort, .. } = self;
         let folder = recording.as_ref().map(|r| r.folder().path().to_path_buf());
         let took = recording.as_ref().map_or(Duration::ZERO, Recording::took)
             + film.as_ref().map_or(Duration::ZERO, McapFilm::took);
@@ -158,6 +262,17 @@ impl Journey {
     }
 }
 
+/// Refuses to go on with a run whose agents had orders: nobody would give them any.
+fn refuse_without_orders(run: &dyn Simulation, folder: &Path) -> Result<(), InputError> {
+    if !has_orders(folder)? {
+        return Ok(());
+    }
+    let cause = format!("its agents were decided from outside up to cycle {}", run.cycle());
+    let remedy = "continue it with the program that decided for them, or look at it with \
+                  `sidestep replay DIR --cycle N`";
+    Err(InputError::new(folder.display(), cause, remedy))
+}
+
 fn check_end(asked: Option<Cycle>, now: Cycle, planned: Cycle) -> Result<(), InputError> {
     let Some(end) = asked.filter(|end| !(now..=planned).contains(end)) else { return Ok(()) };
     let cause = format!("the run stands at cycle {now} and was planned for {planned} cycles");
@@ -179,7 +294,7 @@ pub(crate) fn recorded_run(
     watcher: &dyn Watcher,
 ) -> Result<bool, Error> {
     let until = run.plan().cycles;
-    let sinks = Sinks { recording: Some(&mut recording), film: None };
+    let sinks = Sinks { recording: Some(&mut recording), ..Sinks::default() };
     let effort = drive_guarded(run, until, sinks, watcher)?;
     let folder = recording.folder().path().to_path_buf();
     let cost = Cost { workers, effort, recording: recording.took() };

@@ -4,10 +4,13 @@
 //! ```text
 //! scenario.rs   a file and overrides -> a scenario     journey.rs    one run, to its end
 //! driver.rs     advances in slices                     recording.rs  the folder of a run
+//! orders.rs     orders from outside, followed again
 //! film/         frames into files                      picture.rs    pictures into files
 //! rerun.rs      recorded runs, computed again          replay.rs     ... and compared
+//! played/       ... of other builds, from their tables
 //! export/       recorded runs in other formats         report/       folders -> documents
 //! sweep/        many runs of one scenario              summary.rs    the results of a run
+//! live/         viewers that watch and steer           beat.rs       when a cycle is due
 //! watcher.rs    progress, and whether to go on         identity.rs   the build that made a run
 //! ```
 //!
@@ -15,6 +18,7 @@
 //! list of worlds take [`Worlds`](sidestep::scenario::Worlds), and report their progress to a
 //! [`Watcher`].
 
+mod beat;
 mod compare;
 mod driver;
 mod error;
@@ -22,7 +26,10 @@ mod files;
 mod film;
 mod identity;
 mod journey;
+mod live;
+mod orders;
 mod picture;
+mod played;
 mod recorded;
 mod recording;
 mod replay;
@@ -35,17 +42,20 @@ pub mod export;
 pub mod report;
 pub mod sweep;
 
+pub use beat::Beat;
 pub use driver::{Effort, Sinks, drive};
 pub use error::Error;
 pub use files::replace;
 pub use film::{Ending, Film, McapFilm};
 pub use identity::{adds_code, build};
 pub use journey::{Journey, Keep};
+pub use live::{Steered, Viewers, ViewersAt, next_free};
 pub use picture::write_png;
 pub use recorded::{csv_table, stored_summary};
 pub use recording::Recording;
 pub use replay::{Replayed, replay_all, replay_to};
 pub use rerun::Recorded;
 pub use scenario::{problems, read};
+pub use sidestep_record::{Playback, Playing, Steering};
 pub use summary::{Phases, Status, Summary};
 pub use watcher::{Progress, Unwatched, Watcher};

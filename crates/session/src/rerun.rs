@@ -2,6 +2,8 @@
 
 use crate::Error;
 use crate::identity::Maker;
+use crate::orders::follow_recorded;
+use crate::played::Played;
 use crate::recording::{restore, write_inputs};
 use sidestep::kernel::Simulation;
 use sidestep::kernel::checkpoint::decode_header;
@@ -119,7 +121,30 @@ impl Recorded {
         self.maker.check(&self.path, "run", |wrote| {
             format!("use sidestep {wrote}, or run its scenario again")
         })?;
-        Ok(compiled.start(&self.source, workers))
+        let mut run = compiled.start(&self.source, workers);
+        if let Some(folder) = &self.folder {
+            follow_recorded(run.as_mut(), folder)?;
+        }
+        Ok(run)
+    }
+
+    /// Returns the build that made the recording, if it is another one: then it is not computed again.
+    pub fn other_maker(&self) -> Option<&str> {
+        let other = self.maker.check(&self.path, "run", |_| String::new()).is_err();
+        other.then(|| self.maker.build.as_deref().unwrap_or(&self.maker.version))
+    }
+
+    /// Returns the run at its start, to be watched: computed again, or from its own tables where another build made
+    /// it.
+    ///
+    /// # Errors
+    /// When the scenario is no longer valid; when a recording of another build has no tables.
+    pub fn shown(&self, workers: usize) -> Result<Box<dyn Simulation>, InputError> {
+        let Some(folder) = self.folder.as_ref().filter(|_| self.other_maker().is_some()) else {
+            return self.start(workers);
+        };
+        let start = self.worlds.compile(&self.source)?.start(&self.source, 1);
+        Ok(Box::new(Played::open(start, folder, self.cycles_done)?))
     }
 
     /// Returns the run at its last checkpoint, if that is before `cycle`; otherwise at its start.

@@ -2,9 +2,12 @@
 
 import { spawn, type ChildProcess } from "node:child_process";
 import { createInterface } from "node:readline";
+import { fileURLToPath } from "node:url";
 import { preview, type PreviewServer } from "vite";
 
 export const BINARY = process.env.SIDESTEP_BINARY ?? "";
+/** The folder of the shipped scenarios. */
+export const SCENARIOS = fileURLToPath(new URL("../../../scenarios", import.meta.url));
 
 export class Program {
   readonly url: string;

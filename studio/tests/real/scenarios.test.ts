@@ -1,11 +1,11 @@
-/** All shipped kinds of scenarios through a real server: STUDIO_URL names a page that `sidestep studio scenarios` serves. */
+/** All shipped kinds of scenarios through the real program. */
 
 import { mkdirSync } from "node:fs";
 import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
 import { drawn, launch, openPage } from "../browser";
+import { BINARY, Program, SCENARIOS as FOLDER } from "./program";
 
-const url = process.env.STUDIO_URL ?? "";
 /** Pictures for people to look at; MANY=1 for all widths and themes. */
 const LOOKS = process.env.MANY
   ? [[1280, false], [1280, true], [400, false], [400, true]] as const
@@ -17,18 +17,23 @@ const SCENARIOS = [
   ["airspace", "superconflict.toml"],
 ] as const;
 
-describe.skipIf(url === "")("a real server", () => {
+describe.skipIf(BINARY === "")("the real program", () => {
   let browser: Browser;
+  let program: Program;
   beforeAll(async () => {
+    program = await Program.start(FOLDER);
     mkdirSync("screenshots", { recursive: true });
     browser = await launch();
   });
-  afterAll(async () => browser.close());
+  afterAll(async () => {
+    await browser?.close();
+    await program?.stop();
+  });
 
   for (const [folder, name] of SCENARIOS) {
     for (const [width, isDark] of LOOKS) {
       test(`${folder}/${name} at ${width}${isDark ? ", dark" : ""} plays and is inspected`, async () => {
-        const { page, complaints } = await openPage(browser, url, { width, isDark });
+        const { page, complaints } = await openPage(browser, program.url, { width, isDark });
         await page.getByRole("button", { name: "Open…" }).click();
         await page.getByRole("button", { name: `${folder}/` }).click();
         await page.getByRole("button", { name }).first().click();

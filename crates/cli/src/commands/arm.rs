@@ -1,7 +1,7 @@
 //! Arms of robot models: the options that choose one and its posture, and both as text and JSON.
 
 use super::arm_picture::ArmPicture;
-use crate::console::aligned;
+use crate::console::{aligned, fixed};
 use clap::Args;
 use serde::Serialize;
 use sidestep::import::urdf::srdf::Semantics;
@@ -228,12 +228,16 @@ fn joint_words(joint: &JointPlaced) -> String {
         Some([lower, upper]) => format!("{lower:.4} to {upper:.4}"),
         None => "no limits".into(),
     };
-    format!("{:>9.4} {:<3}  ({limits})", joint.value, joint.unit)
+    format!("{:>9} {:<3}  ({limits})", fixed(joint.value, 4), joint.unit)
+}
+
+/// Formats numbers with six decimals in aligned columns.
+pub(crate) fn in_micros(numbers: &[f64]) -> String {
+    let columns = numbers.iter().map(|x| format!("{:>10}", fixed(*x, 6)));
+    columns.collect::<Vec<_>>().join(" ")
 }
 
 /// Formats a position in m in aligned columns.
 pub(crate) fn meters(p: &Vector) -> String {
-    // Adding zero turns the -0 of rounding into 0.
-    let rounded = p.map(|x| (x * 1e6).round() / 1e6 + 0.0);
-    format!("{:>10.6} {:>10.6} {:>10.6} m", rounded[0], rounded[1], rounded[2])
+    format!("{} m", in_micros(p))
 }

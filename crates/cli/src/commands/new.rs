@@ -45,9 +45,9 @@ pub(crate) fn new(args: &NewArgs, console: Console) -> Result<ExitCode, Failure>
     let default = || PathBuf::from(format!("{}.toml", kind.name()));
     let path = args.file.clone().unwrap_or_else(default);
     write_new(&path, kind.default_scenario())?;
-    let next = format!("Try: sidestep check {0}; sidestep run {0}\n", path.display());
+    let next = format!("Try:\n  sidestep check {0}\n  sidestep run {0}\n", path.display());
     let json = json!({ "file": path, "world": args.world });
-    console.result(&json, || format!("Wrote {}. {next}", path.display()));
+    console.result(&json, || format!("Wrote {}\n{next}", path.display()));
     Ok(ExitCode::Done)
 }
 

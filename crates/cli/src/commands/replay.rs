@@ -40,6 +40,10 @@ pub(crate) struct ReplayArgs {
     #[command(flatten)]
     workers: WorkersArg,
 
+    /// Print the state of every body, not of the first ones alone
+    #[arg(long, requires = "cycle")]
+    all: bool,
+
     /// Draw the state to this PNG file
     #[arg(long, value_name = "OUT")]
     png: Option<PathBuf>,
@@ -65,7 +69,7 @@ pub(crate) fn replay(args: &ReplayArgs, console: Console) -> Result<ExitCode, Fa
         replayed.draw(&recorded, png)?;
     }
     match args.cycle {
-        Some(_) => show_moment(&replayed, console),
+        Some(_) => show_moment(&replayed, args.all, console),
         None => show_end(&replayed, recorded.is_complete, console),
     }
     Ok(ExitCode::Done)
@@ -88,7 +92,24 @@ fn show_end(replayed: &Replayed, is_complete: bool, console: Console) {
     });
 }
 
-fn show_moment(replayed: &Replayed, console: Console) {
+/// Lines of a state that are printed unless all are asked for: a heading, and some bodies.
+const SHOWN: usize = 11;
+
+/// Returns the first lines of a state in words, and how to see the others.
+fn beginning(text: &str) -> String {
+    let lines: Vec<&str> = text.lines().collect();
+    match lines.len().saturating_sub(SHOWN) {
+        // A line that counts a single one takes the room of that one.
+        0 | 1 => text.into(),
+        more => format!(
+            "{}\n  and {} more rows: --all\n",
+            lines[..SHOWN].join("\n"),
+            grouped(more as u64)
+        ),
+    }
+}
+
+fn show_moment(replayed: &Replayed, shows_all: bool, console: Console) {
     let Replayed { run, compared_poses, .. } = replayed;
     let poses = run.poses();
     let digest = run.digest().to_string();
@@ -104,6 +125,19 @@ fn show_moment(replayed: &Replayed, console: Console) {
             0 => "no pose of this cycle is recorded".into(),
             n => format!("equal to the {} recorded poses", grouped(n as u64)),
         };
-        format!("Cycle {}: {compared}\n{}  digest {digest}\n", grouped(run.cycle()), poses.text)
+        let state = if shows_all { poses.text } else { beginning(&poses.text) };
+        format!("Cycle {}: {compared}\n{state}  digest {digest}\n", grouped(run.cycle()))
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_state_is_told_by_its_beginning_and_how_many_rows_follow() {
+        let text = |rows: usize| (0..rows).map(|k| format!("  row {k}\n")).collect::<String>();
+        assert_eq!(beginning(&text(12)), text(12));
+        assert_eq!(beginning(&text(93)), text(11) + "  and 82 more rows: --all\n");
+    }
 }

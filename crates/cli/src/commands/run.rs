@@ -7,11 +7,12 @@ use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::plan::{ScenarioArgs, WorkersArg};
 use crate::sweep::ManyArgs;
+use crate::viewers;
 use crate::worlds;
 use clap::{ArgGroup, Args};
 use sidestep::kernel::{Cycle, InputError};
 use sidestep::scenario::{Remark, Severity};
-use sidestep_session::{Journey, Keep};
+use sidestep_session::{Journey, Keep, ViewersAt};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -22,8 +23,8 @@ Examples:
   sidestep run office.toml --replicate 100 --vary regime=reliable,both
   sidestep run office.toml --json | jq .metrics.contacts
   sidestep run office.toml --mcap office.mcap    for Foxglove and other viewers
+  sidestep run office.toml --foxglove 127.0.0.1:8765    watch it there
   sidestep run tracks.csv              replay recorded traffic
-  sidestep run tracks.csv --set airspace.replay_until_s=600
 
 Without --out and --mcap nothing is written. The folder holds scenario.toml (complete), \
 summary.json, trajectories/ and events/ (Parquet), trajectories.svg and .png, and a checkpoint.";
@@ -52,6 +53,11 @@ pub(crate) struct RunArgs {
         value_parser = clap::value_parser!(u64).range(1..))]
     mcap_every: Cycle,
 
+    /// Show the run live to Foxglove and Lichtblick ("Open connection", Foxglove WebSocket), which may
+    /// pause it and set its speed; until they do it goes as fast as it can
+    #[arg(long, value_name = "ADDR", value_parser = clap::value_parser!(ViewersAt))]
+    foxglove: Option<ViewersAt>,
+
     /// Overwrite an earlier run in DIR, and FILE
     #[arg(long, requires = "written")]
     replace: bool,
@@ -67,6 +73,12 @@ pub(crate) struct RunArgs {
 /// When the scenario or the folder is wrong, or results cannot be stored.
 pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure> {
     if args.many.is_asked() {
+        if args.foxglove.is_some() {
+            let remedy = "leave it out, or run one of them alone";
+            return Err(
+                InputError::new("--foxglove", "many runs have no one picture", remedy).into()
+            );
+        }
         if args.mcap.is_some() || args.replace {
             let remedy = "record the runs with --record-runs, then `sidestep export DIR/runs/N`";
             let cause = "many runs have no one film, and a sweep is never replaced";
@@ -87,7 +99,20 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
         replace: args.replace,
     };
     interrupt::listen()?;
-    travel(Journey::start(compiled.as_ref(), &source, workers, keep, told)?, console)
+    // Before anything is written.
+    let viewers = args.foxglove.as_ref().map(ViewersAt::settled).transpose()?;
+    let mut journey = Journey::start(compiled.as_ref(), &source, workers, keep, told)?;
+    if let Some(at) = &viewers {
+        serve(&mut journey, at, console)?;
+    }
+    travel(journey, console)
+}
+
+/// Starts to show a run to viewers, and says where.
+fn serve(journey: &mut Journey, at: &ViewersAt, console: Console) -> Result<(), Failure> {
+    journey.show(at)?;
+    viewers::tell(at, console);
+    Ok(())
 }
 
 /// Prints the warnings that `sidestep check` gives, too: hardly anybody wants a run that they are about.

@@ -53,7 +53,7 @@ pub(crate) fn schema(args: &SchemaArgs, console: Console) -> Result<ExitCode, Fa
 fn told(file: &Path, schema: &Value) -> String {
     let title = schema["title"].as_str().unwrap_or_default();
     let file = file.display();
-    format!("Wrote {file}: {title}. Begin scenarios with the line\n  #:schema {file}\n")
+    format!("Wrote {file}: {title}\nBegin scenarios with the line\n  #:schema {file}\n")
 }
 
 fn write(file: &Path, text: &str) -> Result<(), InputError> {

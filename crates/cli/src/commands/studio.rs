@@ -4,10 +4,12 @@ use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::plan::WorkersArg;
+use crate::viewers;
 use crate::worlds;
 use clap::Args;
 use serde_json::json;
 use sidestep_server::{Options, Studio};
+use sidestep_session::ViewersAt;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -19,6 +21,7 @@ Examples:
   sidestep studio runs/office              replay a recorded run
   sidestep studio scenarios --port 8000 --no-open
   sidestep studio --addr 0.0.0.0           for others, who need its token
+  sidestep studio office.toml --foxglove 127.0.0.1:8765
 
 The page may read what lies below the folders that are named, the folders of the files that are \
 named, or else the current folder. It writes what you save there, and nothing else. Ctrl-C ends it.";
@@ -50,6 +53,11 @@ pub(crate) struct StudioArgs {
     #[arg(long)]
     read_only: bool,
 
+    /// Show the scenario or recording that was opened last to Foxglove and Lichtblick, too, which may
+    /// play, pause and seek
+    #[arg(long, value_name = "ADDR", value_parser = clap::value_parser!(ViewersAt))]
+    foxglove: Option<ViewersAt>,
+
     #[command(flatten)]
     workers: WorkersArg,
 }
@@ -60,6 +68,7 @@ pub(crate) struct StudioArgs {
 /// When something that is named is not there, or the port cannot be had.
 pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Failure> {
     interrupt::listen()?;
+    let foxglove = args.foxglove.as_ref().map(ViewersAt::settled).transpose()?;
     let studio = Studio::start(Options {
         worlds: worlds(),
         program: format!("sidestep {}", sidestep_session::build()),
@@ -68,7 +77,11 @@ pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Fa
         port: args.port,
         read_only: args.read_only,
         workers: args.workers.count(),
+        foxglove: foxglove.clone(),
     })?;
+    if let Some(at) = &foxglove {
+        viewers::tell(at, console);
+    }
     let url = studio.url();
     if studio.is_open_to_others() {
         console.warn(

@@ -149,6 +149,7 @@ fn a_bluesky_file_is_a_scenario_and_check_counts_its_commands() {
     let in_one_line = words.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(in_one_line.contains("X5 at EHAM RWY18L and 2 more"), "{words}");
     assert!(words.contains("unknown way-points") && !words.contains("X6"), "{words}");
+    assert!(in_one_line.contains("ARTIP (ADDWPT of A1, line 6, and 1 more)"), "{words}");
     for wrong in ["airspace.method=magic", "airspace.dt_s=-1.0", "airspce.dt_s=1.0"] {
         let ended = place.run(&["check", "two.scn", "--set", wrong]);
         assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{wrong}: {}", ended.err());

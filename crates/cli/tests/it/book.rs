@@ -5,6 +5,7 @@
 
 use crate::support::Place;
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -72,6 +73,26 @@ fn every_command_of_the_book_runs() {
     pages.sort();
     let commands: usize = pages.iter().map(|page| run_all(page)).sum();
     assert!(commands > 15, "the book shows how: {commands}");
+}
+
+/// Whoever goes on from the README to the book does so in one clone, where a folder can hold one run.
+#[test]
+fn no_two_pages_record_into_one_folder() {
+    let mut pages = vec![root().join("README.md")];
+    let book = std::fs::read_dir(root().join("docs/src")).expect("the book");
+    pages.extend(book.map(|page| page.expect("an entry").path()).filter(|page| page.is_file()));
+    let mut taken: BTreeMap<String, PathBuf> = BTreeMap::new();
+    for page in &pages {
+        for line in commands(&std::fs::read_to_string(page).expect("text")) {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let out =
+                words.iter().position(|word| *word == "--out").map(|k| words[k + 1].to_string());
+            let Some(out) = out.filter(|_| !words.contains(&"--replace")) else { continue };
+            let first = taken.entry(out.clone()).or_insert_with(|| page.clone());
+            assert_eq!(first, page, "{out} of {} is taken", page.display());
+        }
+    }
+    assert!(taken.len() > 8, "{taken:?}");
 }
 
 #[test]

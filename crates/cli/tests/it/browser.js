@@ -122,6 +122,8 @@
     const isCut = (place) => place.scrollWidth > place.clientWidth + 1;
     found.beyond = beyond(found.width);
     found.cut = all(".scrolled").filter(isCut).map((place) => place.getAttribute("aria-label"));
+    const isShort = (table) => table.tBodies[0].rows.length <= 60;
+    found.hidden = all("table[data-shown]").filter(isShort).map((table) => table.dataset.shown);
     found.offered = all(".more:not([hidden])").length;
     found.cards = all("table.cards").length;
     const more = all(".more:not([hidden])").find((button) => button.closest(".wide").offsetWidth > 0);

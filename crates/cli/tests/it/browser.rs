@@ -107,6 +107,7 @@ impl Browser {
 pub(crate) fn assert_sound(browser: &Browser, page: &Path) -> Value {
     let narrow = browser.probe(page, Some(400));
     assert_eq!(narrow["width"], 400, "the page is as narrow as asked");
+    assert_eq!(narrow["hidden"], Value::Array(Vec::new()), "columns that a phone does not show");
     let found = browser.probe(page, None);
     for found in [&narrow, &found] {
         assert_eq!(found["cut"], Value::Array(Vec::new()), "columns behind an edge");

@@ -115,6 +115,9 @@ const TABLE: &[(&str, &str, &str, &str)] = &[
     ("three dimensions", "dt_s = 0.1", "dimensions = 3", "chain.dimensions is 3"),
     ("records nothing", "[chain]", "[record]\nevery = 0\n[chain]", "every = 0"),
     ("two shapes", "radius_m = 0.5", "radius_m = 0.5\nsize_m = [1.0, 1.0]\nends_m = [[0.0, 0.0], [1.0, 1.0]]", "two"),
+    ("box of no size", "radius_m = 0.5", "size_m = [1.0, 0.0]", "a box of no size"),
+    ("joined whole", "[[chains.tasks]]", "[[chains.changes]]\nat_s = 1\nreform = true\n[[chains.tasks]]", "that is whole"),
+    ("joined too early", "[[chains.tasks]]", "[[chains.changes]]\nat_s = 1\nreform = true\n[[chains.changes]]\nat_s = 2\nscatter = [1, 1]\n[[chains.tasks]]", "that is whole"),
     ("velocity", "radius_m = 0.5", "radius_m = 0.5\nvelocity_m_s = [nan, 0.0]", "velocity_m_s"),
     ("mover out of its room", "radius_m = 0.5", "radius_m = 0.5\nvelocity_m_s = [1.0, 0.0]\nbounces_m = [[0, 0], [1, 1]]", "not in its room"),
     ("two grounds", "[chain]", "[ground]\nmap = \"m.yaml\"\ncorridor = { width_m = 1.0 }\n[chain]", "2 grounds"),
@@ -190,6 +193,35 @@ fn a_wrong_script_is_refused_where_it_is_wrong() {
     assert!(refused(&place, "no script", &[]).contains("needs one script"));
     place.write("c.toml", format!("{SCRIPTED}script_file = \"gone.txt\"\n"));
     assert!(refused(&place, "no file", &[]).contains("gone.txt"));
+}
+
+#[test]
+fn an_error_of_a_key_points_at_the_key_not_at_its_section() {
+    for (header, line) in [
+        ("[[chains.tasks]]", "connector = 9"),
+        ("[[chains.tasks]]", "turn_deg = 5.0"),
+        ("[[chains.limits]]", "connector = 9"),
+        ("[[chains.changes]]\nat_s = 1.0\nfailed = true", "connector = 9"),
+        ("[[chains.changes]]\nat_s = 1.0", "scatter = [0, 1]"),
+        ("[[chains.changes]]\nat_s = 1.0\nconnector = 1", "max_bend_deg = -3"),
+        ("[[chains]]", "count = 2"),
+        ("[[chains]]", "points_m = [[0.0, 0.0]]"),
+        ("[[chains]]", "anywhere = true"),
+        ("[[obstacles]]", "turn_deg = 5.0"),
+        ("[[obstacles]]", "size_m = [nan, 1.0]"),
+        ("[[obstacles]]", "corners_m = [[0.0, 0.0]]"),
+    ] {
+        let place = Place::new();
+        let with = format!("{header}\n{line}\n");
+        let text = match RIGHT.contains(header) {
+            true => RIGHT.replacen(&format!("{header}\n"), &with, 1),
+            false => RIGHT.replacen("[[chains.tasks]]", &format!("{with}[[chains.tasks]]"), 1),
+        };
+        place.write("c.toml", &text);
+        let number = text.lines().position(|l| l == line).expect(line) + 1;
+        let err = refused(&place, line, &[]);
+        assert!(err.contains(&format!("c.toml:{number}:")), "{line} is {number}: {err}");
+    }
 }
 
 /// All scripts are checked with the first one, not in the middle of a run.

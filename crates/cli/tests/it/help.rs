@@ -20,6 +20,49 @@ fn every_command_has_help_with_examples() {
     }
 }
 
+/// The first line that is wider than 80 columns.
+fn wide(text: &str) -> Option<&str> {
+    text.lines().find(|line| line.chars().count() > 80)
+}
+
+#[test]
+fn no_line_of_help_is_wider_than_80_columns_where_there_is_no_terminal() {
+    let place = Place::new();
+    let all = "run check new map learn exact fk ik resume replay export sweep compare report schema \
+               completions man reproduce studio";
+    for command in all.split_whitespace() {
+        let help = place.run(&[command, "--help"]).out();
+        assert_eq!(wide(&help), None, "{command}");
+    }
+    assert_eq!(wide(&place.run(&["--help"]).out()), None);
+    for words in [["learn", "sensor"], ["learn", "effector"], ["reproduce", "loria"]] {
+        assert_eq!(wide(&place.run(&[words[0], words[1], "--help"]).out()), None, "{words:?}");
+    }
+}
+
+#[test]
+fn warnings_verdicts_and_advice_fit_into_80_columns_and_nothing_has_the_sign_of_zero() {
+    let place = Place::new();
+    let arm = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/chain/arm.urdf");
+    place.write("arm.urdf", std::fs::read_to_string(arm).expect("the arm"));
+    let moves = "forward,1,0,0,no\n".repeat(9) + "forward,0,0,0,yes\nleft,0,0,89.9,no\n";
+    place.write("m.csv", format!("action,ahead_boxes,left_boxes,turn_deg,contact\n{moves}"));
+    for words in [
+        &["learn", "effector", "--csv", "m.csv"][..],
+        &["ik", "arm.urdf", "--target", "2,0,0"],
+        &["ik", "arm.urdf", "--target", "0.4,0.1,0.6", "--rpy", "3.1416,0,0", "--free", "rz"],
+        &["new", "airspace", "a-scenario-with-a-long-name.toml"],
+    ] {
+        let told = place.run(words).out();
+        assert_eq!(wide(&told), None, "{words:?}");
+        let is_odd = |word: &&str| match word.parse::<f64>() {
+            Ok(number) => (number == 0.0 && word.starts_with('-')) || word.contains("e-"),
+            Err(_) => false,
+        };
+        assert_eq!(told.split_whitespace().find(is_odd), None, "{told}");
+    }
+}
+
 #[test]
 fn the_help_names_the_exit_codes_and_the_version_is_told() {
     let place = Place::new();

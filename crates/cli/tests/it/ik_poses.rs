@@ -163,7 +163,7 @@ fn wrong_poses_are_answered_with_what_would_be_right() {
     }
     for (file, reason) in [
         ("both.csv", "both angles and quaternions"),
-        ("half.csv", "no column `pitch`"),
+        ("half.csv", "lacks `pitch`, `yaw`"),
         ("zero.csv", "zero.csv:2:7"),
         ("nan.csv", "nan.csv:2:5"),
         ("none.csv", "none.csv"),

@@ -145,7 +145,7 @@ impl Page {
     }
 
     /// Waits until a session has come to its end; returns its status.
-    fn over(&mut self, session: &Value) -> Value {
+    pub(crate) fn over(&mut self, session: &Value) -> Value {
         loop {
             if let Some(status) = self.last_over(session) {
                 return status;

@@ -115,6 +115,15 @@ pub(super) fn scene(frame: &Frame, dimensions: u8, shown: &mut BTreeSet<String>)
     SceneUpdate { deletions, entities }
 }
 
+/// Returns the deletion of whatever was shown before.
+pub(super) fn all_gone(now_ns: u64) -> Vec<SceneEntityDeletion> {
+    vec![SceneEntityDeletion {
+        timestamp: timestamp(now_ns),
+        r#type: scene_entity_deletion::Type::All as i32,
+        id: String::new(),
+    }]
+}
+
 /// Returns the entity that a body belongs to: all connectors of a chain are one, as its rods are.
 fn entity_name(body: &Body) -> String {
     format!("{}/{}", body.kind, body.number)

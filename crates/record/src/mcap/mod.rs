@@ -1,4 +1,5 @@
-//! Recordings for viewers: MCAP files with the schemas of Foxglove.
+//! Recordings for viewers, and frames for those that watch: MCAP files and a live server, with the schemas of
+//! Foxglove.
 //!
 //! | topic | schema | when |
 //! | --- | --- | --- |
@@ -16,13 +17,19 @@
 //! `log_time` is simulated time in nanoseconds. The scenario and its files are attachments; the
 //! metadata record `sidestep` describes the run and how it ended. While it is incomplete, the file
 //! is called `NAME.partial`. Equal runs give equal bytes.
+//!
+//! Whoever watches a run live gets the same topics: of each the last message at once, and then each frame that it
+//! keeps up with. As it may miss some, a live `/scene` deletes all bodies before it shows them.
 
 mod bag;
+mod live;
 mod messages;
 mod reader;
+mod topics;
 mod writer;
 
 pub use bag::{BagSchema, BagWriter};
+pub use live::{LiveFrames, LiveServer, Playback, Playing, Steering, live};
 pub use reader::{McapRun, is_mcap};
 pub use writer::{McapEnd, McapOrigin, McapRecorder};
 

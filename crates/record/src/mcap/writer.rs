@@ -1,6 +1,6 @@
 //! Frames written to a file.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
@@ -8,12 +8,12 @@ use std::path::{Path, PathBuf};
 use ::mcap::records::{MessageHeader, Metadata};
 use ::mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 use foxglove::Encode;
-use foxglove::messages::{FrameTransforms, Grid, LaserScan, Log, PosesInFrame, SceneUpdate};
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RecordError;
-use sidestep_kernel::view::{Frame, Kind, Scenery};
+use sidestep_kernel::view::{Frame, Scenery};
 
-use super::{METADATA, SCENARIO, messages};
+use super::topics::{Sink, Topics};
+use super::{METADATA, SCENARIO};
 use crate::disk;
 use crate::folder::Existing;
 use crate::format;
@@ -53,16 +53,18 @@ pub struct McapEnd {
 
 /// Writes frames to an MCAP file. If it is dropped before it is finished, it deletes the file.
 pub struct McapRecorder {
+    origin: McapOrigin,
+    topics: Topics,
+    output: Output,
+}
+
+/// The messages of the file.
+struct Output {
     path: PathBuf,
     /// `None` once the file is finished.
     writer: Option<Writer<BufWriter<File>>>,
-    origin: McapOrigin,
-    cycle_s: f64,
-    dimensions: u8,
     /// Channels by topic.
     channels: BTreeMap<String, u16>,
-    /// Bodies of the previous frame, by name.
-    shown: BTreeSet<String>,
     frames: u32,
     buffer: Vec<u8>,
 }
@@ -97,24 +99,21 @@ impl McapRecorder {
         let options = options(&origin.origin.program_version);
         let writer = options.create(BufWriter::new(file)).map_err(|e| failed(said(e)));
         let writer = writer.inspect_err(|_| drop(fs::remove_file(&growing)))?;
-        let mut recorder = Self {
+        let output = Output {
             path: path.to_path_buf(),
             writer: Some(writer),
-            origin,
-            cycle_s: scenery.cycle_s,
-            dimensions: scenery.dimensions,
             channels: BTreeMap::new(),
-            shown: BTreeSet::new(),
             frames: 0,
             buffer: Vec::new(),
         };
+        let mut recorder = Self { origin, topics: Topics::new(scenery), output };
         recorder.begin(scenery)?;
         Ok(recorder)
     }
 
     /// Returns the file's name once it is complete.
     pub fn path(&self) -> &Path {
-        &self.path
+        &self.output.path
     }
 
     fn begin(&mut self, scenery: &Scenery) -> Result<(), RecordError> {
@@ -124,10 +123,7 @@ impl McapRecorder {
         files
             .iter()
             .try_for_each(|(name, bytes)| self.attach(name, "application/octet-stream", bytes))?;
-        if let Some(floor) = &scenery.floor {
-            self.write::<Grid>("/map", 0, &messages::grid(floor))?;
-        }
-        self.write::<SceneUpdate>("/scenery", 0, &messages::scenery(scenery))
+        self.topics.scenery(scenery, &mut self.output)
     }
 
     fn attach(&mut self, name: &str, media_type: &str, data: &[u8]) -> Result<(), RecordError> {
@@ -138,7 +134,7 @@ impl McapRecorder {
             media_type: media_type.into(),
             data: data.into(),
         };
-        self.with(|writer| writer.attach(&attachment))
+        self.output.with(|writer| writer.attach(&attachment))
     }
 
     /// Appends a frame; frames must be in order of time.
@@ -146,23 +142,8 @@ impl McapRecorder {
     /// # Errors
     /// An I/O error; the recording is over then.
     pub fn frame(&mut self, frame: &Frame) -> Result<(), RecordError> {
-        for entry in messages::log(frame, self.cycle_s) {
-            self.write::<Log>("/log", messages::nanoseconds(&entry), &entry)?;
-        }
-        let now_ns = messages::to_ns(frame.time_s);
-        let scene = messages::scene(frame, self.dimensions, &mut self.shown);
-        self.write::<SceneUpdate>("/scene", now_ns, &scene)?;
-        self.write::<FrameTransforms>("/tf", now_ns, &messages::transforms(frame))?;
-        for kind in [Kind::Robot, Kind::Connector, Kind::Airplane] {
-            if let Some(poses) = messages::poses(frame, kind) {
-                self.write::<PosesInFrame>(&format!("/poses/{kind}"), now_ns, &poses)?;
-            }
-        }
-        for scan in &frame.scans {
-            let topic = format!("/scan/{}", scan.name());
-            self.write::<LaserScan>(&topic, now_ns, &messages::laser_scan(scan, now_ns))?;
-        }
-        self.frames += 1;
+        self.topics.frame(frame, &mut self.output)?;
+        self.output.frames += 1;
         Ok(())
     }
 
@@ -171,7 +152,7 @@ impl McapRecorder {
     /// # Errors
     /// An I/O error.
     pub fn finish(self, end: &McapEnd) -> Result<PathBuf, RecordError> {
-        let path = self.path.clone();
+        let path = self.path().to_path_buf();
         disk::rename(&self.stop(end)?, &path)?;
         Ok(path)
     }
@@ -183,14 +164,14 @@ impl McapRecorder {
     /// An I/O error.
     pub fn stop(mut self, end: &McapEnd) -> Result<PathBuf, RecordError> {
         let metadata = Metadata { name: METADATA.into(), metadata: self.metadata(end) };
-        self.with(|writer| writer.write_metadata(&metadata))?;
-        self.with(|writer| writer.finish().map(drop))?;
-        let growing = disk::partial(&self.path);
-        let Some(writer) = self.writer.take() else { return Ok(growing) };
+        self.output.with(|writer| writer.write_metadata(&metadata))?;
+        self.output.with(|writer| writer.finish().map(drop))?;
+        let growing = disk::partial(self.path());
+        let Some(writer) = self.output.writer.take() else { return Ok(growing) };
         let ended = writer.into_inner().into_inner().map_err(|e| e.into_error());
         ended.and_then(|file| file.sync_all()).map_err(|e| {
             let _ = fs::remove_file(&growing);
-            RecordError::new(self.path.display(), e)
+            RecordError::new(self.path().display(), e)
         })?;
         Ok(growing)
     }
@@ -209,15 +190,17 @@ impl McapRecorder {
             ("seed", origin.seed.to_string()),
             ("cycles_planned", cycles_planned.to_string()),
             ("cycles_done", end.cycles_done.to_string()),
-            ("cycle_s", self.cycle_s.to_string()),
+            ("cycle_s", self.topics.cycle_s.to_string()),
             ("every", every.to_string()),
-            ("frames", self.frames.to_string()),
+            ("frames", self.output.frames.to_string()),
             ("status", status.into()),
             ("digest", end.digest.clone()),
         ];
         pairs.into_iter().map(|(key, value)| (key.to_string(), value)).collect()
     }
+}
 
+impl Sink for Output {
     /// Appends a message, and creates a channel for a new topic.
     fn write<T: Encode>(
         &mut self,
@@ -238,7 +221,9 @@ impl McapRecorder {
         self.buffer = bytes;
         written
     }
+}
 
+impl Output {
     fn open_channel<T: Encode>(&mut self, topic: &str) -> Result<u16, RecordError> {
         let schema = T::get_schema();
         let id = self.with(|writer| {
@@ -264,10 +249,10 @@ impl McapRecorder {
 
 impl Drop for McapRecorder {
     fn drop(&mut self) {
-        if let Some(writer) = self.writer.take() {
+        if let Some(writer) = self.output.writer.take() {
             drop(writer.into_inner());
             // An incomplete file, or one that a full disk refused, must not keep its space.
-            let _ = fs::remove_file(disk::partial(&self.path));
+            let _ = fs::remove_file(disk::partial(&self.output.path));
         }
     }
 }

@@ -10,10 +10,12 @@ mod pace;
 mod player;
 mod save;
 mod scout;
+mod showing;
 mod stage;
 mod viewer;
 
 pub(crate) use edit::{edited, model};
+pub(crate) use showing::Showcase;
 pub(crate) use stage::{Means, checked, stopped};
 
 use crate::outbox::Outbox;
@@ -137,7 +139,7 @@ impl Desk {
         let opened = self.guarded(|| {
             let stage = Stage::open(means, &what, seed)?.shown_by(shown);
             let (outbox, interrupt) = (self.outbox.clone(), self.interrupt.clone());
-            Ok(Player::new(session, outbox, interrupt, stage))
+            Player::new(session, outbox, interrupt, stage)
         });
         let mut player = match opened {
             Ok(Ok(player)) => player,

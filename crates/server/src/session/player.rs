@@ -1,9 +1,12 @@
 //! A run that is played: what it does next, and what it answers.
 
+mod viewers;
+
 use super::inspect::inspection;
 use super::memory::Memory;
-use super::pace::{Beat, Pace, Rate};
+use super::pace::{Pace, Rate};
 use super::scout::Scout;
+use super::showing::Showing;
 use super::stage::Stage;
 use super::viewer::{MOST_SCANNING, Viewer};
 use crate::SPEEDS;
@@ -14,6 +17,7 @@ use crate::protocol::{
 };
 use sidestep::kernel::view::Scenery;
 use sidestep::kernel::{Cycle, Interrupt};
+use sidestep_session::Beat;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -23,9 +27,11 @@ const MOST_EVENTS: u32 = 5000;
 /// A way to a cycle that a page waits for.
 #[derive(Debug, Clone, Copy)]
 struct Errand {
-    /// The request that is answered on arrival.
-    id: u32,
+    /// The request that is answered on arrival; none of a viewer's.
+    id: Option<u32>,
     target: Cycle,
+    /// The speed at which the run goes on from there.
+    then: Option<Speed>,
 }
 
 /// A run that is played.
@@ -36,6 +42,7 @@ pub(super) struct Player {
     pub(super) stage: Stage,
     scenery: Scenery,
     viewer: Viewer,
+    showing: Showing,
     memory: Memory,
     scout: Option<Scout>,
     state: State,
@@ -58,11 +65,12 @@ impl Player {
         outbox: Arc<Outbox>,
         interrupt: Interrupt,
         stage: Stage,
-    ) -> Self {
+    ) -> Result<Self, Problem> {
         let scenery = stage.run.scenery();
         let mut player = Self {
             session,
             viewer: Viewer::new(session, outbox.clone(), &scenery),
+            showing: Showing::new(stage.showcase(), session),
             outbox,
             interrupt,
             memory: Memory::of(stage.run.as_ref(), stage.meanings(), stage.budget()),
@@ -80,19 +88,24 @@ impl Player {
             scenery,
         };
         player.begin();
-        player
+        player.show_anew()?;
+        Ok(player)
     }
 
     /// Makes a run ready that is at its start.
     fn begin(&mut self) {
         self.stage.run.heed(self.interrupt.clone());
         self.stage.run.watch();
+        if self.showing.is_possible() {
+            self.memory.log.keep_for_viewers();
+        }
         self.scout =
             self.stage.again().map(|run| Scout::new(run, self.stage.until, self.interrupt.clone()));
         self.stand();
     }
 
     fn restart(&mut self, seed: Option<u64>, text: Option<String>) -> Result<Answer, Problem> {
+        let is_other = text.is_some();
         self.stage.restart(seed, text)?;
         self.scenery = self.stage.run.scenery();
         self.viewer.restart(&self.scenery);
@@ -100,6 +113,10 @@ impl Player {
             Memory::of(self.stage.run.as_ref(), self.stage.meanings(), self.stage.budget());
         (self.digest, self.pace, self.rate) = (None, Pace::default(), Rate::default());
         self.begin();
+        // The same scenario only goes back to its start.
+        if is_other {
+            self.show_anew()?;
+        }
         Ok(self.opened())
     }
 
@@ -142,11 +159,11 @@ impl Player {
                 Ok(Answer::Done)
             }
             Call::Step { cycles, .. } => {
-                self.go(id, self.cycle().saturating_add(u64::from(cycles)));
+                self.go(Some(id), self.cycle().saturating_add(u64::from(cycles)), None);
                 return None;
             }
             Call::Seek { cycle, .. } => {
-                self.go(id, cycle);
+                self.go(Some(id), cycle, None);
                 return None;
             }
             Call::Restart { seed, text, .. } => {
@@ -203,7 +220,12 @@ impl Player {
         }
         self.give_up("the run was played");
         self.speed = speed;
-        self.beat = Beat::new(speed, self.scenery.cycle_s, Instant::now(), self.cycle());
+        self.beat = match speed {
+            Speed::Fastest => None,
+            Speed::Times(times) => {
+                Some(Beat::new(times / self.scenery.cycle_s, Instant::now(), self.cycle()))
+            }
+        };
         match self.is_at_end() {
             true => self.stand(),
             false => self.state = State::Playing,
@@ -228,17 +250,17 @@ impl Player {
 
     /// Answers the request of a way that is not gone to its end.
     pub(super) fn give_up(&mut self, cause: &str) {
-        if let Some(Errand { id, target }) = self.errand.take() {
+        if let Some(Errand { id: Some(id), target, .. }) = self.errand.take() {
             let place = format!("cycle {target}");
             self.reply(id, Err(Problem::new(place, cause, "ask again to go there")));
         }
     }
 
     /// Sets out to a cycle, from the nearest place that is known.
-    fn go(&mut self, id: u32, cycle: Cycle) {
+    fn go(&mut self, id: Option<u32>, cycle: Cycle, then: Option<Speed>) {
         self.give_up("another way was asked for");
         let target = cycle.min(self.stage.until);
-        (self.state, self.errand) = (State::Seeking, Some(Errand { id, target }));
+        (self.state, self.errand) = (State::Seeking, Some(Errand { id, target, then }));
         let here = self.cycle();
         let Some((at, checkpoint)) = self.memory.keyframes.before(target) else { return };
         if target < here || at > here {
@@ -271,11 +293,13 @@ impl Player {
         self.viewer.attend(self.stage.run.as_mut(), &mut self.memory.log, now);
         let status = self.status(now);
         self.viewer.tell(status.clone(), now);
+        self.attend_viewers(now);
         let is_free = self.work_due(now).is_none_or(|due| due > now);
         if is_free && self.scout() {
             return Some(Duration::ZERO);
         }
-        let due = [self.work_due(now), self.viewer.frame_due(), self.status_due(&status)];
+        let status_due = self.status_due(&status);
+        let due = [self.work_due(now), self.viewer.frame_due(), status_due, self.showing.due()];
         let next = due.into_iter().flatten().min()?;
         Some(next.saturating_duration_since(Instant::now()))
     }
@@ -299,8 +323,12 @@ impl Player {
         if is_on_the_way && (is_there || self.is_at_end()) {
             let errand = self.errand;
             self.stand();
-            if let Some(Errand { id, .. }) = errand {
+            if let Some(id) = errand.and_then(|errand| errand.id) {
                 self.reply(id, Ok(Answer::Done));
+            }
+            if let Some(speed) = errand.and_then(|errand| errand.then) {
+                // Speeds of viewers are in bounds.
+                let _ = self.play(speed);
             }
         }
     }
@@ -334,10 +362,11 @@ impl Player {
     fn status(&mut self, now: Instant) -> Status {
         let cycle = self.cycle();
         let is_still = matches!(self.state, State::Paused | State::Over);
-        let digest = self.digest.as_ref().filter(|(of, _)| is_still && *of == cycle);
+        let has_digest = is_still && self.stage.is_computed();
+        let digest = self.digest.as_ref().filter(|(of, _)| has_digest && *of == cycle);
         let banner = self.stage.recorded.as_ref().map(|_| {
-            let later = "Computed again; the digest is compared at the end.";
-            self.verdict.clone().unwrap_or_else(|| later.into())
+            let later = || "Computed again; the digest is compared at the end.".into();
+            self.verdict.clone().unwrap_or_else(later)
         });
         Status {
             session: self.session,
@@ -355,7 +384,7 @@ impl Player {
 
     /// Tells that the session ends here; the run is not touched any more.
     pub(super) fn fail(&mut self, problem: Problem) {
-        let errand = self.errand.map(|errand| errand.id);
+        let errand = self.errand.and_then(|errand| errand.id);
         self.give_up("the session has ended");
         // Whoever asked for what met the bug waits for an answer, too.
         if let Some(id) = self.taken.take().filter(|id| Some(*id) != errand) {

@@ -1,6 +1,7 @@
 //! The run of a session, and its origin.
 
 use super::save::{OwnFile, Shown, own_path, saved};
+use super::showing::Showcase;
 use crate::encode::problem;
 use crate::files::Files;
 use crate::keyframes::Budget;
@@ -24,6 +25,8 @@ pub(crate) struct Means {
     pub(crate) read_only: bool,
     /// The memory that the keyframes of all sessions share.
     pub(crate) budget: Arc<Budget>,
+    /// The place for viewers beside the page, if they are served.
+    pub(crate) showcase: Option<Arc<Showcase>>,
 }
 
 /// A run, and where it comes from.
@@ -98,7 +101,7 @@ impl Stage {
         let path = means.files.find(path)?;
         let recorded = Recorded::open(means.worlds, &path).map_err(|e| stopped(&e))?;
         let resolved = recorded.resolved().map_err(|e| problem(&e))?;
-        let run = recorded.start(means.workers).map_err(|e| problem(&e))?;
+        let run = recorded.shown(means.workers).map_err(|e| problem(&e))?;
         let until = recorded.cycles_done;
         let source =
             Source::new(path.join("scenario.toml").display().to_string(), resolved.text, path);
@@ -119,7 +122,7 @@ impl Stage {
             if seed.is_some() || text.is_some() {
                 return Err(fixed(&self.source.place));
             }
-            self.run = recorded.start(self.means.workers).map_err(|e| problem(&e))?;
+            self.run = recorded.shown(self.means.workers).map_err(|e| problem(&e))?;
             return Ok(());
         }
         let (source, seed) = match text {
@@ -174,12 +177,18 @@ impl Stage {
     /// Returns the same run at its start once more, of a recording.
     pub(crate) fn again(&self) -> Option<Box<dyn Simulation>> {
         // It could be started before: where it cannot now, nothing is known ahead.
-        self.recorded.as_ref()?.start(self.means.workers).ok()
+        self.recorded.as_ref()?.shown(self.means.workers).ok()
     }
 
     /// Returns what comes of comparing the end of a recorded run with what is recorded; `None` before.
     pub(crate) fn verdict(&self, run: &dyn Simulation) -> Option<String> {
         let recorded = self.recorded.as_ref()?;
+        if let Some(maker) = recorded.other_maker() {
+            return Some(format!(
+                "Recorded by sidestep {maker}, which is not this one: shown from its own tables, not computed again, \
+                 without inspection."
+            ));
+        }
         let (done, of) = (run.cycle(), recorded.cycles_done);
         if run.is_over() && done < of {
             let words = format!("it is over after {done} cycles, recorded are {of}");
@@ -195,9 +204,19 @@ impl Stage {
         })
     }
 
+    /// Whether its states are computed, so that they have digests.
+    pub(crate) fn is_computed(&self) -> bool {
+        self.recorded.as_ref().is_none_or(|recorded| recorded.other_maker().is_none())
+    }
+
     /// Returns the memory that keyframes of all sessions share.
     pub(crate) fn budget(&self) -> &Arc<Budget> {
         &self.means.budget
+    }
+
+    /// Returns the place for viewers beside the page.
+    pub(crate) fn showcase(&self) -> Option<Arc<Showcase>> {
+        self.means.showcase.clone()
     }
 
     /// Returns the metrics of its world in words.

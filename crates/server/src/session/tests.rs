@@ -9,6 +9,8 @@ use serde_json::{Value, json};
 use sidestep::worlds::WORLDS;
 use std::time::Instant;
 
+mod recordings;
+
 const ROBOTS: &str = "format = 1\nworld = \"robots\"\nseed = 5\ncycles = 600\n[map]\nbox_size_m = 0.25\nascii = \"\"\"\n\
     ..............\n..............\n....##........\n....##........\n..............\n..............\n\"\"\"\n\
     [robots]\ncount = 6\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n[people]\ncount = 2\n";
@@ -32,7 +34,7 @@ struct Page {
 fn means(folder: &std::path::Path, workers: usize) -> Means {
     let files = Files::below(&[folder.to_path_buf()]).expect("a folder");
     let budget = Arc::new(Budget::new(1 << 28, 1 << 28));
-    Means { worlds: WORLDS, files, workers, read_only: false, budget }
+    Means { worlds: WORLDS, files, workers, read_only: false, budget, showcase: None }
 }
 
 impl Page {
@@ -341,45 +343,6 @@ fn a_session_that_is_dropped_ends_within_its_cycle_and_answers_all_requests() {
         assert!(started.elapsed() < Duration::from_secs(20), "it did not end");
         std::thread::sleep(Duration::from_millis(1));
     }
-}
-
-#[test]
-fn a_recorded_run_is_computed_again_and_its_digest_confirmed() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let (run, source) = (folder.path().join("r"), Source::new("s.toml", ROBOTS, ""));
-    let compiled = WORLDS.compile(&source).expect("valid");
-    let keep = sidestep_session::Keep { folder: Some(&run), ..Default::default() };
-    let journey = sidestep_session::Journey::start(compiled.as_ref(), &source, 1, keep, None);
-    journey.expect("started").travel(&sidestep_session::Unwatched).expect("recorded");
-    let what = Subject::Recording { path: run.display().to_string() };
-    let (mut page, opened) = Page::of(means(folder.path(), 2), what, folder);
-    assert_eq!(opened["answer"]["scene"]["is_recording"], true);
-    let banner = |status: &Value| status["banner"].as_str().expect("text").to_string();
-    assert!(banner(&opened["answer"]["status"]).contains("at the end"));
-    // Without being played, it is computed ahead: all events are known, and the digest is confirmed.
-    page.until("the verdict", |page| {
-        let told = page
-            .notices
-            .iter()
-            .any(|n| n["notice"] == "status" && banner(n).contains("the recorded one"));
-        told.then_some(())
-    });
-    let events =
-        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 601, "most": 9999 }));
-    assert_eq!(events["known_until"], 600.0);
-    let (mut plain_page, _) = Page::open(ROBOTS, 1);
-    plain_page.digest_at(600);
-    assert_eq!(
-        plain_page
-            .ask(json!({ "do": "events", "session": 1, "from": 0, "until": 601, "most": 9999 })),
-        events
-    );
-    assert_eq!(page.digest_at(600), plain(ROBOTS, 600));
-    assert!(banner(&page.state("over")).contains("the recorded one"));
-    let id = page.send(json!({ "do": "restart", "session": 1, "seed": 3, "text": null }));
-    assert!(page.wait(id).get("problem").is_some());
-    page.ask(json!({ "do": "restart", "session": 1, "seed": null, "text": null }));
-    assert_eq!(page.digest_at(100), plain(ROBOTS, 100));
 }
 
 #[test]

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 /// Scans of more bodies than this are left out: each has its own topic, and reading sensors for a
 /// scan costs as much as simulating.
-pub(super) const LOOK: Look = Look::first(64);
+pub(crate) const LOOK: Look = Look::first(64);
 
 /// The reason why a recording ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

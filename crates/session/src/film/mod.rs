@@ -7,6 +7,7 @@ mod pictures;
 
 pub(crate) use bag::BagFilm;
 pub(crate) use gif::write_gif;
+pub(crate) use mcap::LOOK;
 pub use mcap::{Ending, McapFilm};
 pub(crate) use pictures::Pictures;
 

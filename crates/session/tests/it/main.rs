@@ -2,6 +2,7 @@
 
 mod builds;
 mod exports;
+mod orders;
 mod pond;
 mod runs;
 mod support;

@@ -1,7 +1,7 @@
 //! An answer of `sidestep ik` as text and JSON.
 
-use super::super::arm::{Arm, Placed, meters};
-use crate::console::aligned;
+use super::super::arm::{Arm, Placed, in_micros, meters};
+use crate::console::{LINE_COLS, aligned, wrapped};
 use serde::Serialize;
 use sidestep::worlds::chain::kinematics::{ArmAnswer, ArmGoal, Posture, Turn, Vector};
 
@@ -79,16 +79,20 @@ impl Found {
         let verdict = match &self.reason {
             None => "The target is reached.".to_owned(),
             Some(reason) => {
-                format!("The target is not reached: {reason}.\nThe nearest posture found is shown.")
+                let words = format!("The target is not reached: {reason}.");
+                format!(
+                    "{}\nThe nearest posture found is shown.",
+                    wrapped(&words, LINE_COLS).join("\n")
+                )
             }
         };
         let mut rows = vec![
             ("target".to_owned(), meters(&self.target)),
-            ("error".to_owned(), format!("{:>10.3e} m", self.error_m)),
+            ("error".to_owned(), format!("{} m", in_micros(&[self.error_m]))),
         ];
         if let (Some(quaternion), Some(error_rad)) = (self.target_quaternion, self.error_rad) {
-            rows.insert(1, ("quaternion".to_owned(), plain(&quaternion)));
-            rows.push(("turned off".to_owned(), format!("{error_rad:>10.3e} rad")));
+            rows.insert(1, ("quaternion".to_owned(), in_micros(&quaternion)));
+            rows.push(("turned off".to_owned(), format!("{} rad", in_micros(&[error_rad]))));
         }
         format!("{}{}{}{verdict}\n", self.placed.text(), aligned(&rows), self.list())
     }
@@ -99,7 +103,7 @@ impl Found {
             return String::new();
         }
         let rows = self.solutions.iter().enumerate();
-        let rows = rows.map(|(i, s)| (format!("posture {}", i + 1), plain(&s.joints)));
+        let rows = rows.map(|(i, s)| (format!("posture {}", i + 1), in_micros(&s.joints)));
         let found = self.solutions.len();
         let missing = if found < self.wanted {
             format!("Found {found} of {} postures; more --restarts may find more.\n", self.wanted)
@@ -108,11 +112,4 @@ impl Found {
         };
         format!("Joint values\n{}{missing}", aligned(&rows.collect::<Vec<_>>()))
     }
-}
-
-/// Formats numbers in aligned columns.
-fn plain(numbers: &[f64]) -> String {
-    // Adding zero turns the -0 of rounding into 0.
-    let rounded = numbers.iter().map(|x| (x * 1e6).round() / 1e6 + 0.0);
-    rounded.map(|x| format!("{x:>10.6}")).collect::<Vec<_>>().join(" ")
 }

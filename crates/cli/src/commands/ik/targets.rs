@@ -11,10 +11,10 @@ use sidestep::kernel::InputError;
 use sidestep::worlds::chain::kinematics::ArmAnswer;
 use std::path::Path;
 
-/// Names of the columns of positions and orientations.
+/// Names of the columns of positions, without and with orientations.
 const POSITION: [&str; 3] = ["x", "y", "z"];
-const RPY: [&str; 3] = ["roll", "pitch", "yaw"];
-const QUATERNION: [&str; 4] = ["qx", "qy", "qz", "qw"];
+const WITH_RPY: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
+const WITH_QUATERNION: [&str; 7] = ["x", "y", "z", "qx", "qy", "qz", "qw"];
 /// The largest number in a table: a place in m, or an angle in rad.
 const MOST: f64 = 1e7;
 
@@ -126,37 +126,42 @@ impl Answers {
 /// Reads the targets.
 fn read(path: &Path) -> Result<Vec<Target>, InputError> {
     let table = CsvTable::read(path)?;
-    let position = columns(&table, POSITION)?;
-    let has = |name| table.find(name).is_some();
-    let (turned, of_quaternion) = (RPY.into_iter().any(has), QUATERNION.into_iter().any(has));
+    let turns = |names: &[&str]| names[POSITION.len()..].iter().any(|n| table.find(n).is_some());
+    let (turned, of_quaternion) = (turns(&WITH_RPY), turns(&WITH_QUATERNION));
     if turned && of_quaternion {
         let cause = "the header has both angles and quaternions";
         let remedy = "keep roll,pitch,yaw or qx,qy,qz,qw";
         return Err(InputError::new(table.place(), cause, remedy).at(1, 1));
     }
-    let rpy = turned.then(|| columns(&table, RPY)).transpose()?;
-    let quaternion = of_quaternion.then(|| columns(&table, QUATERNION)).transpose()?;
-    let target = |row: CsvRow| {
-        let position_m = values(&table, row, position)?;
-        match (rpy, quaternion) {
-            (Some(rpy), _) => Ok(Target::rpy(position_m, values(&table, row, rpy)?)),
-            (None, Some(columns)) => {
-                let place = row.field(columns[0]);
-                Target::quaternion(table.place(), position_m, values(&table, row, columns)?)
-                    .map_err(|error| error.at(place.line, place.column))
-            }
-            (None, None) => Ok(Target::position(position_m)),
-        }
+    if turned {
+        with_rpy(&table)
+    } else if of_quaternion {
+        with_quaternion(&table)
+    } else {
+        let position = table.columns(POSITION)?;
+        let target = |row| Ok(Target::position(values(&table, row, position)?));
+        table.rows().map(target).collect()
+    }
+}
+
+fn with_rpy(table: &CsvTable) -> Result<Vec<Target>, InputError> {
+    let [x, y, z, roll, pitch, yaw] = table.columns(WITH_RPY)?;
+    let target = |row| {
+        let position_m = values(table, row, [x, y, z])?;
+        Ok(Target::rpy(position_m, values(table, row, [roll, pitch, yaw])?))
     };
     table.rows().map(target).collect()
 }
 
-fn columns<const N: usize>(table: &CsvTable, names: [&str; N]) -> Result<[usize; N], InputError> {
-    let mut found = [0; N];
-    for (index, name) in found.iter_mut().zip(names) {
-        *index = table.column(name)?;
-    }
-    Ok(found)
+fn with_quaternion(table: &CsvTable) -> Result<Vec<Target>, InputError> {
+    let [x, y, z, quaternion @ ..] = table.columns(WITH_QUATERNION)?;
+    let target = |row: CsvRow| {
+        let place = row.field(quaternion[0]);
+        let position_m = values(table, row, [x, y, z])?;
+        Target::quaternion(table.place(), position_m, values(table, row, quaternion)?)
+            .map_err(|error| error.at(place.line, place.column))
+    };
+    table.rows().map(target).collect()
 }
 
 fn values<const N: usize>(

@@ -1,0 +1,254 @@
+//! Frames for viewers that watch while a run goes on.
+//!
+//! The server is the library's, with the library's threads: what a viewer does or leaves undone happens there. It keeps
+//! some messages for each viewer and drops the oldest, so that frames are passed on without waiting.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use foxglove::websocket::{
+    Capability, ChannelView, Client, PlaybackCommand, PlaybackControlRequest, PlaybackState,
+    PlaybackStatus, ServerListener,
+};
+use foxglove::{
+    ChannelBuilder, Context, Encode, FoxgloveError, PartialMetadata, RawChannel, WebSocketServer,
+    WebSocketServerHandle,
+};
+use sidestep_kernel::ports::RecordError;
+use sidestep_kernel::view::{Frame, Scenery};
+
+use super::messages::to_ns;
+use super::topics::{Sink, Topics};
+
+/// Bytes that wait for a viewer before the oldest ones are dropped, about.
+const WAITING_BYTES: usize = 64 << 20;
+/// Messages that wait at least: as many as there can be topics at once.
+const FEWEST_WAITING: usize = 128;
+const MOST_WAITING: usize = 1024;
+
+/// The wish of a viewer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Steering {
+    /// Whether the run is to go on.
+    pub play: bool,
+    /// Simulated seconds per second; any number at all, for it comes from outside.
+    pub speed: f64,
+    /// The time to go to.
+    pub seek_s: Option<f64>,
+}
+
+/// The state of the run, as viewers are told.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Playback {
+    /// Whether it goes on.
+    pub playing: Playing,
+    /// Simulated seconds.
+    pub time_s: f64,
+    /// Simulated seconds per second.
+    pub speed: f64,
+    /// Whether the time has jumped.
+    pub did_seek: bool,
+}
+
+/// Whether a run goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Playing {
+    /// It goes on.
+    Playing,
+    /// It stands still.
+    Paused,
+    /// It is at its end.
+    Ended,
+}
+
+/// The server of viewers. It ends when this is dropped.
+pub struct LiveServer {
+    /// `None` once it has ended.
+    handle: Option<WebSocketServerHandle>,
+    _context: Arc<Context>,
+}
+
+/// The frames of a server, in a form that viewers understand.
+pub struct LiveFrames {
+    topics: Topics,
+    output: Output,
+}
+
+/// Starts a server for a run at `host` and `port` (0 for any free one), with a first frame, and up to `end_s` of
+/// simulated time. Viewers' wishes are handed to `steer`, in threads of the server, which must not wait there.
+///
+/// # Errors
+/// When the address cannot be had.
+pub fn live(
+    host: &str,
+    port: u16,
+    scenery: &Scenery,
+    (first, end_s): (&Frame, f64),
+    steer: impl Fn(Steering) -> Playback + Send + Sync + 'static,
+) -> io::Result<(LiveServer, LiveFrames)> {
+    let context = Context::new();
+    let desk = Arc::new(Desk { latest: Mutex::default(), steer: Box::new(steer) });
+    let output = Output { context: context.clone(), desk: desk.clone(), channels: BTreeMap::new() };
+    let mut frames = LiveFrames { topics: Topics::new(scenery), output };
+    let told = frames.topics.scenery(scenery, &mut frames.output);
+    told.and_then(|()| frames.frame(first)).map_err(io::Error::other)?;
+    let server = WebSocketServer::new()
+        .context(&context)
+        .name(format!("sidestep: {}", scenery.name))
+        .bind(host, port)
+        .capabilities([Capability::PlaybackControl, Capability::Time])
+        .playback_time_range(0, to_ns(end_s))
+        .message_backlog_size(desk.waiting())
+        .listener(desk)
+        .start_blocking();
+    let handle = server.map_err(|error| match error {
+        FoxgloveError::Bind(error) => error,
+        other => io::Error::other(other),
+    })?;
+    Ok((LiveServer { handle: Some(handle), _context: context }, frames))
+}
+
+impl LiveServer {
+    /// Returns the port at which it listens.
+    pub fn port(&self) -> u16 {
+        self.handle.as_ref().map_or(0, WebSocketServerHandle::port)
+    }
+
+    /// Whether somebody watches.
+    pub fn is_watched(&self) -> bool {
+        self.handle.as_ref().is_some_and(|handle| handle.client_count() > 0)
+    }
+
+    /// Tells all viewers what the run does.
+    pub fn tell(&self, playback: Playback) {
+        if let Some(handle) = &self.handle {
+            handle.broadcast_time(to_ns(playback.time_s));
+            handle.broadcast_playback_state(state(playback));
+        }
+    }
+}
+
+impl Drop for LiveServer {
+    fn drop(&mut self) {
+        if let Some(handle) = self.handle.take() {
+            // Nobody waits for viewers that do not read: connections end with this.
+            drop(handle.stop());
+        }
+    }
+}
+
+impl LiveFrames {
+    /// Passes a frame on to those who watch.
+    ///
+    /// # Errors
+    /// When it cannot be encoded.
+    pub fn frame(&mut self, frame: &Frame) -> Result<(), RecordError> {
+        self.topics.frame(frame, &mut self.output)
+    }
+}
+
+struct Output {
+    context: Arc<Context>,
+    desk: Arc<Desk>,
+    /// Channels by topic.
+    channels: BTreeMap<String, Arc<RawChannel>>,
+}
+
+impl Output {
+    fn channel<T: Encode>(&mut self, topic: &str) -> Result<Arc<RawChannel>, RecordError> {
+        if let Some(channel) = self.channels.get(topic) {
+            return Ok(channel.clone());
+        }
+        let builder = ChannelBuilder::new(topic).context(&self.context);
+        let builder = builder.schema(T::get_schema()).message_encoding(T::get_message_encoding());
+        let channel = builder.build_raw().map_err(|e| RecordError::new(topic, e))?;
+        self.channels.insert(topic.into(), channel.clone());
+        Ok(channel)
+    }
+}
+
+impl Sink for Output {
+    fn write<T: Encode>(
+        &mut self,
+        topic: &str,
+        log_time: u64,
+        message: &T,
+    ) -> Result<(), RecordError> {
+        let channel = self.channel::<T>(topic)?;
+        let mut bytes = Vec::with_capacity(message.encoded_len().unwrap_or(0));
+        message.encode(&mut bytes).map_err(|e| RecordError::new(topic, e))?;
+        channel.log_with_meta(&bytes, PartialMetadata::with_log_time(log_time));
+        // An event is told once, not whenever somebody comes.
+        if topic != "/log" {
+            let id = u64::from(channel.id());
+            self.desk.lock().insert(id, Message { channel, log_time, bytes });
+        }
+        Ok(())
+    }
+
+    fn is_lossy(&self) -> bool {
+        true
+    }
+}
+
+struct Message {
+    channel: Arc<RawChannel>,
+    log_time: u64,
+    bytes: Vec<u8>,
+}
+
+/// The server's side of what viewers ask.
+struct Desk {
+    /// The last message of each channel, for viewers that come later.
+    latest: Mutex<BTreeMap<u64, Message>>,
+    steer: Box<dyn Fn(Steering) -> Playback + Send + Sync>,
+}
+
+impl Desk {
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<u64, Message>> {
+        self.latest.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Returns the number of messages that may wait for a viewer.
+    fn waiting(&self) -> usize {
+        let largest = self.lock().values().map(|message| message.bytes.len()).max();
+        (WAITING_BYTES / largest.unwrap_or(0).max(1)).clamp(FEWEST_WAITING, MOST_WAITING)
+    }
+}
+
+impl ServerListener for Desk {
+    fn on_subscribe(&self, client: Client, channel: ChannelView) {
+        if let Some(message) = self.lock().get(&u64::from(channel.id())) {
+            let meta = PartialMetadata::with_log_time(message.log_time);
+            message.channel.log_with_meta_to_sink(&message.bytes, meta, client.sink_id());
+        }
+    }
+
+    fn on_playback_control_request(
+        &self,
+        request: PlaybackControlRequest,
+    ) -> Option<PlaybackState> {
+        let steering = Steering {
+            play: request.playback_command == PlaybackCommand::Play,
+            speed: f64::from(request.playback_speed),
+            seek_s: request.seek_time.map(|ns| ns as f64 * 1e-9),
+        };
+        Some(state((self.steer)(steering)))
+    }
+}
+
+fn state(playback: Playback) -> PlaybackState {
+    let status = match playback.playing {
+        Playing::Playing => PlaybackStatus::Playing,
+        Playing::Paused => PlaybackStatus::Paused,
+        Playing::Ended => PlaybackStatus::Ended,
+    };
+    PlaybackState {
+        status,
+        current_time: to_ns(playback.time_s),
+        playback_speed: playback.speed as f32,
+        did_seek: playback.did_seek,
+        request_id: None,
+    }
+}

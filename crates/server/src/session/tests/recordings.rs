@@ -1,0 +1,131 @@
+//! Recordings: computed again by the build that made them, else shown from their own tables.
+
+use super::*;
+use sidestep::kernel::view::{Frame, Look, Place, Who as Body};
+use sidestep_session::{Journey, Keep, Recorded, Unwatched};
+use std::path::PathBuf;
+
+/// Records a scenario into the folder `r`.
+fn recorded(text: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (run, source) = (folder.path().join("r"), Source::new("s.toml", text, ""));
+    let compiled = WORLDS.compile(&source).expect("valid");
+    let keep = Keep { folder: Some(&run), ..Keep::default() };
+    let journey = Journey::start(compiled.as_ref(), &source, 1, keep, None).expect("started");
+    journey.travel(&Unwatched).expect("recorded");
+    folder
+}
+
+fn path(folder: &tempfile::TempDir) -> PathBuf {
+    folder.path().join("r")
+}
+
+/// Makes a recording one of another version of the program.
+fn made_by_another(folder: &tempfile::TempDir) {
+    let manifest = path(folder).join("run.json");
+    let text = std::fs::read_to_string(&manifest).expect("a manifest");
+    let mut value: Value = serde_json::from_str(&text).expect("JSON");
+    (value["program_version"], value["build"]) = ("0.0.9".into(), "0.0.9+abc".into());
+    std::fs::write(manifest, value.to_string()).expect("written");
+}
+
+fn opened(folder: tempfile::TempDir) -> (Page, Value) {
+    let what = Subject::Recording { path: path(&folder).display().to_string() };
+    Page::of(means(folder.path(), 2), what, folder)
+}
+
+fn banner(status: &Value) -> String {
+    status["banner"].as_str().expect("text").to_string()
+}
+
+/// Places of agents, in micrometers: rows of tables are as exact as their columns.
+fn places(frame: &Frame) -> Vec<(Body, [i64; 3])> {
+    let rounded = |at_m: Place| at_m.map(|m| (m * 1e6).round() as i64);
+    let agents = frame.bodies.iter().filter(|body| body.kind.is_agent());
+    let mut places: Vec<_> = agents.map(|body| (body.who(), rounded(body.pose.at_m))).collect();
+    places.sort_unstable();
+    places
+}
+
+#[test]
+fn a_recording_of_another_build_shows_everybody_where_they_were() {
+    for (text, cycles) in [(ROBOTS, 600), (CHAINS, 150), (AIRPLANES, 40)] {
+        let folder = recorded(text);
+        let open = || Recorded::open(WORLDS, &path(&folder)).expect("a recording");
+        let mut again = open().start(1).expect("of this build");
+        made_by_another(&folder);
+        assert!(open().start(1).is_err(), "it is not computed again");
+        let mut shown = open().shown(1).expect("its tables are there");
+        let way = [0, cycles / 10, cycles / 5, cycles / 2];
+        for cycle in way {
+            again.advance(cycle - again.cycle());
+            shown.advance(cycle - shown.cycle());
+            let (one, other) = (again.frame(Look::BODIES), shown.frame(Look::BODIES));
+            assert!(!places(&one).is_empty());
+            assert_eq!(places(&one), places(&other), "{} at {cycle}", again.world());
+            assert_eq!(one.time_s, other.time_s);
+        }
+        let back = shown.checkpoint();
+        shown.advance(u64::MAX);
+        assert!(shown.is_over() && !shown.frame(Look::BODIES).bodies.is_empty());
+        shown.restore(&back).expect("its own");
+        assert_eq!(places(&shown.frame(Look::BODIES)), places(&again.frame(Look::BODIES)));
+    }
+}
+
+#[test]
+fn a_recording_of_another_build_says_so_and_has_its_events_but_no_inspection_and_no_digest() {
+    let folder = recorded(ROBOTS);
+    let (mut one, _) = opened(recorded(ROBOTS));
+    made_by_another(&folder);
+    let (mut page, told) = opened(folder);
+    let words = banner(&told["answer"]["status"]);
+    assert!(words.contains("0.0.9+abc") && words.contains("its own tables"), "{words}");
+    page.ask(json!({ "do": "seek", "session": 1, "cycle": 600 }));
+    let status = page.state("over");
+    assert!(status["digest"].is_null() && banner(&status) == words, "{status}");
+    let who = json!({ "kind": "robot", "number": 0, "part": null });
+    let id = page.send(json!({ "do": "inspect", "session": 1, "who": who }));
+    assert!(page.wait(id).get("problem").is_some());
+    one.ask(json!({ "do": "seek", "session": 1, "cycle": 600 }));
+    let ask = json!({ "do": "events", "session": 1, "from": 0, "until": 600, "most": 5000 });
+    let happened = |page: &mut Page| -> Vec<Value> {
+        let told = page.ask(ask.clone())["entries"].clone();
+        let entries = told.as_array().expect("events").iter();
+        entries.map(|e| json!([e["cycle"], e["kind"], e["who"]])).collect()
+    };
+    let (now, then) = (happened(&mut one), happened(&mut page));
+    assert!(!now.is_empty());
+    assert_eq!(now, then);
+}
+
+#[test]
+fn a_recorded_run_is_computed_again_and_its_digest_confirmed() {
+    let (mut page, opened) = opened(recorded(ROBOTS));
+    assert_eq!(opened["answer"]["scene"]["is_recording"], true);
+    assert!(banner(&opened["answer"]["status"]).contains("at the end"));
+    // Without being played, it is computed ahead: all events are known, and the digest is confirmed.
+    page.until("the verdict", |page| {
+        let told = page
+            .notices
+            .iter()
+            .any(|n| n["notice"] == "status" && banner(n).contains("the recorded one"));
+        told.then_some(())
+    });
+    let events =
+        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 601, "most": 9999 }));
+    assert_eq!(events["known_until"], 600.0);
+    let (mut plain_page, _) = Page::open(ROBOTS, 1);
+    plain_page.digest_at(600);
+    assert_eq!(
+        plain_page
+            .ask(json!({ "do": "events", "session": 1, "from": 0, "until": 601, "most": 9999 })),
+        events
+    );
+    assert_eq!(page.digest_at(600), plain(ROBOTS, 600));
+    assert!(banner(&page.state("over")).contains("the recorded one"));
+    let id = page.send(json!({ "do": "restart", "session": 1, "seed": 3, "text": null }));
+    assert!(page.wait(id).get("problem").is_some());
+    page.ask(json!({ "do": "restart", "session": 1, "seed": null, "text": null }));
+    assert_eq!(page.digest_at(100), plain(ROBOTS, 100));
+}

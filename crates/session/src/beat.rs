@@ -1,0 +1,70 @@
+//! The time at which the next cycle of a run is due.
+
+use sidestep::kernel::Cycle;
+use std::time::{Duration, Instant};
+
+/// A run that is so late does not hurry to catch up.
+const LATE: Duration = Duration::from_millis(250);
+
+/// The clock of a run that is played at a speed.
+#[derive(Debug, Clone, Copy)]
+pub struct Beat {
+    start: Instant,
+    from: Cycle,
+    cycles_per_s: f64,
+}
+
+impl Beat {
+    /// Returns the clock of a run that stands at a cycle.
+    pub fn new(cycles_per_s: f64, now: Instant, from: Cycle) -> Self {
+        Self { start: now, from, cycles_per_s }
+    }
+
+    /// Returns the cycle at which a run should be that is now at `cycle`; one that is too late is waited for.
+    pub fn target(&mut self, now: Instant, cycle: Cycle) -> Cycle {
+        let due = self.due(now);
+        let late = due.saturating_sub(cycle) as f64 / self.cycles_per_s;
+        if late > LATE.as_secs_f64() {
+            (self.start, self.from) = (now, cycle);
+            return cycle + 1;
+        }
+        due
+    }
+
+    fn due(&self, now: Instant) -> Cycle {
+        let passed_s = now.saturating_duration_since(self.start).as_secs_f64();
+        // A little more, so that a wait until a cycle is due ends when it is.
+        self.from + (passed_s * self.cycles_per_s + 1e-6) as u64
+    }
+
+    /// Returns when the cycle after this one is due.
+    pub fn next(&self, cycle: Cycle) -> Instant {
+        let cycles = (cycle + 1).saturating_sub(self.from) as f64;
+        // No wait is longer than an hour; it is asked again then.
+        self.start + Duration::from_secs_f64((cycles / self.cycles_per_s).min(3600.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: Duration = Duration::from_millis(1);
+
+    #[test]
+    fn a_beat_tells_the_cycle_that_is_due_and_when_the_next_one_is() {
+        let start = Instant::now();
+        let mut beat = Beat::new(4.0, start, 10);
+        assert_eq!(beat.target(start + 200 * MS, 10), 10);
+        assert_eq!(beat.next(10), start + 250 * MS);
+        assert_eq!(beat.target(beat.next(10), 10), 11);
+    }
+
+    #[test]
+    fn a_run_that_cannot_keep_up_does_not_hurry_afterwards() {
+        let start = Instant::now();
+        let mut beat = Beat::new(100.0, start, 0);
+        assert_eq!(beat.target(start + 1000 * MS, 3), 4);
+        assert_eq!(beat.target(start + 1020 * MS, 4), 5, "as from now on");
+    }
+}

@@ -1,0 +1,232 @@
+//! Runs that are watched live, by viewers of Foxglove's protocol.
+//!
+//! A frame is made when somebody watches and the one before is encoded, which a thread of its own does: what nobody
+//! takes in time is not made, and the run goes on meanwhile.
+
+mod address;
+mod steered;
+
+pub use address::{ViewersAt, next_free};
+pub use steered::Steered;
+
+use crate::Error;
+use crate::film::LOOK;
+use sidestep::kernel::Simulation;
+use sidestep::kernel::view::{Frame, Look, Scenery};
+use sidestep_record::{LiveFrames, LiveServer, Playback, Playing, Steering, live};
+use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, Builder, JoinHandle};
+use std::time::{Duration, Instant};
+
+/// The time between two frames.
+const FRAME: Duration = Duration::from_millis(33);
+/// The time between two states of a run that goes on.
+const TOLD: Duration = Duration::from_millis(100);
+const TRIES: u32 = 50;
+const BETWEEN_TRIES: Duration = Duration::from_millis(10);
+/// The speeds that viewers can ask for.
+const SPEEDS: std::ops::RangeInclusive<f64> = 0.1..=100.0;
+
+/// The viewers of one run. They are sent away when this is dropped.
+pub struct Viewers {
+    server: LiveServer,
+    wishes: Arc<Wishes>,
+    /// `None` once there are no more frames.
+    frames: Option<SyncSender<Frame>>,
+    is_encoding: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+    /// The time that the last frame shows.
+    shown_s: f64,
+    frame_due: Instant,
+    told_due: Instant,
+}
+
+/// The wishes of viewers, and what they are told of them.
+struct Wishes {
+    can_seek: bool,
+    told: Mutex<Playback>,
+    wish: Mutex<Option<Steering>>,
+}
+
+impl Viewers {
+    /// The options of frames for viewers.
+    pub const LOOK: Look = LOOK;
+
+    /// Starts to serve viewers of a run, up to `end_s` of simulated time. With `can_seek`, they may ask for times.
+    ///
+    /// # Errors
+    /// When the address cannot be had.
+    pub fn start(
+        at: &ViewersAt,
+        run: &mut dyn Simulation,
+        scenery: &Scenery,
+        (end_s, can_seek): (f64, bool),
+        now: Playback,
+    ) -> Result<Self, Error> {
+        let told = Mutex::new(now);
+        let wishes = Arc::new(Wishes { can_seek, told, wish: Mutex::default() });
+        let heard = wishes.clone();
+        let first = run.frame(LOOK);
+        let (host, port) = (at.host(), at.port());
+        let steer = move |wish| heard.take(wish);
+        let served = retried(|| live(&host, port, scenery, (&first, end_s), steer.clone()));
+        let (server, encoder) = served.map_err(|e| at.unusable(&e))?;
+        let (frames, taken) = sync_channel(1);
+        let is_encoding = Arc::new(AtomicBool::new(false));
+        let busy = is_encoding.clone();
+        let thread = Builder::new().name("viewers".into());
+        let thread = thread.spawn(move || encode(encoder, &taken, &busy)).map_err(|e| {
+            Error::stopped(format!("no thread for viewers: {e}"), "end other programs")
+        })?;
+        Ok(Self {
+            server,
+            wishes,
+            frames: Some(frames),
+            is_encoding,
+            thread: Some(thread),
+            shown_s: first.time_s,
+            frame_due: Instant::now(),
+            told_due: Instant::now(),
+        })
+    }
+
+    /// Whether somebody watches.
+    pub fn are_there(&self) -> bool {
+        self.server.is_watched()
+    }
+
+    /// Returns what viewers want since the last call.
+    pub fn wish(&self) -> Option<Steering> {
+        lock(&self.wishes.wish).take()
+    }
+
+    /// Returns how a frame is made for them, if one is wanted of this time now.
+    pub fn frame_due(&self, time_s: f64, now: Instant) -> bool {
+        self.are_there()
+            && time_s != self.shown_s
+            && now >= self.frame_due
+            && !self.is_encoding.load(Ordering::Acquire)
+    }
+
+    /// Shows a frame that was due.
+    pub fn show(&mut self, frame: Frame, now: Instant) {
+        (self.shown_s, self.frame_due) = (frame.time_s, (self.frame_due + FRAME).max(now));
+        self.is_encoding.store(true, Ordering::Release);
+        if let Some(frames) = &self.frames {
+            // It is taken, as the one before is encoded.
+            let _ = frames.try_send(frame);
+        }
+    }
+
+    /// Tells them what the run does: at once if it does something else or its time has jumped, else now and then.
+    pub fn tell(&mut self, playback: Playback, now: Instant) {
+        let mut told = lock(&self.wishes.told);
+        let did_seek = playback.did_seek || playback.time_s < told.time_s;
+        let is_other = told.playing != playback.playing || told.speed != playback.speed || did_seek;
+        let is_later = told.time_s != playback.time_s && now >= self.told_due;
+        if is_other || is_later {
+            *told = Playback { did_seek: false, ..playback };
+            drop(told);
+            self.told_due = now + TOLD;
+            self.server.tell(Playback { did_seek, ..playback });
+        }
+    }
+}
+
+impl Drop for Viewers {
+    fn drop(&mut self) {
+        self.frames = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Wishes {
+    /// Takes a wish, and returns what comes of it.
+    fn take(&self, wish: Steering) -> Playback {
+        let told = *lock(&self.told);
+        let speed = match wish.speed {
+            speed if speed.is_finite() && speed > 0.0 => {
+                speed.clamp(*SPEEDS.start(), *SPEEDS.end())
+            }
+            _ => told.speed,
+        };
+        let seek_s = wish.seek_s.filter(|_| self.can_seek);
+        let mut waiting = lock(&self.wish);
+        // Who asks for a time, and then to play, means both.
+        let before_s = waiting.as_ref().and_then(|before| before.seek_s);
+        *waiting = Some(Steering { speed, seek_s: seek_s.or(before_s), ..wish });
+        let playing = if wish.play { Playing::Playing } else { Playing::Paused };
+        let time_s = seek_s.unwrap_or(told.time_s);
+        Playback { playing, time_s, speed, did_seek: seek_s.is_some() }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Tries to have a port for a moment: the server that had it before may be about to end.
+fn retried<T>(start: impl Fn() -> io::Result<T>) -> io::Result<T> {
+    for _ in 0..TRIES {
+        match start() {
+            Err(error) if error.kind() == io::ErrorKind::AddrInUse => thread::sleep(BETWEEN_TRIES),
+            other => return other,
+        }
+    }
+    start()
+}
+
+/// Encodes frames until there are no more.
+fn encode(mut encoder: LiveFrames, frames: &Receiver<Frame>, is_encoding: &AtomicBool) {
+    for frame in frames {
+        // What cannot be encoded is not shown; the next frame can.
+        let _ = encoder.frame(&frame);
+        is_encoding.store(false, Ordering::Release);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TOLD: Playback =
+        Playback { playing: Playing::Playing, time_s: 5.0, speed: 2.0, did_seek: false };
+
+    fn wishes(can_seek: bool) -> Wishes {
+        Wishes { can_seek, told: Mutex::new(TOLD), wish: Mutex::default() }
+    }
+
+    fn wish(play: bool, speed: f64, seek_s: Option<f64>) -> Steering {
+        Steering { play, speed, seek_s }
+    }
+
+    #[test]
+    fn a_wish_for_a_time_is_not_lost_when_another_wish_follows() {
+        let wishes = wishes(true);
+        let came = wishes.take(wish(false, 1.0, Some(7.0)));
+        assert_eq!((came.playing, came.time_s, came.did_seek), (Playing::Paused, 7.0, true));
+        wishes.take(wish(true, 4.0, None));
+        assert_eq!(lock(&wishes.wish).take(), Some(wish(true, 4.0, Some(7.0))));
+    }
+
+    #[test]
+    fn times_are_refused_where_a_run_cannot_go_back() {
+        let wishes = wishes(false);
+        let came = wishes.take(wish(true, 1.0, Some(7.0)));
+        assert_eq!((came.time_s, came.did_seek), (5.0, false));
+        assert_eq!(lock(&wishes.wish).take().and_then(|wish| wish.seek_s), None);
+    }
+
+    #[test]
+    fn speeds_that_are_none_leave_the_speed_and_others_are_kept_in_bounds() {
+        let wishes = wishes(false);
+        let speeds = [f64::NAN, f64::INFINITY, -1.0, 0.0, 1e9, 1e-9, 3.0];
+        let came = speeds.map(|speed| wishes.take(wish(true, speed, None)).speed);
+        assert_eq!(came, [2.0, 2.0, 2.0, 2.0, 100.0, 0.1, 3.0]);
+    }
+}

@@ -1,0 +1,193 @@
+//! Places of bodies at any cycle, from the tables that have them.
+
+use crate::recorded::has_rows;
+use sidestep::kernel::ports::Values;
+use sidestep::kernel::view::{Body, Frame, Kind, Place, PlaceRows, Pose, Scenery, Shape, Who};
+use sidestep::kernel::{Cycle, InputError};
+use sidestep_record::{Table, read_table};
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::FRAC_PI_2;
+use std::path::{Path, PathBuf};
+
+/// The number of rows that are held at a time, about.
+const ROWS: u64 = 200_000;
+
+/// The bodies of a recording.
+pub(super) struct Places {
+    folder: PathBuf,
+    rows: Vec<PlaceRows>,
+    scenery: Scenery,
+    /// The bodies at the start: what they look like.
+    first: Vec<Body>,
+    until: Cycle,
+    window: Vec<Window>,
+}
+
+/// The rows of some cycles of a table.
+struct Window {
+    from: Cycle,
+    table: Option<Table>,
+}
+
+impl Places {
+    /// Opens the tables of a folder.
+    ///
+    /// # Errors
+    /// When one of them is damaged.
+    pub(super) fn new(
+        folder: &Path,
+        rows: Vec<PlaceRows>,
+        scenery: Scenery,
+        first: Vec<Body>,
+        until: Cycle,
+    ) -> Result<Self, InputError> {
+        let folder = folder.to_path_buf();
+        let window = Vec::new();
+        let mut places = Self { folder, rows, scenery, first, until, window };
+        for k in 0..places.rows.len() {
+            let window = places.read(k, 0)?;
+            places.window.push(window);
+        }
+        Ok(places)
+    }
+
+    pub(super) fn scenery(&self) -> &Scenery {
+        &self.scenery
+    }
+
+    /// Returns the number of cycles of a window, and its first.
+    fn span(&self, rows: &PlaceRows, cycle: Cycle) -> (Cycle, Cycle) {
+        let bodies = self.first.iter().filter(|body| body.kind == rows.kind).count();
+        let cycles = (ROWS / bodies.max(1) as u64).max(1) * rows.every;
+        (cycle / cycles * cycles, cycles)
+    }
+
+    /// Reads the rows around a cycle, and one moment before them, for directions.
+    fn read(&self, k: usize, cycle: Cycle) -> Result<Window, InputError> {
+        let rows = &self.rows[k];
+        let (from, cycles) = self.span(rows, cycle);
+        if !has_rows(&self.folder, rows.table) {
+            return Ok(Window { from, table: None });
+        }
+        let before = from.saturating_sub(2 * rows.every);
+        let table = read_table(&self.folder, rows.table, before..from + cycles)?;
+        Ok(Window { from, table: Some(table) })
+    }
+
+    /// Returns the bodies of a cycle. Those that have gone are left out, and so is all that moves but has no rows.
+    pub(super) fn at(&mut self, cycle: Cycle) -> Vec<Body> {
+        // Rows are of the beginnings of cycles, and none begins at the end.
+        let cycle = cycle.min(self.until.saturating_sub(1));
+        let mut poses = BTreeMap::new();
+        for k in 0..self.rows.len() {
+            if self.span(&self.rows[k], cycle).0 != self.window[k].from {
+                // It could be read at the start. What cannot be read now is not shown.
+                let (from, _) = self.span(&self.rows[k], cycle);
+                self.window[k] = self.read(k, cycle).unwrap_or(Window { from, table: None });
+            }
+            if let Some(table) = &self.window[k].table {
+                poses.extend(self.poses(&self.rows[k], table, cycle));
+            }
+        }
+        self.placed(&poses)
+    }
+
+    /// Returns where the bodies of a table are.
+    fn poses(&self, rows: &PlaceRows, table: &Table, cycle: Cycle) -> Vec<(Who, Pose)> {
+        let Some(headings) = last_headings(rows, table, cycle) else { return Vec::new() };
+        let whose: Vec<Who> = headings.keys().copied().collect();
+        // People are numbered on from robots, in one table.
+        let like = |body: &Body| Body { kind: rows.kind, ..body.clone() };
+        let bodies = self.first.iter().filter(|body| is_of(rows, body)).map(like).collect();
+        let frame = Frame { cycle: cycle + 1, bodies, ..Frame::default() };
+        let trails = rows.trails(&self.scenery, &frame, &whose, |name| table.column(name));
+        let pose = |who: Who, way: &[(Cycle, Place)]| {
+            let known: Vec<_> = way.iter().filter(|(at, _)| *at <= cycle).collect();
+            let (last, at_m) = **known.last()?;
+            let before = known.iter().rev().find(|(_, before)| *before != at_m);
+            let ahead = before.map(|(_, [x, y, _])| (at_m[1] - y).atan2(at_m[0] - x));
+            let yaw_rad = rows.plane.map_or(0.0, |plane| plane.yaw_rad);
+            let quarters = headings[&who].map(|quarters| f64::from(quarters) * FRAC_PI_2 + yaw_rad);
+            let is_here = last + rows.every > cycle;
+            is_here.then(|| (who, Pose::heading(at_m, quarters.or(ahead).unwrap_or(0.0))))
+        };
+        let trails = trails.unwrap_or_default();
+        trails.iter().filter_map(|trail| pose(trail.of, &trail.way)).collect()
+    }
+
+    /// Returns the bodies at their places, the known ones in the order of the start.
+    fn placed(&self, poses: &BTreeMap<Who, Pose>) -> Vec<Body> {
+        let mut used = BTreeSet::new();
+        let mut joints: BTreeMap<u32, u32> = BTreeMap::new();
+        let mut bodies = Vec::new();
+        for body in &self.first {
+            let who = self.row_of(body);
+            let followed = match body.kind {
+                Kind::Rods => line(body, poses, joints.entry(body.number).or_default()),
+                Kind::Zone => poses
+                    .get(&(Kind::Airplane, body.number, None))
+                    .map(|pose| Body { pose: Pose::at(pose.at_m), ..body.clone() }),
+                _ => who.and_then(|who| poses.get(&who)).map(|pose| {
+                    used.extend(who);
+                    Body { pose: *pose, ..body.clone() }
+                }),
+            };
+            let stays =
+                who.is_none() && !matches!(body.kind, Kind::Rods | Kind::Zone | Kind::Robot);
+            bodies.extend(followed.or_else(|| stays.then(|| body.clone())));
+        }
+        let late = poses.iter().filter(|(who, _)| !used.contains(*who));
+        bodies.extend(late.map(|(who, pose)| self.latecomer(*who, *pose)));
+        bodies
+    }
+
+    /// Returns the name of a body in the tables, if it has rows there.
+    fn row_of(&self, body: &Body) -> Option<Who> {
+        let rows = self.rows.iter().find(|rows| is_of(rows, body))?;
+        Some((rows.kind, body.number, body.part))
+    }
+
+    /// Returns a body that was not there at the start: it looks like those that were.
+    fn latecomer(&self, (kind, number, part): Who, pose: Pose) -> Body {
+        let like = self.first.iter().find(|body| body.kind == kind);
+        let shape = like.map_or(Shape::Sphere { radius_m: 1.0 }, |body| body.shape.clone());
+        Body { part, ..Body::new(kind, number, pose, shape) }
+    }
+}
+
+/// Whether a body may have rows.
+fn is_of(rows: &PlaceRows, body: &Body) -> bool {
+    let is_kind = body.kind == rows.kind || (rows.kind == Kind::Robot && body.kind == Kind::Person);
+    is_kind && body.part.is_some() == rows.part.is_some()
+}
+
+/// Returns the line through the joints that follow those of the lines before.
+fn line(body: &Body, poses: &BTreeMap<Who, Pose>, joint: &mut u32) -> Option<Body> {
+    let Shape::Line { points_m, thickness_m } = &body.shape else { return None };
+    let from = *joint;
+    *joint += points_m.len() as u32;
+    let place = |part| Some(poses.get(&(Kind::Connector, body.number, Some(part)))?.at_m);
+    let points_m = (from..*joint).map(place).collect::<Option<Vec<_>>>()?;
+    let shape = Shape::Line { points_m, thickness_m: *thickness_m };
+    Some(Body { shape, ..body.clone() })
+}
+
+/// Returns everybody who has rows up to a cycle, with the last recorded heading in quarter turns.
+fn last_headings(
+    rows: &PlaceRows,
+    table: &Table,
+    cycle: Cycle,
+) -> Option<BTreeMap<Who, Option<u32>>> {
+    let Values::U64(cycles) = table.column("cycle")? else { return None };
+    let whole = |name: &str, row| table.column(name)?.number(row).map(|number| number as u32);
+    let mut found: BTreeMap<Who, (Cycle, Option<u32>)> = BTreeMap::new();
+    for (row, &at) in cycles.iter().enumerate().filter(|(_, at)| **at <= cycle) {
+        let part = rows.part.and_then(|part| whole(part, row));
+        let who = (rows.kind, whole(rows.number, row)?, part);
+        let last = found.entry(who).or_default();
+        if at >= last.0 {
+            *last = (at, rows.ahead.and_then(|ahead| whole(ahead, row)));
+        }
+    }
+    Some(found.into_iter().map(|(who, (_, heading))| (who, heading)).collect())
+}
