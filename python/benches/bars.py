@@ -1,0 +1,165 @@
+"""What Python costs: figures beside the bars that the package is held to. Ratios are of one run.
+
+    python python/benches/bars.py
+
+Needs polars for the table, and gymnasium and pettingzoo for the environments; leaves out what is not there.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+import sidestep
+
+
+def robots(count: int, side: int, **keys: object) -> dict[str, object]:
+    """A floor of side x side boxes with external robots of eight beams."""
+    return {
+        "world": "robots",
+        "cycles": 10**9,
+        "map": {"ascii": "\n".join(["." * side] * side)},
+        "robots": [{"count": count, "sensors": ["sonar-8"], "behaviour": {"kind": "external"}}],
+        **keys,
+    }
+
+
+def best(work: Callable[[], object], times: int = 7) -> float:
+    """Returns the least CPU seconds of several tries."""
+    took = []
+    for _ in range(times):
+        started = time.process_time()
+        work()
+        took.append(time.process_time() - started)
+    return min(took)
+
+
+def told(what: str, figure: str, bar: str) -> None:
+    print(f"{what:<58} {figure:>24}   bar {bar}")
+
+
+def steps() -> None:
+    sim = sidestep.Simulation(robots(100, 60))
+    n = 2000
+    alone = best(lambda: sim.step(n)) / n
+
+    def one_by_one() -> None:
+        for _ in range(n):
+            sim.step()
+
+    single = best(one_by_one) / n
+    figure = f"{(single - alone) * 1e6:.1f} us ({alone * 1e6:.1f} alone)"
+    told("step() of 100 robots, more than the same cycle in Rust", figure, "10 us")
+
+
+def behavior() -> None:
+    sim = sidestep.Simulation(robots(1000, 150))
+    n = 200
+    zeros = np.zeros(1000)
+
+    def run(observes: bool) -> None:
+        for _ in range(n):
+            if observes:
+                sim.observe()
+                sim.order("action", zeros)
+            sim.step()
+
+    without, with_python = best(lambda: run(False)) / n, best(lambda: run(True)) / n
+    rust = observing(1000, 150)
+    figure = f"{(with_python - without - rust) * 1e6:.0f} us (+ {rust * 1e6:.0f} to sense)"
+    told("arrays of a behavior, 1,000 agents, a cycle", figure, "50 us")
+
+
+def observing(count: int, side: int) -> float:
+    """Returns what robots that decide for themselves take more for sensing than those that do not sense, a cycle."""
+    own = robots(count, side)
+    own["robots"] = [{"count": count, "sensors": ["sonar-8"], "behaviour": {"kind": "random"}}]
+    blind = {**own, "robots": [{"count": count, "behaviour": {"kind": "random"}}]}
+    took = []
+    for scenario in (own, blind):
+        sim = sidestep.Simulation(scenario)
+        took.append(best(lambda sim=sim: sim.step(200)) / 200)
+    return max(took[0] - took[1], 0.0)
+
+
+def resets() -> None:
+    scenario = sidestep.Scenario(robots(10, 12))
+    n = 200
+
+    def reseed() -> None:
+        for seed in range(2, n + 2):
+            sidestep.Simulation(scenario, seed=seed)
+
+    def compile_all() -> None:
+        for seed in range(2, n + 2):
+            sidestep.Simulation(scenario.set(seed=seed))
+
+    quick, whole = best(reseed) / n, best(compile_all) / n
+    figure = f"{quick * 1e3:.3f} ms, {quick / whole:.2f} of it"
+    told("a fresh start of 10 robots by seed; beside compiling", figure, "0.2 ms, 0.20")
+
+
+def table() -> None:
+    try:
+        import polars as pl
+    except ImportError:
+        return
+    sim = sidestep.Simulation(robots(1000, 150), record=True)
+    sim.step(10_000)
+    rows = sim.tables()["trajectories"]
+    started = time.perf_counter()
+    frame = pl.DataFrame(rows)
+    took = time.perf_counter() - started
+    told(f"{frame.height:,} rows to polars", f"{took * 1e3:.1f} ms", "10 ms")
+
+
+def environments() -> None:
+    try:
+        from sidestep.envs import parallel_env
+    except ImportError:
+        return
+    for count, side in ((10, 20), (100, 60), (1000, 150)):
+        env = parallel_env(robots(count, side))
+        env.reset(seed=1)
+        actions = dict.fromkeys(env.agents, 0)
+        zeros = np.zeros(count)
+        n = max(20, 5000 // count)
+
+        def with_dicts(env=env, actions=actions, n=n) -> None:
+            for _ in range(n):
+                env.step(actions)
+
+        def with_arrays(env=env, zeros=zeros, n=n) -> None:
+            for _ in range(n):
+                env.sim.order("action", zeros)
+                env.sim.step()
+                env.sim.observe()
+
+        dicts, arrays = best(with_dicts) / n, best(with_arrays) / n
+        figure = f"{(dicts - arrays) / count * 1e6:.2f} us, {count / dicts:,.0f}/s"
+        told(f"PettingZoo, {count} agents: dicts per agent; agent-steps", figure, "1 us")
+
+
+def loading() -> None:
+    program = (
+        "import time, numpy\n"
+        "resident = lambda: int(open('/proc/self/statm').read().split()[1]) * 4096 / 2**20\n"
+        "before, started = resident(), time.perf_counter()\n"
+        "import sidestep\n"
+        "print((time.perf_counter() - started) * 1e3, resident() - before)"
+    )
+    runs = [
+        subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+        for _ in range(5)
+    ]
+    took, size = min(tuple(map(float, run.stdout.split())) for run in runs)
+    told("import sidestep, beside NumPy", f"{took:.0f} ms, {size:.1f} MB", "100 ms, 15 MB")
+
+
+if __name__ == "__main__":
+    for part in (steps, behavior, resets, table, environments, loading):
+        part()

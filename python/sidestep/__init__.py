@@ -1,0 +1,48 @@
+"""Simulation of many agents that must not collide: robots on a grid, chains, airplanes.
+
+The same scenario and seed give the same bits: whatever the number of workers, and whether the command, the Rust library or
+Python runs it.
+
+>>> import sidestep
+>>> scenario = sidestep.Scenario({
+...     "world": "robots",
+...     "map": {"ascii": "......\\n......\\n......"},
+...     "robots": [{"count": 3, "behaviour": {"kind": "external"}}],
+... })
+>>> sim = sidestep.Simulation(scenario, seed=7)
+>>> sim.order("action", 0)        # all go forward
+>>> sim.step()
+1
+>>> sorted(sim.observe())
+['at_boxes', 'contact', 'contact_side', 'due', 'heading']
+"""
+
+from ._errors import (
+    CheckpointError,
+    ClosedError,
+    InputError,
+    OrderError,
+    RecordError,
+    ReplayError,
+    SidestepError,
+)
+from ._native import Scenario, Simulation, Space, Table, Team, __version__, read, schema, worlds
+
+__all__ = [
+    "CheckpointError",
+    "ClosedError",
+    "InputError",
+    "OrderError",
+    "RecordError",
+    "ReplayError",
+    "Scenario",
+    "SidestepError",
+    "Simulation",
+    "Space",
+    "Table",
+    "Team",
+    "__version__",
+    "read",
+    "schema",
+    "worlds",
+]

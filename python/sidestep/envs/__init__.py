@@ -1,0 +1,31 @@
+"""Environments for reinforcement learning: PettingZoo's ``ParallelEnv`` from any scenario whose agents take orders.
+
+Needs the extra ``rl``: ``pip install 'sidestep[rl]'``.
+
+>>> from sidestep.envs import parallel_env
+>>> env = parallel_env({
+...     "world": "robots",
+...     "cycles": 50,
+...     "map": {"ascii": "......\\n......\\n......"},
+...     "robots": [{"count": 2, "behaviour": {"kind": "external"}}],
+... })
+>>> observations, infos = env.reset(seed=1)
+>>> env.agents
+['robot_0', 'robot_1']
+>>> observations, rewards, terminations, truncations, infos = env.step({agent: 0 for agent in env.agents})
+"""
+
+try:
+    import gymnasium as _gymnasium
+    import pettingzoo as _pettingzoo
+except ImportError as error:
+    raise ImportError(
+        "environments need gymnasium and pettingzoo: pip install 'sidestep[rl]'"
+    ) from error
+
+from ._parallel import ParallelEnv, parallel_env
+from ._rewards import DEFAULTS, TERMS, Reward
+
+__all__ = ["DEFAULTS", "TERMS", "ParallelEnv", "Reward", "parallel_env"]
+
+del _gymnasium, _pettingzoo

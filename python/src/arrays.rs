@@ -1,0 +1,82 @@
+//! Arrays: ids and values that come from Python, and columns of bodies that go there.
+
+use crate::error;
+use crate::json::list;
+use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+use sidestep::kernel::EntityId;
+use sidestep::kernel::view::Body;
+
+/// Returns the ids of agents; truth values are no ids, though Python counts with them.
+pub(crate) fn ids(py: Python<'_>, agents: &Bound<'_, PyAny>) -> PyResult<Vec<EntityId>> {
+    let told = || {
+        let words = "`agents` must be ids: whole numbers; of a mask, `team.agents[mask]`";
+        error::OrderError::new_err(words)
+    };
+    let array = py.import("numpy")?.call_method1("atleast_1d", (agents,))?;
+    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+    let is_empty = array.len()? == 0;
+    match kind.as_str() {
+        "i" | "u" => array.call_method0("tolist")?.extract().map_err(|_| told()),
+        _ if is_empty => Ok(Vec::new()),
+        _ => Err(told()),
+    }
+}
+
+/// Returns the values of an order as floats, one agent after the other: an array with a row for each agent, or one number
+/// for all.
+pub(crate) fn numbers(
+    py: Python<'_>,
+    order: &str,
+    values: &Bound<'_, PyAny>,
+    agents: usize,
+    shape: Option<&[usize]>,
+) -> PyResult<Vec<f64>> {
+    let told = |cause: String| error::OrderError::new_err(format!("the order `{order}` {cause}"));
+    let float = py.import("numpy")?.getattr("float64")?;
+    let array = py.import("numpy")?.call_method1("asarray", (values, float));
+    let array = array.map_err(|e| told(format!("must be numbers: {}", e.value(py))))?;
+    let array = array.cast::<PyArrayDyn<f64>>().map_err(|e| told(e.to_string()))?;
+    // An order that nobody knows is refused with the names of those that are known.
+    let Some(shape) = shape else { return Ok(array.to_vec().unwrap_or_default()) };
+    let wanted: Vec<usize> = [agents].iter().chain(shape).copied().collect();
+    if array.ndim() == 0 {
+        let width: usize = wanted.iter().product();
+        return Ok(vec![array.readonly().as_array().iter().copied().next().unwrap_or(0.0); width]);
+    }
+    if array.shape() != wanted {
+        let (has, wanted) = (PyTuple::new(py, array.shape())?, PyTuple::new(py, &wanted)?);
+        return Err(told(format!("needs an array of the shape {wanted}, not {has}")));
+    }
+    Ok(array.readonly().as_array().iter().copied().collect())
+}
+
+/// Returns a number of each body.
+pub(crate) fn column<'py, T: numpy::Element>(
+    py: Python<'py>,
+    bodies: &[Body],
+    of: impl Fn(&Body) -> T,
+) -> Bound<'py, PyArray1<T>> {
+    PyArray1::from_iter(py, bodies.iter().map(of))
+}
+
+/// Returns some numbers of each body, of the shape (bodies, N).
+pub(crate) fn rows<'py, const N: usize>(
+    py: Python<'py>,
+    bodies: &[Body],
+    of: impl Fn(&Body) -> [f64; N],
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let flat: Vec<f64> = bodies.iter().flat_map(of).collect();
+    PyArray1::from_vec(py, flat).reshape([bodies.len(), N])
+}
+
+/// Returns a word of each body.
+pub(crate) fn texts<'py>(
+    py: Python<'py>,
+    bodies: &[Body],
+    of: impl Fn(&Body) -> String,
+) -> PyResult<Bound<'py, PyAny>> {
+    let list = list(py, bodies.iter().map(of))?;
+    py.import("numpy")?.call_method1("array", (list,))
+}

@@ -1,0 +1,120 @@
+//! Functions in Python that decide for a team, between observing and acting.
+
+use crate::error::OrderError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyMapping};
+use sidestep::kernel::control::Team;
+use sidestep::kernel::{Cycle, Plan};
+use std::sync::Arc;
+
+/// A team, with its number before it.
+pub(crate) type Numbered = (usize, Arc<Team>);
+
+/// A run, as far as functions decide in it.
+pub(crate) trait Deciding {
+    /// Returns the cycles done.
+    fn now(&self, py: Python<'_>) -> PyResult<Cycle>;
+    /// Returns whether nothing can happen anymore.
+    fn has_ended(&self, py: Python<'_>) -> PyResult<bool>;
+    /// Returns the plan of its scenario.
+    fn plan(&self) -> Plan;
+    /// Returns a team by number or name, with its number.
+    fn team(&self, team: &Bound<'_, PyAny>) -> PyResult<Numbered>;
+    /// Returns the teams that take orders, with their numbers.
+    fn ordered_teams(&self) -> Vec<Numbered>;
+    /// Returns what a team observes.
+    fn observed<'py>(&self, py: Python<'py>, team: &Numbered) -> PyResult<Bound<'py, PyDict>>;
+    /// Orders something of all agents of a team.
+    fn give(
+        &self,
+        py: Python<'_>,
+        order: &str,
+        values: &Bound<'_, PyAny>,
+        team: &Team,
+    ) -> PyResult<()>;
+    /// Advances by one cycle.
+    fn advance(&self, py: Python<'_>) -> PyResult<()>;
+}
+
+/// A team, its number, and the function that decides for it.
+struct Decider<'py> {
+    team: Numbered,
+    decide: Bound<'py, PyAny>,
+}
+
+/// Advances a run to a cycle in which functions decide, and returns how many cycles were done.
+pub(crate) fn decided(
+    py: Python<'_>,
+    run: &impl Deciding,
+    decide: &Bound<'_, PyAny>,
+    state: Option<Bound<'_, PyAny>>,
+    until: Cycle,
+) -> PyResult<u64> {
+    let deciders = deciders(run, decide)?;
+    let state = state.unwrap_or_else(|| PyDict::new(py).into_any());
+    let from = run.now(py)?;
+    while run.now(py)? < until && !run.has_ended(py)? {
+        for decider in &deciders {
+            decider.order(py, run, &state).inspect_err(|raised| {
+                // Who reads the traceback learns where the run stands; nothing else depends on it.
+                let _ = note(py, run, raised);
+            })?;
+        }
+        run.advance(py)?;
+    }
+    Ok(run.now(py)? - from)
+}
+
+/// Adds to an exception of a function where the run stands, where Python can.
+fn note(py: Python<'_>, run: &impl Deciding, raised: &PyErr) -> PyResult<()> {
+    let (plan, cycle, version) = (run.plan(), run.now(py)?, sidestep::VERSION);
+    let words = format!(
+        "deciding for cycle {cycle} of `{}`, seed {}, sidestep {version}; the run is at that cycle still",
+        plan.name, plan.seed
+    );
+    raised.value(py).call_method1("add_note", (words,)).map(drop)
+}
+
+/// Returns the functions by team: one function decides for all that take orders.
+fn deciders<'py>(run: &impl Deciding, decide: &Bound<'py, PyAny>) -> PyResult<Vec<Decider<'py>>> {
+    let mut deciders = Vec::new();
+    if let Ok(by_team) = decide.cast::<PyMapping>() {
+        for entry in by_team.items()?.iter() {
+            let (team, decide): (Bound<'_, PyAny>, Bound<'_, PyAny>) = entry.extract()?;
+            deciders.push(Decider { team: run.team(&team)?, decide });
+        }
+        return Ok(deciders);
+    }
+    for team in run.ordered_teams() {
+        deciders.push(Decider { team, decide: decide.clone() });
+    }
+    if deciders.is_empty() {
+        let words = "no agent of this scenario takes orders; let it say that some are `external`";
+        return Err(OrderError::new_err(words));
+    }
+    Ok(deciders)
+}
+
+impl Decider<'_> {
+    /// Calls the function, and gives its orders.
+    fn order(&self, py: Python<'_>, run: &impl Deciding, state: &Bound<'_, PyAny>) -> PyResult<()> {
+        let observed = run.observed(py, &self.team)?;
+        let decided = self.decide.call1((observed, state))?;
+        let (_, team) = &self.team;
+        if decided.is_none() {
+            return Ok(());
+        }
+        let Ok(by_name) = decided.cast::<PyMapping>() else {
+            let Some(first) = team.ordered.first() else {
+                let words = format!("the agents of team `{}` decide for themselves", team.name);
+                return Err(OrderError::new_err(words));
+            };
+            return run.give(py, &first.name, &decided, team);
+        };
+        for entry in by_name.items()?.iter() {
+            let (order, values): (String, Bound<'_, PyAny>) = entry.extract()?;
+            run.give(py, &order, &values, team)?;
+        }
+        Ok(())
+    }
+}

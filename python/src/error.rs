@@ -1,0 +1,71 @@
+//! From the errors of Rust to the exceptions of `sidestep/_errors.py`.
+
+use pyo3::prelude::*;
+use sidestep::kernel;
+use sidestep::kernel::checkpoint;
+use sidestep::kernel::control;
+use sidestep::kernel::ports;
+use sidestep_session::Error;
+
+pyo3::import_exception!(sidestep._errors, InputError);
+pyo3::import_exception!(sidestep._errors, OrderError);
+pyo3::import_exception!(sidestep._errors, RecordError);
+pyo3::import_exception!(sidestep._errors, CheckpointError);
+pyo3::import_exception!(sidestep._errors, ReplayError);
+pyo3::import_exception!(sidestep._errors, ClosedError);
+
+/// Returns the exception of wrong input.
+pub(crate) fn input(error: &kernel::InputError) -> PyErr {
+    let (line, column) = error.position().unzip();
+    InputError::new_err((
+        error.to_string(),
+        error.place().to_string(),
+        line,
+        column,
+        error.key().map(str::to_string),
+        error.cause().to_string(),
+        error.remedy().to_string(),
+    ))
+}
+
+/// Returns the exception of input that came as a dict: its text was made from it, so the error names the
+/// key and no line.
+pub(crate) fn input_of_dict(error: &kernel::InputError) -> PyErr {
+    let place = error.key().unwrap_or(error.place()).to_string();
+    let told = format!("{place}: {}\n  help: {}", error.cause(), error.remedy());
+    let none: Option<usize> = None;
+    let (cause, remedy) = (error.cause().to_string(), error.remedy().to_string());
+    InputError::new_err((told, place, none, none, error.key().map(str::to_string), cause, remedy))
+}
+
+/// Returns the exception of wrong input that has no text: place, cause and remedy.
+pub(crate) fn wrong(place: &str, cause: impl Into<String>, remedy: impl Into<String>) -> PyErr {
+    input(&kernel::InputError::new(place, cause, remedy))
+}
+
+/// Returns the exception of an order.
+pub(crate) fn order(error: &control::OrderError) -> PyErr {
+    OrderError::new_err(error.to_string())
+}
+
+/// Returns the exception of rows that cannot be stored.
+pub(crate) fn record(error: &ports::RecordError) -> PyErr {
+    RecordError::new_err(error.to_string())
+}
+
+/// Returns the exception of a checkpoint.
+pub(crate) fn checkpoint(error: &checkpoint::CheckpointError) -> PyErr {
+    CheckpointError::new_err(error.to_string())
+}
+
+/// Returns the exception of a session.
+pub(crate) fn session(error: &Error) -> PyErr {
+    match error {
+        Error::Input(error) => input(error),
+        Error::Record(error) => record(error),
+        Error::Draw(_) => RecordError::new_err(error.to_string()),
+        Error::Interrupted | Error::WithinACycle(_) | Error::Stopped { .. } => {
+            ReplayError::new_err(error.to_string())
+        }
+    }
+}

@@ -1,0 +1,276 @@
+//! Scenarios: a file, text or dict, compiled once.
+
+use crate::error::{self, wrong};
+use crate::json::{list, table, to_python, to_toml};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList, PyMapping};
+use sidestep::kernel::InputError;
+use sidestep::scenario::{Compiled, Resolved, Source};
+use sidestep::worlds::WORLDS;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
+
+/// A scenario that was read, checked and compiled. It never changes; simulations share it.
+///
+/// Scenario(scenario=None, *, text=None, base=None): a path (or a file of another program that the command reads,
+/// such as BlueSky's .scn), a dict with the keys of a scenario file, or `text`, which is one. Paths in a dict or text are
+/// relative to `base`, by default the present folder.
+///
+/// Raises InputError, with the key that is wrong.
+///
+/// >>> import sidestep
+/// >>> scenario = sidestep.Scenario({"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2}]})
+/// >>> scenario.world, scenario.seed, scenario.agents
+/// ('robots', 1, 2)
+#[pyclass(module = "sidestep", frozen)]
+pub(crate) struct Scenario(pub(crate) Arc<Made>);
+
+/// A compiled scenario with its text.
+pub(crate) struct Made {
+    pub(crate) source: Source,
+    pub(crate) compiled: Box<dyn Compiled>,
+    /// Whether its text was made from a dict, so that its lines are nobody's.
+    is_dict: bool,
+    resolved: OnceLock<Result<Resolved, InputError>>,
+    /// Holds its files, if it was unpacked from a bundle.
+    unpacked: Option<Arc<tempfile::TempDir>>,
+}
+
+impl Made {
+    fn new(source: Source, is_dict: bool) -> PyResult<Self> {
+        let compiled = WORLDS.compile(&source).map_err(|e| told(&e, is_dict))?;
+        Ok(Self { source, compiled, is_dict, resolved: OnceLock::new(), unpacked: None })
+    }
+
+    /// Returns the scenario of a bundle.
+    pub(crate) fn unpacked(resolved: Resolved) -> PyResult<Self> {
+        let unpacked = match resolved.files.is_empty() {
+            true => None,
+            false => Some(Arc::new(unpack(&resolved.files)?)),
+        };
+        let base = unpacked.as_ref().map_or_else(PathBuf::new, |dir| dir.path().to_path_buf());
+        let source = Source::new("scenario.toml", resolved.text.clone(), base);
+        let made = Self::new(source, false)?;
+        let _ = made.resolved.set(Ok(resolved));
+        Ok(Self { unpacked, ..made })
+    }
+
+    /// Returns it with all its files, as run folders keep it; checkpoints belong to this text.
+    pub(crate) fn resolved(&self) -> PyResult<&Resolved> {
+        let resolved = self.resolved.get_or_init(|| self.compiled.resolve(&self.source));
+        resolved.as_ref().map_err(|e| told(e, self.is_dict))
+    }
+
+    /// Returns the same scenario with another seed, compiled anew only where its world needs that.
+    pub(crate) fn reseeded(&self, seed: u64) -> PyResult<Self> {
+        let source = self.source.clone().with(&[format!("seed={seed}")]);
+        let source = source.map_err(|e| told(&e, self.is_dict))?;
+        let Some(compiled) = self.compiled.reseeded(seed) else {
+            let unpacked = self.unpacked.clone();
+            return Ok(Self { unpacked, ..Self::new(source, self.is_dict)? });
+        };
+        let compiled = compiled.map_err(|e| told(&e, self.is_dict))?;
+        Ok(Self {
+            source,
+            compiled,
+            is_dict: self.is_dict,
+            resolved: OnceLock::new(),
+            unpacked: self.unpacked.clone(),
+        })
+    }
+
+    /// Returns the same scenario with other values.
+    pub(crate) fn with(&self, overrides: &[String]) -> PyResult<Self> {
+        let source = self.source.clone().with(overrides).map_err(|e| told(&e, self.is_dict))?;
+        Ok(Self { unpacked: self.unpacked.clone(), ..Self::new(source, self.is_dict)? })
+    }
+}
+
+fn told(error: &InputError, is_dict: bool) -> PyErr {
+    if is_dict { error::input_of_dict(error) } else { error::input(error) }
+}
+
+fn unpack(files: &[(String, Vec<u8>)]) -> PyResult<tempfile::TempDir> {
+    let stored = || {
+        let dir = tempfile::tempdir()?;
+        for (name, bytes) in files {
+            let path = dir.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap_or(dir.path()))?;
+            std::fs::write(path, bytes)?;
+        }
+        Ok(dir)
+    };
+    let failed = |e: std::io::Error| error::RecordError::new_err(format!("cannot unpack: {e}"));
+    stored().map_err(failed)
+}
+
+/// Returns a scenario from whatever stands for one: a path, a dict, or a scenario.
+pub(crate) fn made(scenario: &Bound<'_, PyAny>) -> PyResult<Arc<Made>> {
+    if let Ok(scenario) = scenario.cast::<Scenario>() {
+        return Ok(Arc::clone(&scenario.get().0));
+    }
+    of_any(Some(scenario), None, None).map(Arc::new)
+}
+
+fn of_any(
+    scenario: Option<&Bound<'_, PyAny>>,
+    text: Option<&str>,
+    base: Option<PathBuf>,
+) -> PyResult<Made> {
+    let base = base.unwrap_or_default();
+    match (scenario, text) {
+        (None, Some(text)) => Made::new(Source::new("text", text, base), false),
+        (Some(given), None) => match given.cast::<PyMapping>() {
+            Ok(mapping) => Made::new(of_dict(mapping, &base)?, true),
+            Err(_) => {
+                let path: PathBuf = given.extract().map_err(|_| {
+                    let cause = format!("{given} is no path, dict or Scenario");
+                    wrong("scenario", cause, "give a path or a dict, or text=...")
+                })?;
+                let (source, compiled) =
+                    sidestep_session::read(WORLDS, &path, &[]).map_err(|e| error::input(&e))?;
+                let resolved = OnceLock::new();
+                Ok(Made { source, compiled, is_dict: false, resolved, unpacked: None })
+            }
+        },
+        _ => {
+            let remedy = "give a path, a dict or a Scenario, or text=...";
+            Err(wrong("Scenario", "it needs one scenario", remedy))
+        }
+    }
+}
+
+/// Returns the scenario of a dict; `format` may be left out there.
+fn of_dict(mapping: &Bound<'_, PyMapping>, base: &Path) -> PyResult<Source> {
+    let mut table = table(mapping, "")?;
+    table.entry("format").or_insert(toml::Value::Integer(1));
+    let text = toml::to_string(&table)
+        .map_err(|e| wrong("scenario", e.to_string(), "give what a scenario file may hold"))?;
+    Ok(Source::new("scenario", text, base))
+}
+
+#[pymethods]
+impl Scenario {
+    #[new]
+    #[pyo3(signature = (scenario=None, *, text=None, base=None))]
+    fn new(
+        scenario: Option<&Bound<'_, PyAny>>,
+        text: Option<&str>,
+        base: Option<PathBuf>,
+    ) -> PyResult<Self> {
+        of_any(scenario, text, base).map(|made| Self(Arc::new(made)))
+    }
+
+    /// Returns the same scenario with other values: `set(seed=3)`, `set({"robots.0.count": 5})`. A dotted key goes by tables and
+    /// by the numbers of arrays, as `--set` of the command does.
+    ///
+    /// >>> import sidestep
+    /// >>> scenario = sidestep.Scenario({"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2}]})
+    /// >>> scenario.set({"robots.0.count": 4}, seed=9).agents
+    /// 4
+    #[pyo3(signature = (values=None, /, **keys))]
+    fn set(
+        &self,
+        values: Option<&Bound<'_, PyMapping>>,
+        keys: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let mut overrides = Vec::new();
+        let keys = keys.map(|keys| keys.as_any().cast::<PyMapping>()).transpose()?;
+        for mapping in values.into_iter().chain(keys) {
+            for entry in mapping.items()?.iter() {
+                let (key, value): (String, Bound<'_, PyAny>) = entry.extract()?;
+                overrides.push(format!("{key}={}", to_toml(&value, &key)?));
+            }
+        }
+        self.0.with(&overrides).map(|made| Self(Arc::new(made)))
+    }
+
+    /// Returns what will surprise its author, the weightiest first: `key: words`.
+    fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        let remarks = self.0.compiled.remarks();
+        list(py, remarks.into_iter().map(|remark| format!("{}: {}", remark.key, remark.words)))
+    }
+
+    /// Name of its world.
+    #[getter]
+    fn world(&self) -> &'static str {
+        self.0.compiled.world()
+    }
+
+    /// Its name; may be empty.
+    #[getter]
+    fn name(&self) -> String {
+        self.0.compiled.plan().name
+    }
+
+    /// Its seed, from which all randomness grows.
+    #[getter]
+    fn seed(&self) -> u64 {
+        self.0.compiled.plan().seed
+    }
+
+    /// Number of cycles that it asks for.
+    #[getter]
+    fn cycles(&self) -> u64 {
+        self.0.compiled.plan().cycles
+    }
+
+    /// Number of bodies that are simulated.
+    #[getter]
+    fn agents(&self) -> usize {
+        self.0.compiled.bodies()
+    }
+
+    /// The text of its file, with the values that were set.
+    #[getter]
+    fn text(&self) -> &str {
+        &self.0.source.text
+    }
+
+    /// Pickled with all files that it names.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bundle)> {
+        let maker = slf.py().import("sidestep._native")?.getattr("unpack_scenario")?;
+        let Resolved { text, files } = slf.get().0.resolved()?.clone();
+        Ok((maker, (text, files)))
+    }
+
+    fn __repr__(&self) -> String {
+        let plan = self.0.compiled.plan();
+        let (world, n) = (self.0.compiled.world(), self.0.compiled.bodies());
+        let name =
+            if plan.name.is_empty() { world.into() } else { format!("{world} {}", plan.name) };
+        format!("Scenario({name}, {n} bodies, seed {}, {} cycles)", plan.seed, plan.cycles)
+    }
+}
+
+/// A scenario's text, and its files by name.
+pub(crate) type Bundle = (String, Vec<(String, Vec<u8>)>);
+
+/// Returns the scenario that was pickled.
+#[pyfunction]
+pub(crate) fn unpack_scenario(text: String, files: Vec<(String, Vec<u8>)>) -> PyResult<Scenario> {
+    Made::unpacked(Resolved { text, files }).map(|made| Scenario(Arc::new(made)))
+}
+
+/// Returns the JSON Schema of the scenarios of a world, or of any, as a dict.
+#[pyfunction]
+#[pyo3(signature = (world=None))]
+pub(crate) fn schema(py: Python<'_>, world: Option<&str>) -> PyResult<Py<PyAny>> {
+    match WORLDS.schema(world) {
+        Some(schema) => to_python(py, &schema),
+        None => {
+            let (names, world) = (WORLDS.names().join(", "), world.unwrap_or_default());
+            Err(wrong(
+                "schema",
+                format!("there is no world `{world}`"),
+                format!("it is one of {names}"),
+            ))
+        }
+    }
+}
+
+/// Returns the names of the worlds.
+#[pyfunction]
+pub(crate) fn worlds() -> Vec<&'static str> {
+    WORLDS.names()
+}

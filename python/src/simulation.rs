@@ -1,0 +1,539 @@
+//! Simulations that Python advances, observes and orders.
+
+use crate::arrays::{column, ids, numbers, rows, texts};
+use crate::decide::{Deciding, Numbered, decided};
+use crate::error::{self, ClosedError, wrong};
+use crate::json::to_python;
+use crate::scenario::{Bundle, Made, made};
+use crate::space::{Room, Team};
+use crate::table::Table;
+use crate::watch::Signals;
+use numpy::{PyArray1, PyArray3, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
+use sidestep::kernel::control::{self, Orders};
+use sidestep::kernel::view::{Body, Kind, Look};
+use sidestep::kernel::{Cycle, EntityId, Plan, Simulation as AnySimulation};
+use sidestep::scenario::{Resolved, Source};
+use sidestep_draw::Film;
+use sidestep_session::{Journey, Keep};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// A run of a scenario, at its start.
+///
+/// Simulation(scenario, *, seed=None, workers=1, record=False, out=None, replace=False): `scenario` is a Scenario, a path
+/// or a dict. With `record` the rows of all tables are kept in memory (see `tables`); with `out` they go to a run folder, as
+/// `sidestep run --out` writes it, and `close` completes it. Same scenario and seed, same bits: whatever the
+/// workers, as the command and the library.
+///
+/// It may be used from several threads, one at a time; Python's lock is released while it advances, and Ctrl-C stops it between
+/// two cycles. It can be pickled: its whole state goes along, but no rows.
+///
+/// >>> import sidestep
+/// >>> sim = sidestep.Simulation({"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2}]})
+/// >>> sim.step(10)
+/// 10
+/// >>> sim.cycle
+/// 10
+#[pyclass(module = "sidestep", frozen)]
+pub(crate) struct Simulation {
+    scenario: Arc<Made>,
+    workers: usize,
+    /// Its teams, which never change: they are asked for in every cycle.
+    teams: Vec<Arc<control::Team>>,
+    /// `None` when it is closed.
+    journey: Mutex<Option<Journey>>,
+    /// The view of its pictures, with their width in pixels.
+    film: Mutex<Option<(u32, Film)>>,
+}
+
+impl Simulation {
+    fn at_start(scenario: Arc<Made>, workers: usize, keep: Keep<'_>) -> PyResult<Self> {
+        if workers == 0 {
+            return Err(wrong("workers", "0 workers cannot simulate", "give 1 or more"));
+        }
+        // Without a folder it is identified by the text that a folder would have: checkpoints fit both.
+        let source = match keep.folder {
+            Some(_) => scenario.source.clone(),
+            None => {
+                let text = scenario.resolved()?.text.clone();
+                Source { text, ..scenario.source.clone() }
+            }
+        };
+        let journey = Journey::start(scenario.compiled.as_ref(), &source, workers, keep, None);
+        let journey = journey.map_err(|e| error::session(&e))?;
+        let teams = journey.simulation().teams().iter().cloned().map(Arc::new).collect();
+        let journey = Mutex::new(Some(journey));
+        Ok(Self { scenario, workers, teams, journey, film: Mutex::default() })
+    }
+
+    /// Works with the run while other threads of Python go on.
+    fn with<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut Journey) -> PyResult<T> + Send,
+    ) -> PyResult<T> {
+        py.detach(|| {
+            let mut journey = self.journey.lock().unwrap_or_else(PoisonError::into_inner);
+            work(journey.as_mut().ok_or_else(closed)?)
+        })
+    }
+
+    /// Reads something of the run.
+    fn ask<T: Send>(
+        &self,
+        py: Python<'_>,
+        ask: impl FnOnce(&dyn AnySimulation) -> T + Send,
+    ) -> PyResult<T> {
+        self.with(py, |journey| Ok(ask(journey.simulation())))
+    }
+
+    /// Advances from the cycle at which it stands to the one that `goal` returns for it, or to the end of the run, and
+    /// returns the number of cycles done.
+    ///
+    /// The cycle is read by who then advances, with no other thread in between: of two threads that step at once, each
+    /// adds its own step.
+    fn advance_from(
+        &self,
+        py: Python<'_>,
+        goal: impl FnOnce(Cycle) -> Cycle + Send,
+    ) -> PyResult<u64> {
+        let signals = Signals::default();
+        let done = py.detach(|| {
+            let mut held = self.journey.lock().unwrap_or_else(PoisonError::into_inner);
+            let journey = held.as_mut().ok_or_else(closed)?;
+            let from = journey.cycle();
+            let advanced = journey.advance_to(goal(from).max(from), &signals);
+            let done = journey.cycle() - from;
+            if advanced.is_err() {
+                // A run that broke off has no state that anybody can use.
+                *held = None;
+            }
+            advanced.map(|()| done).map_err(|e| error::session(&e))
+        })?;
+        signals.into_result()?;
+        Ok(done)
+    }
+
+    /// Returns a team by number or name, with its number.
+    fn named(&self, team: Option<&Bound<'_, PyAny>>) -> PyResult<Numbered> {
+        let Some(team) = team else { return self.numbered(0) };
+        if let Ok(number) = team.extract::<usize>() {
+            return self.numbered(number);
+        }
+        let name: String = team.extract()?;
+        let position = self.teams.iter().position(|team| team.name == name);
+        position.map(|k| (k, Arc::clone(&self.teams[k]))).ok_or_else(|| {
+            let names: Vec<_> = self.teams.iter().map(|team| team.name.as_str()).collect();
+            let names = names.join(", ");
+            error::OrderError::new_err(format!(
+                "there is no team `{name}`; the scenario has {names}"
+            ))
+        })
+    }
+
+    fn numbered(&self, number: usize) -> PyResult<Numbered> {
+        let team = self.teams.get(number).map(|team| (number, Arc::clone(team)));
+        team.ok_or_else(|| {
+            let teams = self.teams.len();
+            let words = format!("there is no team {number}; the scenario has {teams}, from 0");
+            error::OrderError::new_err(words)
+        })
+    }
+
+    /// Returns the team of an agent; the first one for an agent that is in none, whose order will be refused.
+    fn team_of(&self, agent: Option<EntityId>) -> PyResult<Numbered> {
+        let has = |team: &Arc<control::Team>| {
+            agent.is_some_and(|id| team.agents.binary_search(&id).is_ok())
+        };
+        self.numbered(self.teams.iter().position(has).unwrap_or(0))
+    }
+
+    fn perceived<'py>(
+        &self,
+        py: Python<'py>,
+        (number, team): &Numbered,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let mut room = Room::of(team);
+        let written = self.with(py, |journey| {
+            let written = journey.simulation().observe(*number, &mut room.cells());
+            written.map_err(|e| error::order(&e)).map(|()| room)
+        });
+        written?.into_dict(py, team)
+    }
+
+    /// Orders something of agents of a team.
+    fn ordered(
+        &self,
+        py: Python<'_>,
+        order: &str,
+        values: &Bound<'_, PyAny>,
+        agents: &[EntityId],
+        team: &control::Team,
+    ) -> PyResult<()> {
+        let shape = team.ordered.iter().find(|space| space.name == order).map(|s| &s.shape[..]);
+        let values = numbers(py, order, values, agents.len(), shape)?;
+        self.with(py, |journey| {
+            let orders = Orders { order, agents, values: &values };
+            journey.simulation_mut().order(&orders).map_err(|e| error::order(&e))
+        })
+    }
+
+    /// Returns the end that the scenario plans, or another one.
+    fn end(&self, until: Option<Cycle>) -> Cycle {
+        until.unwrap_or_else(|| self.scenario.compiled.plan().cycles)
+    }
+}
+
+fn closed() -> PyErr {
+    ClosedError::new_err(
+        "the simulation is closed; make a new one, and restore a checkpoint in that",
+    )
+}
+
+#[pymethods]
+impl Simulation {
+    #[new]
+    #[pyo3(signature = (scenario, *, seed=None, workers=1, record=false, out=None, replace=false))]
+    fn new(
+        scenario: &Bound<'_, PyAny>,
+        seed: Option<u64>,
+        workers: usize,
+        record: bool,
+        out: Option<PathBuf>,
+        replace: bool,
+    ) -> PyResult<Self> {
+        let mut scenario = made(scenario)?;
+        if let Some(seed) = seed.filter(|&seed| seed != scenario.compiled.plan().seed) {
+            scenario = Arc::new(scenario.reseeded(seed)?);
+        }
+        let keep = Keep { folder: out.as_deref(), mcap: None, replace };
+        let simulation = Self::at_start(scenario, workers, keep)?;
+        if record {
+            let mut journey = simulation.journey.lock().unwrap_or_else(PoisonError::into_inner);
+            let journey = journey.as_mut().ok_or_else(closed)?;
+            journey.keep_rows().map_err(|e| error::input(&e))?;
+        }
+        Ok(simulation)
+    }
+
+    /// Advances by `cycles` cycles (one if not said), and returns how many were done: fewer when nothing can happen
+    /// anymore.
+    #[pyo3(signature = (cycles=1))]
+    fn step(&self, py: Python<'_>, cycles: u64) -> PyResult<u64> {
+        self.advance_from(py, |now| now.saturating_add(cycles))
+    }
+
+    /// Advances to cycle `until`, by default the planned end, and returns how many cycles were done.
+    ///
+    /// With `decide`, a function or a dict of functions by team, agents are decided from outside: before each
+    /// cycle it is called with a dict of what all agents of a team observe (arrays of the shape (agents, ...)) and with `state`,
+    /// and returns their orders: a dict of arrays by name, or the array of the only or first order.
+    #[pyo3(signature = (until=None, *, decide=None, state=None))]
+    fn run(
+        slf: &Bound<'_, Self>,
+        until: Option<Cycle>,
+        decide: Option<&Bound<'_, PyAny>>,
+        state: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<u64> {
+        let simulation = slf.get();
+        match decide {
+            None => {
+                let until = simulation.end(until);
+                simulation.advance_from(slf.py(), |_| until)
+            }
+            Some(decide) => decided(slf.py(), simulation, decide, state, simulation.end(until)),
+        }
+    }
+
+    /// The scenario.
+    #[getter]
+    fn scenario(&self) -> crate::scenario::Scenario {
+        crate::scenario::Scenario(Arc::clone(&self.scenario))
+    }
+
+    /// Number of workers.
+    #[getter]
+    fn workers(&self) -> usize {
+        self.workers
+    }
+
+    /// Cycles done.
+    #[getter]
+    fn cycle(&self, py: Python<'_>) -> PyResult<u64> {
+        self.ask(py, |run| run.cycle())
+    }
+
+    /// Whether nothing can happen anymore, e.g. because everybody has arrived.
+    #[getter]
+    fn is_over(&self, py: Python<'_>) -> PyResult<bool> {
+        self.ask(py, |run| run.is_over())
+    }
+
+    /// Digest of the state, in hexadecimal: equal for equal scenario, seed, cycle and orders.
+    #[getter]
+    fn digest(&self, py: Python<'_>) -> PyResult<String> {
+        self.ask(py, |run| run.digest().to_string())
+    }
+
+    /// Returns the measurements of the run so far, as the command's summary has them.
+    fn metrics(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        to_python(py, &self.ask(py, |run| run.metrics())?)
+    }
+
+    /// Returns the measurements of each agent.
+    fn agent_metrics(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        to_python(py, &self.ask(py, |run| run.agent_metrics())?)
+    }
+
+    /// The teams: agents that observe, and are ordered, alike.
+    #[getter]
+    fn teams<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        crate::json::list(py, self.teams.iter().cloned().map(Team))
+    }
+
+    /// Returns what the agents of a team (by number or name) observe before the next cycle: arrays by name, of the shape (agents, ...),
+    /// in the order of `Team.agents`. It is what an agent of its own would perceive, errors and all.
+    #[pyo3(signature = (team=None))]
+    fn observe<'py>(
+        &self,
+        py: Python<'py>,
+        team: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let team = self.named(team)?;
+        self.perceived(py, &team)
+    }
+
+    /// Orders something of agents for the next cycle: `order("action", [0, 2])`. `values` has a row for each
+    /// of `agents` (all of the team, by default), or is one number for all. An order stands until its agent has
+    /// acted.
+    ///
+    /// Raises OrderError; nobody is ordered anything then.
+    #[pyo3(signature = (name, values, *, agents=None, team=None))]
+    fn order(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        values: &Bound<'_, PyAny>,
+        agents: Option<&Bound<'_, PyAny>>,
+        team: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let agents = agents.map(|agents| ids(py, agents)).transpose()?;
+        let (_, team) = match (team, &agents) {
+            (None, Some(agents)) => self.team_of(agents.first().copied())?,
+            (team, _) => self.named(team)?,
+        };
+        let agents = agents.as_deref().unwrap_or(&team.agents);
+        self.ordered(py, name, values, agents, &team)
+    }
+
+    /// Returns the state as bytes, for `restore`; run folders of the same scenario hold the like.
+    fn checkpoint<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = self.ask(py, |run| run.checkpoint())?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Goes on from a checkpoint of the same scenario.
+    ///
+    /// Raises CheckpointError when it is damaged, or belongs to another scenario or version.
+    fn restore(&self, py: Python<'_>, checkpoint: Vec<u8>) -> PyResult<()> {
+        self.with(py, |journey| {
+            let restored = journey.simulation_mut().restore(&checkpoint);
+            restored.map_err(|e| error::checkpoint(&e))
+        })
+    }
+
+    /// Returns an independent copy in the same state, which records nothing.
+    fn copy(&self, py: Python<'_>) -> PyResult<Self> {
+        let bytes = self.ask(py, |run| run.checkpoint())?;
+        let copy = Self::at_start(Arc::clone(&self.scenario), self.workers, Keep::default())?;
+        copy.restore(py, bytes)?;
+        Ok(copy)
+    }
+
+    fn __copy__(&self, py: Python<'_>) -> PyResult<Self> {
+        self.copy(py)
+    }
+
+    fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> PyResult<Self> {
+        self.copy(py)
+    }
+
+    /// Pickled with its scenario, all files of it, and its state.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
+        let (py, simulation) = (slf.py(), slf.get());
+        let maker = py.import("sidestep._native")?.getattr("rebuild")?;
+        let Resolved { text, files } = simulation.scenario.resolved()?.clone();
+        Ok((maker, ((text, files), simulation.workers, simulation.checkpoint(py)?)))
+    }
+
+    /// Returns all bodies as arrays: `kind` and `condition` (text), `number`, `part` (-1 where there are no parts), `at_m` (n, 3),
+    /// `turn` (n, 4: a unit quaternion x, y, z, w), `velocity_m_s` (n, 3), besides `cycle` and `time_s`.
+    fn snapshot<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let frame = self.with(py, |journey| Ok(journey.simulation_mut().frame(Look::BODIES)))?;
+        let (dict, bodies) = (PyDict::new(py), &frame.bodies);
+        dict.set_item("cycle", frame.cycle)?;
+        dict.set_item("time_s", frame.time_s)?;
+        dict.set_item("kind", texts(py, bodies, |body| body.kind.name().to_string())?)?;
+        dict.set_item("number", column(py, bodies, |body| body.number))?;
+        dict.set_item("part", column(py, bodies, |body| body.part.map_or(-1, i64::from)))?;
+        dict.set_item("at_m", rows(py, bodies, |body| body.pose.at_m)?)?;
+        dict.set_item("turn", rows(py, bodies, |body| body.pose.turn)?)?;
+        dict.set_item("velocity_m_s", rows(py, bodies, |body| body.velocity_m_s)?)?;
+        let condition = |body: &Body| format!("{:?}", body.state).to_lowercase();
+        dict.set_item("condition", texts(py, bodies, condition)?)?;
+        Ok(dict)
+    }
+
+    /// Draws the present state: an array (height, width, 3) of red, green and blue (uint8).
+    #[pyo3(signature = (width=640))]
+    fn picture<'py>(&self, py: Python<'py>, width: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        let (pixels, width, height) = self.with(py, |journey| {
+            let run = journey.simulation_mut();
+            let frame = run.frame(Look::BODIES);
+            let mut film = self.film.lock().unwrap_or_else(PoisonError::into_inner);
+            let made = film.take().filter(|(its, _)| *its == width);
+            let made = made.map_or_else(|| Film::new(run.scenery(), &[], width), |(_, it)| Ok(it));
+            let made = made.map_err(|e| wrong("width", e.to_string(), "give 1 to 4096 pixels"))?;
+            let (caption, size) = (format!("cycle {}", frame.cycle), made.size_px());
+            let still = made.still(&frame, &[], &caption);
+            let still = still.map_err(|e| error::RecordError::new_err(e.to_string()))?;
+            *film = Some((width, made));
+            let opaque = still.rgba().chunks_exact(4).flat_map(|pixel| &pixel[..3]);
+            Ok((opaque.copied().collect::<Vec<u8>>(), size.0 as usize, size.1 as usize))
+        })?;
+        PyArray1::from_vec(py, pixels).reshape([height, width, 3])
+    }
+
+    /// Returns what a body perceives and decides in the next cycle, and what will come of it, as a dict;
+    /// None where nothing is to tell. Looking changes nothing.
+    #[pyo3(signature = (kind, number, part=None))]
+    fn inspect(
+        &self,
+        py: Python<'_>,
+        kind: &str,
+        number: u32,
+        part: Option<u32>,
+    ) -> PyResult<Py<PyAny>> {
+        let known = Kind::ALL.into_iter().find(|one| one.name() == kind).ok_or_else(|| {
+            let names: Vec<_> = Kind::ALL.iter().map(|kind| kind.name()).collect();
+            wrong(
+                "kind",
+                format!("there is no kind `{kind}`"),
+                format!("one of {}", names.join(", ")),
+            )
+        })?;
+        let told = self.ask(py, |run| {
+            let told = run.inspect((known, number, part));
+            told.and_then(|told| serde_json::to_value(told).ok()).unwrap_or_default()
+        })?;
+        to_python(py, &told)
+    }
+
+    /// Takes the rows that were recorded since the last call: tables by name. Needs `record=True`.
+    fn tables<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let rows = self.with(py, |journey| {
+            let remedy = "make it with record=True; with `out` read its folder when it is closed";
+            if !journey.keeps_rows() {
+                return Err(wrong("tables", "the rows of this run are not kept in memory", remedy));
+            }
+            journey.take_rows().map_err(|e| error::record(&e))
+        })?;
+        let dict = PyDict::new(py);
+        for (schema, columns) in rows {
+            dict.set_item(schema.name.clone(), Table::new(schema, columns)?)?;
+        }
+        Ok(dict)
+    }
+
+    /// Ends the run. A run folder gets its summary and picture: it is complete at the planned end, and can be
+    /// resumed otherwise. Returns the summary as a dict; None if it was closed before.
+    fn close(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let signals = Signals::default();
+        let summary = py.detach(|| {
+            let journey = self.journey.lock().unwrap_or_else(PoisonError::into_inner).take();
+            journey.map(|journey| journey.finish(&signals)).transpose()
+        });
+        match summary.map_err(|e| error::session(&e))? {
+            None => Ok(py.None()),
+            Some(summary) => to_python(py, &serde_json::to_value(&summary).unwrap_or_default()),
+        }
+    }
+
+    fn __enter__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    #[pyo3(signature = (*_raised))]
+    fn __exit__(&self, py: Python<'_>, _raised: &Bound<'_, PyTuple>) -> PyResult<()> {
+        self.close(py).map(drop)
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        let plan = self.scenario.compiled.plan();
+        match self.cycle(py) {
+            Ok(cycle) => format!("Simulation({}, cycle {cycle} of {})", plan.name, plan.cycles),
+            Err(_) => format!("Simulation({}, closed)", plan.name),
+        }
+    }
+}
+
+impl Deciding for Simulation {
+    fn now(&self, py: Python<'_>) -> PyResult<Cycle> {
+        self.cycle(py)
+    }
+
+    fn has_ended(&self, py: Python<'_>) -> PyResult<bool> {
+        self.is_over(py)
+    }
+
+    fn plan(&self) -> Plan {
+        self.scenario.compiled.plan()
+    }
+
+    fn team(&self, team: &Bound<'_, PyAny>) -> PyResult<Numbered> {
+        self.named(Some(team))
+    }
+
+    fn ordered_teams(&self) -> Vec<Numbered> {
+        let teams = self.teams.iter().cloned().enumerate();
+        teams.filter(|(_, team)| !team.ordered.is_empty()).collect()
+    }
+
+    fn observed<'py>(&self, py: Python<'py>, team: &Numbered) -> PyResult<Bound<'py, PyDict>> {
+        self.perceived(py, team)
+    }
+
+    fn give(
+        &self,
+        py: Python<'_>,
+        order: &str,
+        values: &Bound<'_, PyAny>,
+        team: &control::Team,
+    ) -> PyResult<()> {
+        self.ordered(py, order, values, &team.agents, team)
+    }
+
+    fn advance(&self, py: Python<'_>) -> PyResult<()> {
+        self.step(py, 1).map(drop)
+    }
+}
+
+/// The arguments of [`rebuild`].
+type Pickled<'py> = (Bundle, usize, Bound<'py, PyBytes>);
+
+/// Returns the simulation that was pickled.
+#[pyfunction]
+pub(crate) fn rebuild(
+    py: Python<'_>,
+    scenario: Bundle,
+    workers: usize,
+    checkpoint: Vec<u8>,
+) -> PyResult<Simulation> {
+    let (text, files) = scenario;
+    let scenario = Arc::new(Made::unpacked(Resolved { text, files })?);
+    let simulation = Simulation::at_start(scenario, workers, Keep::default())?;
+    simulation.restore(py, checkpoint)?;
+    Ok(simulation)
+}

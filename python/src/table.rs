@@ -1,0 +1,269 @@
+//! Tables: rows as Arrow and NumPy arrays.
+
+use crate::error;
+use crate::json::list;
+use arrow_array::ffi_stream::FFI_ArrowArrayStream;
+use arrow_array::types::UInt32Type;
+use arrow_array::{
+    ArrayRef, BooleanArray, DictionaryArray, PrimitiveArray, RecordBatch, RecordBatchIterator,
+    RecordBatchReader, StringArray, UInt32Array,
+};
+use arrow_buffer::{NullBuffer, ScalarBuffer};
+use arrow_schema::ffi::FFI_ArrowSchema;
+use arrow_schema::{ArrowError, DataType, Field, Schema};
+use numpy::{PyArray1, ToPyArray};
+use pyo3::IntoPyObjectExt;
+use pyo3::exceptions::PyKeyError;
+use pyo3::prelude::*;
+use pyo3::types::{PyCapsule, PyDict};
+use sidestep::kernel::ports::{ColumnSpec, ColumnType, TableSchema, Values};
+use sidestep_record::{read_table, tables};
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Rows of one table: what a run records.
+///
+/// It has `__arrow_c_stream__`, so `polars.DataFrame(table)`, `pandas.DataFrame.from_arrow(table)`, `pyarrow.table(table)` and DuckDB take it
+/// without a copy of the numbers; `table["column"]` is a NumPy array.
+#[pyclass(module = "sidestep", frozen)]
+pub(crate) struct Table {
+    schema: TableSchema,
+    batch: RecordBatch,
+}
+
+impl Table {
+    /// Returns a table of these rows; numbers are not copied.
+    pub(crate) fn new(schema: TableSchema, columns: Vec<Values>) -> PyResult<Self> {
+        let fields = schema.columns.iter().map(field).collect::<Vec<_>>();
+        let about = schema.about.iter().cloned().collect::<HashMap<_, _>>();
+        let arrow = Arc::new(Schema::new_with_metadata(fields, about));
+        let arrays = schema.columns.iter().zip(columns).map(|(spec, values)| array(spec, values));
+        let arrays = arrays.collect::<Result<Vec<_>, _>>().map_err(|e| bug(&e))?;
+        let batch = RecordBatch::try_new(arrow, arrays).map_err(|e| bug(&e))?;
+        Ok(Self { schema, batch })
+    }
+
+    fn position(&self, name: &str) -> PyResult<usize> {
+        let known = || {
+            let names: Vec<_> = self.schema.columns.iter().map(|c| c.name.as_str()).collect();
+            names.join(", ")
+        };
+        let position = self.schema.columns.iter().position(|column| column.name == name);
+        position.ok_or_else(|| {
+            let table = &self.schema.name;
+            PyKeyError::new_err(format!("no column `{name}` in `{table}`; it has {}", known()))
+        })
+    }
+}
+
+#[pymethods]
+impl Table {
+    /// Name of the table.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.schema.name
+    }
+
+    /// Names of the columns.
+    #[getter]
+    fn columns(&self) -> Vec<&str> {
+        self.schema.columns.iter().map(|column| column.name.as_str()).collect()
+    }
+
+    /// Units by column; only of those that have one.
+    #[getter]
+    fn units<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        for column in &self.schema.columns {
+            if let Some(unit) = column.unit() {
+                dict.set_item(&column.name, unit)?;
+            }
+        }
+        Ok(dict)
+    }
+
+    /// One sentence about each column, by name.
+    #[getter]
+    fn meanings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        for column in &self.schema.columns {
+            dict.set_item(&column.name, &column.meaning)?;
+        }
+        Ok(dict)
+    }
+
+    /// Facts that hold for all rows, such as the side of a box.
+    #[getter]
+    fn about<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        self.schema.about.iter().try_for_each(|(name, fact)| dict.set_item(name, fact))?;
+        Ok(dict)
+    }
+
+    /// The values of a column as a NumPy array. Missing numbers are NaN, and the array is float64 then; text and
+    /// truth values are an array of objects, None where they are missing.
+    fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let position = self.position(name)?;
+        values(py, self.batch.column(position), self.schema.columns[position].ty)
+    }
+
+    fn __contains__(&self, name: &str) -> bool {
+        self.schema.columns.iter().any(|column| column.name == name)
+    }
+
+    fn __len__(&self) -> usize {
+        self.batch.num_rows()
+    }
+
+    fn __repr__(&self) -> String {
+        let columns = self.columns().join(", ");
+        format!("Table({}, {} rows: {columns})", self.schema.name, self.batch.num_rows())
+    }
+
+    /// The schema as an Arrow capsule.
+    fn __arrow_c_schema__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
+        let schema = FFI_ArrowSchema::try_from(&*self.batch.schema()).map_err(|e| bug(&e))?;
+        PyCapsule::new_with_value(py, schema, c"arrow_schema")
+    }
+
+    /// The rows as an Arrow capsule; the numbers are not copied.
+    #[pyo3(signature = (requested_schema=None))]
+    fn __arrow_c_stream__<'py>(
+        &self,
+        py: Python<'py>,
+        requested_schema: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyCapsule>> {
+        // The protocol allows to ignore it.
+        let _ = requested_schema;
+        let batches = vec![Ok::<_, ArrowError>(self.batch.clone())];
+        let reader: Box<dyn RecordBatchReader + Send> =
+            Box::new(RecordBatchIterator::new(batches, self.batch.schema()));
+        PyCapsule::new_with_value(py, FFI_ArrowArrayStream::new(reader), c"arrow_array_stream")
+    }
+}
+
+fn bug(error: &ArrowError) -> PyErr {
+    error::RecordError::new_err(format!("this is a bug in sidestep: {error}"))
+}
+
+fn field(spec: &ColumnSpec) -> Field {
+    let ty = match spec.ty {
+        ColumnType::U32 => DataType::UInt32,
+        ColumnType::U64 => DataType::UInt64,
+        ColumnType::I32 => DataType::Int32,
+        ColumnType::I64 => DataType::Int64,
+        ColumnType::F64 => DataType::Float64,
+        ColumnType::Bool => DataType::Boolean,
+        ColumnType::Label => {
+            DataType::Dictionary(Box::new(DataType::UInt32), Box::new(DataType::Utf8))
+        }
+        ColumnType::Text => DataType::Utf8,
+    };
+    let unit = spec.unit().map(|unit| ("unit".to_string(), unit.to_string()));
+    let meaning = ("meaning".to_string(), spec.meaning.clone());
+    let about: HashMap<_, _> = [Some(meaning), unit].into_iter().flatten().collect();
+    Field::new(&spec.name, ty, spec.is_nullable).with_metadata(about)
+}
+
+fn array(spec: &ColumnSpec, values: Values) -> Result<ArrayRef, ArrowError> {
+    Ok(match values {
+        Values::U32(cells) => numbers::<_, arrow_array::types::UInt32Type>(cells.into_parts()),
+        Values::U64(cells) => numbers::<_, arrow_array::types::UInt64Type>(cells.into_parts()),
+        Values::I32(cells) => numbers::<_, arrow_array::types::Int32Type>(cells.into_parts()),
+        Values::I64(cells) => numbers::<_, arrow_array::types::Int64Type>(cells.into_parts()),
+        Values::F64(cells) => numbers::<_, arrow_array::types::Float64Type>(cells.into_parts()),
+        Values::Bool(cells) => {
+            Arc::new(cells.options().map(|cell| cell.copied()).collect::<BooleanArray>())
+        }
+        Values::Label(cells) => {
+            let (keys, valid) = cells.into_parts();
+            let keys = UInt32Array::new(ScalarBuffer::from(keys), valid.map(NullBuffer::from));
+            let labels: ArrayRef = Arc::new(StringArray::from_iter_values(&spec.labels));
+            Arc::new(DictionaryArray::<UInt32Type>::try_new(keys, labels)?)
+        }
+        Values::Text(texts) => Arc::new(texts.options().collect::<StringArray>()),
+    })
+}
+
+/// Returns numbers as an Arrow array, without a copy.
+fn numbers<T, A>((values, valid): (Vec<T>, Option<Vec<bool>>)) -> ArrayRef
+where
+    A: arrow_array::ArrowPrimitiveType<Native = T>,
+    T: arrow_buffer::ArrowNativeType,
+{
+    let nulls = valid.map(NullBuffer::from);
+    Arc::new(PrimitiveArray::<A>::new(ScalarBuffer::from(values), nulls))
+}
+
+/// Returns an array of objects, so that it can be compared and be a mask.
+fn objects<'py, T: IntoPyObject<'py>>(
+    py: Python<'py>,
+    items: impl IntoIterator<Item = T>,
+) -> PyResult<Bound<'py, PyAny>> {
+    py.import("numpy")?.call_method1("array", (list(py, items)?, "O"))
+}
+
+/// Returns a column for NumPy.
+fn values<'py>(py: Python<'py>, array: &ArrayRef, ty: ColumnType) -> PyResult<Bound<'py, PyAny>> {
+    use arrow_array::cast::AsArray;
+    use arrow_array::types::{Float64Type, Int32Type, Int64Type, UInt64Type};
+    match ty {
+        ColumnType::U32 => to_numpy(array.as_primitive::<UInt32Type>(), py, f64::from),
+        ColumnType::U64 => to_numpy(array.as_primitive::<UInt64Type>(), py, |value| value as f64),
+        ColumnType::I32 => to_numpy(array.as_primitive::<Int32Type>(), py, f64::from),
+        ColumnType::I64 => to_numpy(array.as_primitive::<Int64Type>(), py, |value| value as f64),
+        ColumnType::F64 => to_numpy(array.as_primitive::<Float64Type>(), py, |value| value),
+        ColumnType::Bool => objects(py, array.as_boolean().iter()),
+        ColumnType::Text => objects(py, array.as_string::<i32>().iter()),
+        ColumnType::Label => {
+            let labels = array.as_dictionary::<UInt32Type>();
+            let names = labels.values().as_string::<i32>();
+            let name = |key: Option<u32>| key.map(|key| names.value(key as usize));
+            objects(py, labels.keys().iter().map(name))
+        }
+    }
+}
+
+fn to_numpy<'py, A>(
+    array: &PrimitiveArray<A>,
+    py: Python<'py>,
+    as_real: impl Fn(A::Native) -> f64,
+) -> PyResult<Bound<'py, PyAny>>
+where
+    A: arrow_array::ArrowPrimitiveType,
+    A::Native: numpy::Element,
+{
+    use arrow_array::Array;
+    if array.null_count() == 0 {
+        return PyArray1::from_slice(py, array.values()).into_bound_py_any(py);
+    }
+    let real: Vec<f64> = array.iter().map(|cell| cell.map_or(f64::NAN, &as_real)).collect();
+    real.to_pyarray(py).into_bound_py_any(py)
+}
+
+/// Returns the tables of a run folder or a sweep's folder by name.
+///
+/// ``tables`` names those that are wanted; all of them otherwise. A table of a run that has not ended reaches to its last
+/// checkpoint.
+///
+/// Raises InputError when there is no such folder or table, or a file is damaged.
+#[pyfunction]
+#[pyo3(signature = (folder, tables=None))]
+pub(crate) fn read<'py>(
+    py: Python<'py>,
+    folder: PathBuf,
+    tables: Option<Vec<String>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let wanted = tables;
+    let read = || {
+        let names = wanted.map_or_else(|| self::tables(&folder), Ok)?;
+        names.into_iter().map(|name| read_table(&folder, &name, ..).map(|t| (name, t))).collect()
+    };
+    let read: Result<Vec<_>, sidestep::kernel::InputError> = py.detach(read);
+    let dict = PyDict::new(py);
+    for (name, table) in read.map_err(|e| error::input(&e))? {
+        dict.set_item(name, Table::new(table.schema, table.columns)?)?;
+    }
+    Ok(dict)
+}
