@@ -20,11 +20,13 @@ const KNOWN: &str = include_str!("../circles.txt");
 const THREADS: [&str; 4] = ["crates/kernel", "crates/session", "crates/server", "crates/cli"];
 
 /// Packages that only some crates may depend on, with the folders of those crates.
-const RESERVED: [(&str, &[&str]); 6] = [
+const RESERVED: [(&str, &[&str]); 8] = [
     ("parquet", &["crates/record"]),
     ("mcap", &["crates/record", "crates/import"]),
     ("foxglove", &["crates/record"]),
+    ("arrow-array", &["python"]),
     ("clap", &["crates/cli"]),
+    ("pyo3", &["python"]),
     ("axum", &["crates/server"]),
     ("tokio", &["crates/server", "crates/link"]),
 ];

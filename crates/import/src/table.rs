@@ -123,6 +123,8 @@ pub fn rows<'a, const N: usize>(
 pub struct CsvTable {
     place: String,
     header: Vec<String>,
+    /// Line of the header, from 1.
+    header_line: usize,
     /// Line of each row, from 1.
     lines: Vec<u32>,
     /// All fields of all rows in one string.
@@ -154,7 +156,7 @@ impl CsvTable {
             .trim(csv::Trim::All)
             .comment(Some(b'#'))
             .from_reader(text.as_bytes());
-        let header = reader.headers().map_err(|e| csv_error(place, &e))?;
+        let header = reader.headers().map_err(|e| csv_error(place, text, &e))?;
         let header: Vec<String> = header.iter().map(str::to_owned).collect();
         if header.is_empty() {
             return Err(InputError::new(place, "the file is empty", "write a header row first"));
@@ -162,19 +164,20 @@ impl CsvTable {
         let mut table = Self {
             place: place.to_string(),
             header,
+            header_line: data_lines(text).next().map_or(1, |(line, _)| line),
             lines: Vec::new(),
             fields: String::new(),
             ends: Vec::new(),
         };
         let mut record = csv::StringRecord::new();
-        while reader.read_record(&mut record).map_err(|e| csv_error(place, &e))? {
-            table.push(&record);
+        while reader.read_record(&mut record).map_err(|e| csv_error(place, text, &e))? {
+            table.push(text, &record);
         }
         Ok(table)
     }
 
-    fn push(&mut self, record: &csv::StringRecord) {
-        self.lines.push(record.position().map_or(0, |p| p.line() as u32));
+    fn push(&mut self, text: &str, record: &csv::StringRecord) {
+        self.lines.push(record.position().map_or(0, |p| line_of(text, p) as u32));
         for field in record {
             self.fields.push_str(field);
             // MAX_CSV_BYTES fits.
@@ -192,16 +195,23 @@ impl CsvTable {
         self.header.iter().position(|column| column == name)
     }
 
-    /// Returns the index of the column called `name`.
+    /// Returns the indices of the columns called `names`.
     ///
     /// # Errors
-    /// When there is none.
-    pub fn column(&self, name: &str) -> Result<usize, InputError> {
-        self.find(name).ok_or_else(|| {
-            let found = self.header.join(",");
-            let cause = format!("no column `{name}` in the header `{}`", shorten(&found));
-            InputError::new(&self.place, cause, format!("add a column named {name}")).at(1, 1)
-        })
+    /// When some of them are missing: all of these in one error.
+    pub fn columns<const N: usize>(&self, names: [&str; N]) -> Result<[usize; N], InputError> {
+        let missing: Vec<&str> =
+            names.into_iter().filter(|name| self.find(name).is_none()).collect();
+        if missing.is_empty() {
+            return Ok(names.map(|name| self.find(name).expect("none of them is missing")));
+        }
+        let is_wanted = |name: &&str| names.contains(name);
+        let found: Vec<&str> = self.header.iter().map(String::as_str).collect();
+        let (known, other): (Vec<&str>, Vec<&str>) = found.into_iter().partition(is_wanted);
+        let cause =
+            format!("the header lacks {}; it has {}", listed(&missing), has(&known, &other));
+        let remedy = "rename the columns that mean these, or add them";
+        Err(InputError::new(&self.place, cause, remedy).at(self.header_line, 1))
     }
 
     /// Returns the rows, in the order of the file.
@@ -218,7 +228,7 @@ pub struct CsvRow<'a> {
 }
 
 impl<'a> CsvRow<'a> {
-    /// Returns the field in the column at `index`, which [`CsvTable::column`] returned.
+    /// Returns the field in the column at `index`, which [`CsvTable::columns`] returned.
     ///
     /// # Panics
     /// When the header has no such column.
@@ -237,8 +247,39 @@ impl<'a> CsvRow<'a> {
     }
 }
 
-fn csv_error(place: &dyn fmt::Display, error: &csv::Error) -> InputError {
-    let line = error.position().map_or(1, |p| p.line() as usize);
+/// Largest number of columns that an error lists; a table without a header may have very many.
+const LISTED_MAX: usize = 16;
+
+/// Returns the columns of a header as an error lists them: those that are right, then the others.
+fn has(known: &[&str], other: &[&str]) -> String {
+    match (known, other) {
+        (known, []) => listed(known),
+        ([], other) => format!("none of those wanted, but {}", listed(other)),
+        (known, other) => format!("{}, and others: {}", listed(known), listed(other)),
+    }
+}
+
+/// Returns names as an error lists them.
+fn listed(names: &[&str]) -> String {
+    let quoted = names.iter().take(LISTED_MAX).map(|name| format!("`{}`", shorten(name)));
+    let text = quoted.collect::<Vec<_>>().join(", ");
+    match names.len().saturating_sub(LISTED_MAX) {
+        0 if names.is_empty() => "nothing else".into(),
+        0 => text,
+        more => format!("{text} and {more} more"),
+    }
+}
+
+/// Returns the line of the record at `position`, which is where its reader began to look for it: behind
+/// it may be comments and empty lines.
+fn line_of(text: &str, position: &csv::Position) -> usize {
+    let ahead = text.get(position.byte() as usize..).unwrap_or("").lines();
+    let skipped = ahead.take_while(|line| line.is_empty() || line.starts_with('#')).count();
+    position.line() as usize + skipped
+}
+
+fn csv_error(place: &dyn fmt::Display, text: &str, error: &csv::Error) -> InputError {
+    let line = error.position().map_or(1, |p| line_of(text, p));
     let cause = match error.kind() {
         csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
             format!("the row has {len} fields, the header {expected_len}")
@@ -284,14 +325,32 @@ mod tests {
     #[test]
     fn csv_fields_are_found_by_name_and_errors_by_line() {
         let table = CsvTable::parse(&"f.csv", "b, a\n# note\n1, 2\n").unwrap();
-        let a = table.column("a").unwrap();
+        let [a] = table.columns(["a"]).unwrap();
         assert_eq!(table.rows().next().unwrap().field(a).number(&"f").unwrap(), 2.0);
-        assert!(table.column("c").unwrap_err().cause().contains("no column `c`"));
         let error = CsvTable::parse(&"f.csv", "a,b\n1,2\n1\n").unwrap_err();
         assert_eq!(error.position(), Some((3, 1)));
         assert!(CsvTable::parse(&"f.csv", "").is_err());
         let row = CsvTable::parse(&"f.csv", "a,b\n1,x\n").unwrap();
         let error = row.rows().next().unwrap().field(1).number(&"f.csv").unwrap_err();
         assert_eq!(error.position(), Some((2, 3)));
+        let noted = CsvTable::parse(&"f.csv", "# a\n\nb,c\n1,2\n# d\n\n3,4\n").unwrap();
+        let lines: Vec<usize> = noted.rows().map(|row| row.field(0).line).collect();
+        assert_eq!(lines, [4, 7], "comments and empty lines count");
+        let error = CsvTable::parse(&"f.csv", "a,b\r\n1,2\r\n# c\r\n1\r\n").unwrap_err();
+        assert_eq!(error.position(), Some((4, 1)));
+    }
+
+    #[test]
+    fn all_columns_that_a_header_lacks_are_told_at_once_beside_those_it_has() {
+        let table = CsvTable::parse(&"f.csv", "# a note\nx,lat,lon\n1,2,3\n").unwrap();
+        let error = table.columns(["x", "lat_deg", "lon_deg"]).unwrap_err();
+        assert_eq!(error.position(), Some((2, 1)), "the header's line");
+        let cause = "the header lacks `lat_deg`, `lon_deg`; it has `x`, and others: `lat`, `lon`";
+        assert_eq!(error.cause(), cause);
+        let other = table.columns(["a"]).unwrap_err();
+        assert!(other.cause().ends_with("it has none of those wanted, but `x`, `lat`, `lon`"));
+        let wide = (0..40).map(|k| format!("c{k}")).collect::<Vec<_>>().join(",");
+        let error = CsvTable::parse(&"f.csv", &wide).unwrap().columns(["a"]).unwrap_err();
+        assert!(error.cause().ends_with("`c15` and 24 more"), "{}", error.cause());
     }
 }

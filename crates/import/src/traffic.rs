@@ -84,16 +84,18 @@ struct Columns<'a> {
 
 impl<'a> Columns<'a> {
     fn find(table: &'a CsvTable) -> Result<Self, InputError> {
+        let names = ["time_s", "icao24", "lat_deg", "lon_deg", "alt_ft", "gs_kt", "track_deg"];
+        let [time, icao24, lat, lon, altitude, ground_speed, track] = table.columns(names)?;
         Ok(Self {
             place: table.place(),
-            time: table.column("time_s")?,
-            icao24: table.column("icao24")?,
+            time,
+            icao24,
             callsign: table.find("callsign"),
-            lat: table.column("lat_deg")?,
-            lon: table.column("lon_deg")?,
-            altitude: table.column("alt_ft")?,
-            ground_speed: table.column("gs_kt")?,
-            track: table.column("track_deg")?,
+            lat,
+            lon,
+            altitude,
+            ground_speed,
+            track,
             vertical_speed: table.find("vs_fpm"),
         })
     }

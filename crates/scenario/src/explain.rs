@@ -1,12 +1,13 @@
 //! Errors of the TOML reader in words that help.
 
 use super::checked::told_by_a_value;
+use serde::de::DeserializeOwned;
 
-/// Returns cause and remedy of an error of the TOML reader; `also` are known keys that it did not
-/// see, and `otherwise` is the remedy of errors for which there is no better one.
+/// Returns cause and remedy of an error of the TOML reader; `top` are the keys of the top level, some
+/// of which it did not see, and `otherwise` is the remedy of errors for which there is no better one.
 pub(crate) fn explain(
     error: &toml::de::Error,
-    also: &[&str],
+    top: &[&str],
     otherwise: String,
 ) -> (String, String) {
     let message = error.message().trim();
@@ -16,12 +17,13 @@ pub(crate) fn explain(
         return (format!("{key} = {value}"), remedy.into());
     }
     if let Some((found, known)) = named(message, "unknown field `") {
-        let mut known = quoted(known);
-        // The keys of the head are known at the top level only.
-        if path.is_none() {
-            known.extend(also);
-        }
-        return (format!("unknown key `{found}`"), nearest(found, &known));
+        let remedy = match path {
+            None => nearest(found, &[&quoted(known), top].concat()),
+            // In TOML, what follows a [section] belongs to it, wherever its author meant it to be.
+            Some(_) if top.contains(&found) => belongs_to_the_top(found),
+            Some(_) => nearest(found, &quoted(known)),
+        };
+        return (format!("unknown key `{found}`"), remedy);
     }
     if let Some((found, known)) = named(message, "unknown variant `") {
         return (format!("unknown value `{found}`"), nearest(found, &quoted(known)));
@@ -30,6 +32,19 @@ pub(crate) fn explain(
         return (format!("the key `{missing}` is missing"), format!("add `{missing} = ...`"));
     }
     (message.replace('\n', " "), otherwise)
+}
+
+fn belongs_to_the_top(key: &str) -> String {
+    format!(
+        "`{key}` belongs to the top level: above the first [section], or as [{key}] if it is one"
+    )
+}
+
+/// Returns the keys of a table, which its reader tells whoever gives it another one.
+pub(crate) fn keys_of<T: DeserializeOwned>() -> Vec<String> {
+    let Err(error) = toml::from_str::<T>("\"\" = 0") else { return Vec::new() };
+    let told = named(error.message(), "unknown field `").map(|(_, known)| known.to_string());
+    told.iter().flat_map(|known| quoted(known)).map(String::from).collect()
 }
 
 /// Returns the name in backticks after a prefix, and the rest of the message.

@@ -1,9 +1,11 @@
 //! Places of the keys of a scenario in its text, for errors about keys that were read long ago.
 //!
 //! A key is named as overrides name it, `robots.1.count`: elements of arrays by their number, and
-//! a section that stands alone by 0 or without a number.
+//! a section that stands alone by 0 or without a number; names with dots stand in quotes.
 
 use crate::Source;
+use crate::edit::{Part, parts};
+use crate::locate::{locate, path};
 use sidestep_kernel::InputError;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
@@ -32,17 +34,17 @@ impl Source {
     /// Returns the value of a key, if the text has it.
     pub fn value(&self, path: &str) -> Option<Value> {
         let mut found = Value::Table(self.text.parse().ok()?);
-        for part in path.split('.') {
+        for part in parts(path).ok()? {
             if let Value::Array(many) = &mut found
-                && part.parse::<usize>().is_err()
+                && part.number().is_none()
                 && many.len() == 1
             {
                 found = many.remove(0);
             }
-            found = match (found, part.parse::<usize>()) {
-                (Value::Array(many), Ok(index)) => many.into_iter().nth(index)?,
-                (found @ Value::Table(_), Ok(0)) => found,
-                (Value::Table(mut table), _) => table.remove(part)?,
+            found = match (found, part.number()) {
+                (Value::Array(many), Some(index)) => many.into_iter().nth(index)?,
+                (found @ Value::Table(_), Some(0)) => found,
+                (Value::Table(mut table), _) => table.remove(&part.name)?,
                 _ => return None,
             };
         }
@@ -56,20 +58,32 @@ impl Source {
         cause: impl Into<String>,
         remedy: impl Into<String>,
     ) -> InputError {
-        let span = DeTable::parse(&self.text).ok().and_then(|root| {
-            let (span, root) = (root.span(), DeValue::Table(root.into_inner()));
-            find(&Spanned::new(span, root), path).map(|(key, _)| key)
-        });
-        match span {
+        match self.place_of(path) {
             Some(span) => self.error(span, cause, remedy),
             None => self.error(None, cause, remedy).with_key(path),
         }
     }
 
+    /// Returns the place of the first of `keys` that the section at a span has, for errors about keys
+    /// whose values do not know their places; that of the section if it has none of them.
+    pub fn within(&self, section: Range<usize>, keys: &[&str]) -> Range<usize> {
+        let way = locate(&self.text, &section).map(|way| path(&way));
+        let place = |key: &&str| self.place_of(&format!("{}.{key}", way.as_ref()?));
+        keys.iter().find_map(place).unwrap_or(section)
+    }
+
+    /// Returns the place of a key, if the text has it.
+    fn place_of(&self, path: &str) -> Option<Range<usize>> {
+        let root = DeTable::parse(&self.text).ok()?;
+        let (span, root) = (root.span(), DeValue::Table(root.into_inner()));
+        find(&Spanned::new(span, root), path).map(|(key, _)| key)
+    }
+
     /// Creates the error for a key that is given and does nothing; `because` completes the
     /// sentence "`key` does nothing ...".
     pub fn idle(&self, path: &str, because: &str) -> InputError {
-        let key = path.rsplit('.').next().unwrap_or(path);
+        let last = parts(path).ok().and_then(|mut parts| parts.pop());
+        let key = last.map_or_else(|| path.to_string(), |part| part.name);
         self.error_at(path, format!("`{key}` does nothing {because}"), "leave it out")
     }
 }
@@ -85,26 +99,26 @@ fn find<'t, 'i>(
     path: &str,
 ) -> Option<(Range<usize>, &'t Spanned<DeValue<'i>>)> {
     let mut found = (root.span(), root);
-    for part in path.split('.') {
-        found = step(found, part)?;
+    for part in parts(path).ok()? {
+        found = step(found, &part)?;
     }
     Some(found)
 }
 
 fn step<'t, 'i>(
     (span, value): (Range<usize>, &'t Spanned<DeValue<'i>>),
-    part: &str,
+    part: &Part,
 ) -> Option<(Range<usize>, &'t Spanned<DeValue<'i>>)> {
-    match (value.get_ref(), part.parse::<usize>()) {
-        (DeValue::Array(many), Ok(index)) => many.get(index).map(|value| (value.span(), value)),
+    match (value.get_ref(), part.number()) {
+        (DeValue::Array(many), Some(index)) => many.get(index).map(|value| (value.span(), value)),
         // An array of one may be passed without a number, as in overrides.
-        (DeValue::Array(many), Err(_)) if many.len() == 1 => {
+        (DeValue::Array(many), None) if many.len() == 1 => {
             let only = many.first()?;
             step((only.span(), only), part)
         }
-        (DeValue::Table(_), Ok(0)) => Some((span, value)),
+        (DeValue::Table(_), Some(0)) => Some((span, value)),
         (DeValue::Table(table), _) => {
-            let (key, value) = table.iter().find(|(key, _)| *key.get_ref() == part)?;
+            let (key, value) = table.iter().find(|(key, _)| *key.get_ref() == part.name)?;
             Some((key.span(), value))
         }
         _ => None,
@@ -151,6 +165,39 @@ mod tests {
         assert_eq!((of("robots.count"), of("robots.2.count"), of("a.b")), (None, None, None));
         let single = Source::new("s.toml", "[[robots]]\ncount = 2\n", "");
         assert_eq!(single.value("robots.count"), Some(Value::Integer(2)));
+    }
+
+    #[test]
+    fn the_keys_of_a_section_are_found_by_its_span() {
+        let source = Source::new("s.toml", TEXT, "");
+        let section = |header: &str| {
+            let start = TEXT.rfind(header).expect(header);
+            start..start + header.len()
+        };
+        let found = |header, keys: &[&str]| &TEXT[source.within(section(header), keys)];
+        assert_eq!(found("[[robots]]", &["count", "b"]), "b", "the second has no count");
+        assert_eq!(found("{ c = 3 }", &["c"]), "c");
+        assert_eq!(found("[people]", &["n"]), "n");
+        assert_eq!(found("[people]", &["at"]), "[people]");
+    }
+
+    #[test]
+    fn the_keys_that_errors_name_lead_back_to_their_places() {
+        let text =
+            "[kinds.\"a.b\"]\nn = 1\n[kinds.\"0\"]\nn = 2\n[[many]]\n[many.x]\n\"c d\" = [1, 7]\n";
+        let source = Source::new("s.toml", text, "");
+        for part in ["n = 1", "n = 2", "\"c d\"", "7"] {
+            let start = text.find(part).expect(part);
+            let told = source.error(start..start + 1, "c", "r");
+            let key = told.key().expect("a key").to_string();
+            let again = source.error_at(&key, "c", "r");
+            assert_eq!((again.position(), again.key()), (told.position(), told.key()), "{key}");
+        }
+        let value = |key| source.value(key).and_then(|value| value.as_integer());
+        assert_eq!((value("kinds.\"a.b\".n"), value("kinds.'0'.n")), (Some(1), Some(2)));
+        assert_eq!(value("many.0.x.\"c d\".1"), Some(7));
+        assert_eq!((value("kinds.a.b.n"), value("kinds..n"), value("\"")), (None, None, None));
+        assert_eq!(source.idle("kinds.\"a.b\"", "here").cause(), "`a.b` does nothing here");
     }
 
     #[test]

@@ -27,6 +27,12 @@ pub trait Kind: Sync {
         serde_json::json!({ "additionalProperties": true })
     }
 
+    /// The things that seeds decide in a scenario of this world, as a list of nouns with the keys that ask for it;
+    /// empty where a world does not say.
+    fn draws(&self) -> &'static str {
+        ""
+    }
+
     /// Its metrics in words. Reports split the names of those that are not listed.
     fn meanings(&self) -> &'static [Meaning] {
         &[]
@@ -77,6 +83,15 @@ pub trait Compiled: Send + Sync {
     /// # Errors
     /// When a file that it names can no longer be read.
     fn resolve(&self, source: &Source) -> Result<Resolved, InputError>;
+
+    /// Returns the same scenario with another seed, where that takes less than compiling it: a fresh start without
+    /// reading or tabulating again. `None` where it does not.
+    ///
+    /// # Errors
+    /// When the scenario is wrong with that seed.
+    fn reseeded(&self, _seed: u64) -> Option<Result<Box<dyn Compiled>, InputError>> {
+        None
+    }
 
     /// Creates a run at its start; `source` identifies it in checkpoints.
     fn start(&self, source: &Source, workers: usize) -> Box<dyn Simulation>;

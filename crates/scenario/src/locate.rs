@@ -19,6 +19,8 @@ pub(crate) fn path(way: &[Part]) -> String {
     let words: Vec<String> = way
         .iter()
         .map(|part| match part {
+            // Without quotes it would be the number of an element.
+            Part::Name(name) if name.bytes().all(|b| b.is_ascii_digit()) => format!("{name:?}"),
             Part::Name(name) => toml_edit::Key::new(name).display_repr().into_owned(),
             Part::Index(index) => index.to_string(),
         })

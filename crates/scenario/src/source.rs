@@ -1,6 +1,6 @@
 //! The text of a scenario, and its parser.
 
-use super::explain::explain;
+use super::explain::{explain, keys_of};
 use super::locate::{locate, path};
 use crate::Spanned;
 use schemars::JsonSchema;
@@ -101,7 +101,11 @@ impl Source {
     /// # Errors
     /// The same as for [`Self::parse`].
     pub fn parse_world<T: DeserializeOwned>(&self) -> Result<(Head, T), InputError> {
-        let told = |error| self.explained(&error, &HEAD);
+        let told = |error| {
+            let own = keys_of::<T>();
+            let top: Vec<&str> = HEAD.into_iter().chain(own.iter().map(String::as_str)).collect();
+            self.explained(&error, &top)
+        };
         let table = DeTable::parse(&self.text).map_err(told)?;
         let span = table.span();
         // Two tables instead of a flattened field, which would lose the places of its entries.
@@ -132,8 +136,8 @@ impl Source {
         told
     }
 
-    fn explained(&self, error: &toml::de::Error, also: &[&str]) -> InputError {
-        let (cause, remedy) = explain(error, also, self.example());
+    fn explained(&self, error: &toml::de::Error, top: &[&str]) -> InputError {
+        let (cause, remedy) = explain(error, top, self.example());
         let told = InputError::new(&self.place, cause, remedy);
         match error.span() {
             Some(span) => self.told_at(told, span),
@@ -262,6 +266,28 @@ mod tests {
             assert_eq!(error.key(), key, "{error}");
         }
         assert!(read("n = 1\nworld = \"w\"").expect_err("no format").cause().contains("format"));
+    }
+
+    #[test]
+    fn a_key_of_the_top_level_in_a_section_is_told_where_it_belongs() {
+        #[derive(Debug, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        #[expect(dead_code, reason = "only the error is of interest")]
+        struct World {
+            robots: Own,
+            profiles: Option<Vec<String>>,
+        }
+        let read = |line: &str| {
+            let text = format!("format = 1\nworld = \"w\"\n[robots]\nn = 1\n{line}\n");
+            Source::new("s.toml", text, "").parse_world::<World>().expect_err(line)
+        };
+        for (line, key) in [("profiles = []", "profiles"), ("seed = 3", "seed")] {
+            let error = read(line);
+            assert_eq!(error.position(), Some((5, 1)), "{error}");
+            let remedy = format!("`{key}` belongs to the top level: above the first [section]");
+            assert!(error.remedy().starts_with(&remedy), "{error}");
+        }
+        assert!(read("nn = 1").remedy().contains("did you mean `n`?"));
     }
 
     #[test]

@@ -49,6 +49,10 @@
 
   // Fewer columns than these say too little; such rows become cards.
   const FEWEST = 3;
+  // As wide as a phone, in pixels: there every row that lacks columns is a card, as the last columns, which
+  // wait elsewhere behind a button, are often those that matter (differences, p). Longer tables stay tables.
+  const PHONE = 480;
+  const MOST_CARDS = 60;
   const rules = document.createElement("style");
   document.head.append(rules);
   let known = 0;
@@ -82,7 +86,9 @@
       show(table, count, heads.length);
       while (count > FEWEST && !fits()) show(table, (count -= 1), heads.length);
       const left = heads.length - count;
-      const isNarrow = !fits() || (left > 0 && table.matches(".claims"));
+      const isShort = table.tBodies[0].rows.length <= MOST_CARDS;
+      const isOfCards = table.matches(".claims") || (room.clientWidth < PHONE && isShort);
+      const isNarrow = !fits() || (left > 0 && isOfCards);
       if (isNarrow || (isOpen && left > 0)) {
         show(table, heads.length, heads.length);
         table.classList.add("cards");

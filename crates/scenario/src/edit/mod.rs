@@ -29,9 +29,10 @@ mod value;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use path::{Part, parts};
+
 use crate::Source;
 use layout::Layout;
-use path::parts;
 use serde_json::Value;
 use sidestep_kernel::InputError;
 use splice::Splice;

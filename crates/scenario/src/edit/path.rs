@@ -8,22 +8,22 @@ const MOST_PARTS: usize = 64;
 
 /// A part of a key.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Part {
+pub(crate) struct Part {
     /// The name, without quotes.
-    pub(super) name: String,
+    pub(crate) name: String,
     is_quoted: bool,
 }
 
 impl Part {
     /// Returns the number of an element, if it is one.
-    pub(super) fn number(&self) -> Option<usize> {
+    pub(crate) fn number(&self) -> Option<usize> {
         let is_number = !self.is_quoted && self.name.bytes().all(|b| b.is_ascii_digit());
         is_number.then(|| self.name.parse().ok()).flatten()
     }
 }
 
 /// Splits a key into its parts; never returns none.
-pub(super) fn parts(key: &str) -> Result<Vec<Part>, Refusal> {
+pub(crate) fn parts(key: &str) -> Result<Vec<Part>, Refusal> {
     let mut found = Vec::new();
     let mut rest = key.trim();
     loop {

@@ -8,6 +8,7 @@ use super::cell::Outcome;
 use super::plan::{Cell, Plan};
 use super::table::{Role, RunTable};
 use crate::scenario::Seeds;
+use crate::worlds::WORLDS;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Number of runs of a variant whose world cannot tell, before the others.
@@ -121,7 +122,14 @@ pub(super) fn notes(plan: &Plan, runs: &RunTable) -> Vec<String> {
             of_all(unchanged)
         ));
     }
+    notes.extend(remedy(&plan.world).filter(|_| !notes.is_empty()));
     notes
+}
+
+/// Returns what to ask for in a scenario of a world so that its seeds change something.
+pub fn remedy(world: &str) -> Option<String> {
+    let draws = WORLDS.named(world).map(|world| world.draws()).filter(|draws| !draws.is_empty())?;
+    Some(format!("Seeds change what is drawn: {draws}."))
 }
 
 /// Returns the number of variants of which all runs ended alike, although seeds might decide.
@@ -160,7 +168,8 @@ mod tests {
         let mut variants = sweep.design.variants("test").expect("valid");
         variants.iter_mut().zip(seeds).for_each(|(v, seeds)| v.seeds = seeds);
         let source = Source::new("s.toml", "", "");
-        Plan::new(&sweep, variants, Base { world: "w", seed: 7, source: &source }).expect("valid")
+        Plan::new(&sweep, variants, Base { world: "chain", seed: 7, source: &source })
+            .expect("valid")
     }
 
     fn outcome(cell: Cell, digest: &str) -> Outcome {
@@ -210,5 +219,18 @@ mod tests {
             told[1].contains("All runs in 1 of 2 variants ended in the same state"),
             "{told:?}"
         );
+        assert!(told[2].starts_with("Seeds change what is drawn: fields"), "{told:?}");
+    }
+
+    #[test]
+    fn where_seeds_decide_nothing_is_said_of_what_they_could_change() {
+        let plan = plan([Seeds::Decide, Seeds::Decide]);
+        let mut rows = Rows::default();
+        for (k, cell) in plan.share(crate::experiment::sweep::Shard::ALL).enumerate() {
+            rows.push(outcome(cell, &format!("end {k}")));
+        }
+        let table = rows.table(&plan).expect("no twins");
+        assert!(notes(&plan, &table).is_empty());
+        assert!(WORLDS.0.iter().all(|world| remedy(world.name()).is_some()), "every world tells");
     }
 }
