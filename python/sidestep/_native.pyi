@@ -22,7 +22,7 @@ __all__ = [
 ]
 
 _Arrays = dict[str, NDArray[Any]]
-_Decide = Callable[[_Arrays, Any], Mapping[str, ArrayLike] | ArrayLike | None]
+_Decide = Callable[[_Arrays, Any], Mapping[str, ArrayLike] | ArrayLike]
 
 @final
 class Scenario:

@@ -3,10 +3,29 @@
 use crate::error;
 use crate::json::list;
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use sidestep::kernel::EntityId;
 use sidestep::kernel::view::Body;
+
+/// An argument that is a whole number, of which Python has more than Rust.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Whole(pub(crate) u64);
+
+impl FromPyObject<'_, '_> for Whole {
+    type Error = PyErr;
+
+    fn extract(value: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
+        value.extract::<u64>().map(Whole).map_err(|raised| {
+            if !raised.is_instance_of::<PyOverflowError>(value.py()) {
+                return raised;
+            }
+            let remedy = format!("give a whole number from 0 to {}", u64::MAX);
+            error::wrong("argument", format!("{} is out of range", &*value), remedy)
+        })
+    }
+}
 
 /// Returns the ids of agents; truth values are no ids, though Python counts with them.
 pub(crate) fn ids(py: Python<'_>, agents: &Bound<'_, PyAny>) -> PyResult<Vec<EntityId>> {

@@ -102,7 +102,12 @@ impl Decider<'_> {
         let decided = self.decide.call1((observed, state))?;
         let (_, team) = &self.team;
         if decided.is_none() {
-            return Ok(());
+            // Far more often a forgotten `return` than a decision.
+            let words = format!(
+                "the function that decides for team `{}` returned None; return its orders, {{}} for none",
+                team.name
+            );
+            return Err(OrderError::new_err(words));
         }
         let Ok(by_name) = decided.cast::<PyMapping>() else {
             let Some(first) = team.ordered.first() else {

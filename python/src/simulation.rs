@@ -1,6 +1,6 @@
 //! Simulations that Python advances, observes and orders.
 
-use crate::arrays::{column, ids, numbers, rows, texts};
+use crate::arrays::{Whole, column, ids, numbers, rows, texts};
 use crate::decide::{Deciding, Numbered, decided};
 use crate::error::{self, ClosedError, wrong};
 use crate::json::to_python;
@@ -195,21 +195,22 @@ fn closed() -> PyErr {
 #[pymethods]
 impl Simulation {
     #[new]
-    #[pyo3(signature = (scenario, *, seed=None, workers=1, record=false, out=None, replace=false))]
+    #[pyo3(signature = (scenario, *, seed=None, workers=Whole(1), record=false, out=None, replace=false), text_signature = "(scenario, *, seed=None, workers=1, record=False, out=None, replace=False)")]
     fn new(
         scenario: &Bound<'_, PyAny>,
-        seed: Option<u64>,
-        workers: usize,
+        seed: Option<Whole>,
+        workers: Whole,
         record: bool,
         out: Option<PathBuf>,
         replace: bool,
     ) -> PyResult<Self> {
         let mut scenario = made(scenario)?;
+        let seed = seed.map(|Whole(seed)| seed);
         if let Some(seed) = seed.filter(|&seed| seed != scenario.compiled.plan().seed) {
             scenario = Arc::new(scenario.reseeded(seed)?);
         }
         let keep = Keep { folder: out.as_deref(), mcap: None, replace };
-        let simulation = Self::at_start(scenario, workers, keep)?;
+        let simulation = Self::at_start(scenario, workers.0 as usize, keep)?;
         if record {
             let mut journey = simulation.journey.lock().unwrap_or_else(PoisonError::into_inner);
             let journey = journey.as_mut().ok_or_else(closed)?;
@@ -220,9 +221,9 @@ impl Simulation {
 
     /// Advances by `cycles` cycles (one if not said), and returns how many were done: fewer when nothing can happen
     /// anymore.
-    #[pyo3(signature = (cycles=1))]
-    fn step(&self, py: Python<'_>, cycles: u64) -> PyResult<u64> {
-        self.advance_from(py, |now| now.saturating_add(cycles))
+    #[pyo3(signature = (cycles=Whole(1)), text_signature = "($self, cycles=1)")]
+    fn step(&self, py: Python<'_>, cycles: Whole) -> PyResult<u64> {
+        self.advance_from(py, |now| now.saturating_add(cycles.0))
     }
 
     /// Advances to cycle `until`, by default the planned end, and returns how many cycles were done.
@@ -233,17 +234,15 @@ impl Simulation {
     #[pyo3(signature = (until=None, *, decide=None, state=None))]
     fn run(
         slf: &Bound<'_, Self>,
-        until: Option<Cycle>,
+        until: Option<Whole>,
         decide: Option<&Bound<'_, PyAny>>,
         state: Option<Bound<'_, PyAny>>,
     ) -> PyResult<u64> {
         let simulation = slf.get();
+        let until = simulation.end(until.map(|Whole(until)| until));
         match decide {
-            None => {
-                let until = simulation.end(until);
-                simulation.advance_from(slf.py(), |_| until)
-            }
-            Some(decide) => decided(slf.py(), simulation, decide, state, simulation.end(until)),
+            None => simulation.advance_from(slf.py(), |_| until),
+            Some(decide) => decided(slf.py(), simulation, decide, state, until),
         }
     }
 
@@ -516,7 +515,7 @@ impl Deciding for Simulation {
     }
 
     fn advance(&self, py: Python<'_>) -> PyResult<()> {
-        self.step(py, 1).map(drop)
+        self.advance_from(py, |now| now.saturating_add(1)).map(drop)
     }
 }
 

@@ -142,3 +142,24 @@ def test_a_scenario_in_which_nobody_takes_orders_cannot_be_decided(external):
     scenario = changed(external, robots=[{"count": 2}])
     with pytest.raises(sidestep.OrderError, match="external"):
         sidestep.Simulation(scenario).run(decide=lambda observed, state: 0)
+
+
+@pytest.mark.parametrize("number", [-1, 2**64])
+def test_a_number_that_is_out_of_range_is_told_with_the_range(external, number):
+    words = rf"{number} is out of range\n  help: give a whole number from 0 to"
+    with pytest.raises(sidestep.InputError, match=words):
+        sidestep.Simulation(external, seed=number)
+    sim = sidestep.Simulation(external)
+    with pytest.raises(sidestep.InputError, match=words):
+        sim.step(number)
+    with pytest.raises(sidestep.InputError, match=words):
+        sim.run(number)
+    with pytest.raises(TypeError, match="argument 'cycles'"):
+        sim.step(0.5)
+
+
+def test_a_forgotten_return_is_told(external):
+    sim = sidestep.Simulation(external)
+    with pytest.raises(sidestep.OrderError, match="`robot` returned None; return its orders, {} for none"):
+        sim.run(decide=lambda observed, state: None)
+    assert sim.run(1, decide=lambda observed, state: {}) == 1

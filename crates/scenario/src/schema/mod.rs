@@ -24,6 +24,7 @@ use crate::{FORMAT, Head, Kind, Worlds};
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 use serde_json::{Map, Value, json};
+use std::collections::BTreeSet;
 
 /// The version of JSON Schema.
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
@@ -187,6 +188,25 @@ pub fn unknown(kind: &dyn Kind) -> Vec<String> {
     let shown = shown::shown(kind.default_scenario()).into_iter();
     let unknown = shown.filter(|one| places::places(&schema, &one.way).is_empty());
     unknown.map(|one| one.way.join(".")).collect()
+}
+
+/// Returns the keys of a world's schema that its commented scenario shows nowhere, neither as a key nor in the words
+/// beside one: as JSON pointers.
+pub fn unshown(kind: &dyn Kind) -> Vec<String> {
+    let schema = of_world(kind);
+    let shown = shown::shown(kind.default_scenario());
+    let ways = shown.iter().flat_map(|one| (1..=one.way.len()).map(|n| &one.way[..n]));
+    let told: BTreeSet<String> = ways.flat_map(|way| places::places(&schema, way)).collect();
+    let is_named = |key: &str| shown.iter().any(|one| has_word(&one.words, key));
+    let mut all = Vec::new();
+    places::properties(&schema, "", &mut all);
+    all.retain(|(place, key)| !told.contains(place) && !is_named(key));
+    all.into_iter().map(|(place, _)| place).collect()
+}
+
+/// Returns whether a text has a key as a word of its own.
+fn has_word(text: &str, key: &str) -> bool {
+    text.split(|c: char| !c.is_alphanumeric() && c != '_').any(|word| word == key)
 }
 
 /// Returns examples of a key's values, as the commented scenario of its world shows them.

@@ -38,6 +38,32 @@ fn below(schema: &Value, place: &str, name: &str) -> Vec<String> {
     found
 }
 
+/// Gathers the places of all keys of the tables within a part of a schema, each with its name.
+pub(crate) fn properties(part: &Value, place: &str, found: &mut Vec<(String, String)>) {
+    match part {
+        Value::Array(many) => {
+            for (i, one) in many.iter().enumerate() {
+                properties(one, &format!("{place}/{i}"), found);
+            }
+        }
+        Value::Object(members) => {
+            for (word, inner) in members {
+                let place = format!("{place}/{word}");
+                let keys = inner.as_object().filter(|_| word == "properties");
+                for (name, inner) in keys.into_iter().flatten() {
+                    let place = format!("{place}/{}", name.replace('~', "~0").replace('/', "~1"));
+                    properties(inner, &place, found);
+                    found.push((place, name.clone()));
+                }
+                if keys.is_none() && !matches!(&word[..], "default" | "examples" | "enum") {
+                    properties(inner, &place, found);
+                }
+            }
+        }
+        _ => {}
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -66,5 +92,10 @@ mod tests {
             ["/properties/sensors/additionalProperties/properties/a~1b"]
         );
         assert!(of(&["robots", "to"]).is_empty() && of(&["x"]).is_empty());
+        let mut all = Vec::new();
+        properties(&schema, "", &mut all);
+        let names: Vec<&str> = all.iter().map(|(_, name)| &name[..]).collect();
+        assert_eq!(names, ["robots", "a/b", "sensors", "at"]);
+        assert!(all.iter().all(|(place, _)| schema.pointer(place).is_some()), "{all:?}");
     }
 }

@@ -30,6 +30,20 @@ const SCENARIOS: [(&str, &str); 3] = [
     ),
 ];
 
+/// A scenario of each world with an agent that is decided from outside.
+const EXTERNAL: [(&str, &str); 3] = [
+    ("robots", "[map]\nascii = \"....\"\n[robots]\nbehaviour = { kind = \"external\" }\n"),
+    (
+        "airspace",
+        "[airspace]\nmethod = \"external\"\n[airspace.generator]\nkind = \"superconflict\"\nn = 2\n",
+    ),
+    (
+        "chain",
+        "[[chains]]\nconnectors = 3\nat_m = [0.0, 0.0]\nrod_m = 0.7\n\
+         [[chains.tasks]]\nkind = \"external\"\n",
+    ),
+];
+
 fn started(world: &str, scenario: &str) -> Box<dyn Simulation> {
     let text = format!("format = 1\nworld = \"{world}\"\n{scenario}");
     let source = Source::new(world, &text, root());
@@ -76,20 +90,31 @@ fn metrics(value: &Value, path: &str) -> Vec<String> {
     members.flat_map(|(key, value)| metrics(value, &format!("{path}.{key}"))).collect()
 }
 
+/// Compares a marked part of the chapter with what it should be, or writes it.
+fn compare(name: &str, expected: &str) {
+    let chapter = read(CHAPTER);
+    let mark = format!("<!-- {name} -->\n");
+    let found = marked(&chapter, name);
+    if std::env::var("SIDESTEP_WRITE").is_ok_and(|what| what == "columns") {
+        let chapter = chapter.replace(&format!("{mark}{found}"), &format!("{mark}{expected}"));
+        std::fs::write(root().join(CHAPTER), &chapter).expect("written");
+    } else {
+        assert_eq!(found, expected, "to write it: see the head of {}", file!());
+    }
+}
+
 #[test]
 fn the_chapter_of_columns_has_the_tables_that_a_run_declares() {
-    let mut chapter = read(CHAPTER);
-    let is_written = std::env::var("SIDESTEP_WRITE").is_ok_and(|what| what == "columns");
     for (world, scenario) in SCENARIOS {
-        let expected = rendered(&started(world, scenario).schemas());
-        let found = marked(&chapter, &format!("tables of {world}")).to_string();
-        if is_written {
-            chapter = chapter.replace(&found, &expected);
-            std::fs::write(root().join(CHAPTER), &chapter).expect("written");
-        } else {
-            assert_eq!(found, expected, "to write it: see the head of {}", file!());
-        }
+        compare(&format!("tables of {world}"), &rendered(&started(world, scenario).schemas()));
     }
+    let orders = |(world, scenario)| {
+        let schemas = started(world, scenario).schemas();
+        rendered(&schemas.into_iter().filter(|schema| schema.name == "orders").collect::<Vec<_>>())
+    };
+    let of_worlds = EXTERNAL.map(orders);
+    compare("tables of orders", &of_worlds[0]);
+    assert!(of_worlds.iter().all(|one| *one == of_worlds[0]), "{of_worlds:?}");
 }
 
 #[test]
