@@ -22,7 +22,7 @@ pub use format::FormatVersion;
 pub use manifest::{Manifest, Status};
 pub use mcap::{
     BagSchema, BagWriter, LiveFrames, LiveServer, McapEnd, McapOrigin, McapRecorder, McapRun,
-    Playback, Playing, Steering, is_mcap, live,
+    McapScenes, Playback, Playing, Steering, is_mcap, live,
 };
 pub use parquet::ParquetRecorder;
 pub use read::{Table, for_each_block, read_table, tables};

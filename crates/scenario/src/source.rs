@@ -211,6 +211,26 @@ impl Source {
         self.error(span, format!("{}: {}", error.place(), error.cause()), error.remedy())
     }
 
+    /// Adds to the error of a file that is named at a span the key that names it.
+    pub fn naming(&self, span: Range<usize>, error: InputError) -> InputError {
+        match locate(&self.text, &span) {
+            Some(way) => error.with_key(path(&way)),
+            None => error,
+        }
+    }
+
+    /// Returns an error as one of this text, for those who see nothing else: that of a file which the text names becomes
+    /// one of the key that names it.
+    pub fn told(&self, error: &InputError) -> InputError {
+        let Some(key) = error.key().filter(|_| error.place() != self.place) else {
+            return error.clone();
+        };
+        let at =
+            error.position().map_or(String::new(), |(line, column)| format!(":{line}:{column}"));
+        let cause = format!("{}{at}: {}", error.place(), error.cause());
+        self.error_at(key, cause, error.remedy())
+    }
+
     /// Returns its place without the mark of overrides.
     pub fn file_place(&self) -> &str {
         self.place.trim_end_matches(WITH_OVERRIDES)
@@ -231,6 +251,23 @@ impl Source {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_error_of_a_named_file_is_told_at_the_key_that_names_it() {
+        let source = Source::new("s.toml", "n = 1\n[map]\nfile = \"a.png\"\n", "");
+        let span = source.text.find("\"a.png\"").map(|at| at..at + 7).expect("it is there");
+        let wrong = InputError::new("a.png", "it is cut off", "copy it again").at(3, 4);
+        let named = source.naming(span, wrong.clone());
+        assert_eq!((named.place(), named.key()), ("a.png", Some("map.file")));
+        let told = source.told(&named);
+        assert_eq!((told.place(), told.key()), ("s.toml", Some("map.file")));
+        assert_eq!(told.position().map(|(line, _)| line), Some(3));
+        assert_eq!((told.cause(), told.remedy()), ("a.png:3:4: it is cut off", "copy it again"));
+        // An error of its own, and one that no key names, stay as they are.
+        let own = source.error(0..1, "wrong", "right");
+        assert_eq!((source.told(&own), source.told(&wrong)), (own, wrong.clone()));
+        assert_eq!(source.naming(0..0, wrong.clone()).key(), None);
+    }
 
     #[derive(Debug, Deserialize)]
     #[serde(deny_unknown_fields)]

@@ -7,7 +7,7 @@
 //! orders.rs     orders from outside, followed again
 //! film/         frames into files                      picture.rs    pictures into files
 //! rerun.rs      recorded runs, computed again          replay.rs     ... and compared
-//! played/       ... of other builds, from their tables
+//! played/       ... of other builds, from their tables or messages
 //! export/       recorded runs in other formats         report/       folders -> documents
 //! sweep/        many runs of one scenario              summary.rs    the results of a run
 //! live/         viewers that watch and steer           beat.rs       when a cycle is due

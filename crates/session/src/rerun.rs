@@ -134,17 +134,21 @@ impl Recorded {
         other.then(|| self.maker.build.as_deref().unwrap_or(&self.maker.version))
     }
 
-    /// Returns the run at its start, to be watched: computed again, or from its own tables where another build made
-    /// it.
+    /// Returns the run at its start, to be watched: computed again, or from its own tables or messages where another
+    /// build made it.
     ///
     /// # Errors
-    /// When the scenario is no longer valid; when a recording of another build has no tables.
+    /// When the scenario is no longer valid; when the tables or messages of another build are damaged.
     pub fn shown(&self, workers: usize) -> Result<Box<dyn Simulation>, InputError> {
-        let Some(folder) = self.folder.as_ref().filter(|_| self.other_maker().is_some()) else {
+        if self.other_maker().is_none() {
             return self.start(workers);
-        };
+        }
         let start = self.worlds.compile(&self.source)?.start(&self.source, 1);
-        Ok(Box::new(Played::open(start, folder, self.cycles_done)?))
+        let played = match &self.folder {
+            Some(folder) => Played::of_tables(start, folder, self.cycles_done),
+            None => Played::of_messages(start, &self.path, self.cycles_done),
+        };
+        Ok(Box::new(played?))
     }
 
     /// Returns the run at its last checkpoint, if that is before `cycle`; otherwise at its start.

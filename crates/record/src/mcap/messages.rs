@@ -45,6 +45,20 @@ fn pose(pose: &ViewPose) -> Option<Pose> {
     Some(Pose { position: vector(pose.at_m), orientation: rotation(pose) })
 }
 
+/// Returns a vector that was read; what is not said is 0.
+pub(super) fn read_vector(read: Option<&Vector3>) -> Place {
+    read.map_or([0.0; 3], |v| [v.x, v.y, v.z])
+}
+
+/// Returns a pose that was read; what is not said is the origin, not turned.
+pub(super) fn read_pose(read: Option<&Pose>) -> ViewPose {
+    let plain = ViewPose::at([0.0; 3]);
+    read.map_or(plain, |read| ViewPose {
+        at_m: read_vector(read.position.as_ref()),
+        turn: read.orientation.as_ref().map_or(plain.turn, |q| [q.x, q.y, q.z, q.w]),
+    })
+}
+
 fn color([r, g, b]: [u8; 3], a: f64) -> Option<Color> {
     let part = |byte: u8| f64::from(byte) / 255.0;
     Some(Color { r: part(r), g: part(g), b: part(b), a })

@@ -25,12 +25,14 @@ mod bag;
 mod live;
 mod messages;
 mod reader;
+mod scenes;
 mod topics;
 mod writer;
 
 pub use bag::{BagSchema, BagWriter};
 pub use live::{LiveFrames, LiveServer, Playback, Playing, Steering, live};
 pub use reader::{McapRun, is_mcap};
+pub use scenes::McapScenes;
 pub use writer::{McapEnd, McapOrigin, McapRecorder};
 
 /// Name of the metadata record.

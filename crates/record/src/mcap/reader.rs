@@ -66,9 +66,7 @@ impl McapRun {
     pub fn open(path: &Path) -> Result<Self, InputError> {
         let mut source = Source::open(path)?;
         let summary = source.summary()?;
-        let index = summary.metadata_indexes.iter().find(|index| index.name == METADATA);
-        let index = index.ok_or_else(|| foreign(path))?;
-        let said = source.metadata(index)?;
+        let said = described(&mut source, &summary)?;
         let text = |key: &str| {
             said.get(key).ok_or_else(|| damaged(path, format!("its metadata has no `{key}`")))
         };
@@ -102,6 +100,16 @@ impl McapRun {
     }
 }
 
+/// Returns what a recording says of its run.
+pub(super) fn described(
+    source: &mut Source,
+    summary: &Summary,
+) -> Result<BTreeMap<String, String>, InputError> {
+    let index = summary.metadata_indexes.iter().find(|index| index.name == METADATA);
+    let index = index.ok_or_else(|| foreign(&source.path))?;
+    source.metadata(index)
+}
+
 fn messages(summary: &Summary) -> BTreeMap<String, u64> {
     let Some(stats) = &summary.stats else { return BTreeMap::new() };
     let counts = stats.channel_message_counts.iter();
@@ -109,26 +117,25 @@ fn messages(summary: &Summary) -> BTreeMap<String, u64> {
 }
 
 /// An open file.
-struct Source<'a> {
-    path: &'a Path,
+pub(super) struct Source {
+    pub(super) path: PathBuf,
     file: File,
-    length: u64,
+    pub(super) length: u64,
 }
 
-impl<'a> Source<'a> {
-    fn open(path: &'a Path) -> Result<Self, InputError> {
+impl Source {
+    pub(super) fn open(path: &Path) -> Result<Self, InputError> {
         let opened = File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
         let (length, file) = opened.map_err(|e| {
             InputError::new(path.display(), e.to_string(), "name a recording that can be read")
         })?;
-        Ok(Self { path, file, length })
+        Ok(Self { path: path.to_path_buf(), file, length })
     }
 
     /// Reads the end of the file, which lists the position of everything.
-    fn summary(&mut self) -> Result<Summary, InputError> {
-        let path = self.path;
-        let summary = self.read_summary().map_err(|e| damaged(path, e))?;
-        summary.ok_or_else(|| damaged(path, "it has no summary"))
+    pub(super) fn summary(&mut self) -> Result<Summary, InputError> {
+        let summary = self.read_summary().map_err(|e| damaged(&self.path, e))?;
+        summary.ok_or_else(|| damaged(&self.path, "it has no summary"))
     }
 
     fn read_summary(&mut self) -> Result<Option<Summary>, McapError> {
@@ -152,20 +159,20 @@ impl<'a> Source<'a> {
     }
 
     /// Reads the bytes of a record; never allocates more than the size of the file.
-    fn record(&mut self, offset: u64, length: u64) -> Result<Vec<u8>, InputError> {
+    pub(super) fn record(&mut self, offset: u64, length: u64) -> Result<Vec<u8>, InputError> {
         if offset.checked_add(length).is_none_or(|end| end > self.length) {
-            return Err(damaged(self.path, "an index points beyond its end"));
+            return Err(damaged(&self.path, "an index points beyond its end"));
         }
         let mut bytes = vec![0; length as usize];
         let read = self.file.seek(SeekFrom::Start(offset));
-        read.and_then(|_| self.file.read_exact(&mut bytes)).map_err(|e| damaged(self.path, e))?;
+        read.and_then(|_| self.file.read_exact(&mut bytes)).map_err(|e| damaged(&self.path, e))?;
         Ok(bytes)
     }
 
     fn metadata(&mut self, index: &MetadataIndex) -> Result<BTreeMap<String, String>, InputError> {
         let bytes = self.record(index.offset, index.length)?;
         let own = MetadataIndex { offset: 0, ..index.clone() };
-        let record = metadata(&bytes, &own).map_err(|e| damaged(self.path, e))?;
+        let record = metadata(&bytes, &own).map_err(|e| damaged(&self.path, e))?;
         Ok(record.metadata)
     }
 
@@ -174,7 +181,7 @@ impl<'a> Source<'a> {
         for index in &summary.attachment_indexes {
             let bytes = self.record(index.offset, index.length)?;
             let own = AttachmentIndex { offset: 0, ..index.clone() };
-            let found = attachment(&bytes, &own).map_err(|e| damaged(self.path, e))?;
+            let found = attachment(&bytes, &own).map_err(|e| damaged(&self.path, e))?;
             // Files are written beside a scenario with these names, so none may point outside of
             // its folder.
             let parts = Path::new(&found.name).components();
@@ -182,7 +189,7 @@ impl<'a> Source<'a> {
                 && parts.into_iter().all(|part| matches!(part, Component::Normal(_)));
             if !is_inside {
                 let cause = format!("it has a file named `{}`", found.name);
-                return Err(damaged(self.path, cause));
+                return Err(damaged(&self.path, cause));
             }
             files.push((found.name, found.data.into_owned()));
         }
@@ -195,7 +202,7 @@ fn foreign(path: &Path) -> InputError {
     InputError::new(path.display(), "the file says nothing of a run of sidestep", remedy)
 }
 
-fn damaged(path: &Path, cause: impl std::fmt::Display) -> InputError {
+pub(super) fn damaged(path: &Path, cause: impl std::fmt::Display) -> InputError {
     let remedy = "the recording is cut off or damaged: copy it again, or run the scenario again";
     InputError::new(path.display(), cause.to_string(), remedy)
 }

@@ -185,8 +185,9 @@ impl Stage {
         let recorded = self.recorded.as_ref()?;
         if let Some(maker) = recorded.other_maker() {
             return Some(format!(
-                "Recorded by sidestep {maker}, which is not this one: shown from its own tables, not computed again, \
-                 without inspection."
+                "Recorded by sidestep {maker}, which is not this one: shown from its own {}, not computed again, without \
+                 inspection.",
+                if recorded.folder.is_some() { "tables" } else { "messages" }
             ));
         }
         let (done, of) = (run.cycle(), recorded.cycles_done);
@@ -258,7 +259,10 @@ pub(crate) fn checked(
         Ok(source) => source,
     };
     Ok(match means.worlds.compile(&source) {
-        Err(_) => sidestep::problems(means.worlds, &source).iter().map(problem).collect(),
+        Err(_) => {
+            let errors = sidestep::problems(means.worlds, &source);
+            errors.iter().map(|error| problem(&source.told(error))).collect()
+        }
         Ok(compiled) => {
             let remarks = compiled.remarks().into_iter();
             let told = remarks.map(|remark| Problem {

@@ -1,7 +1,7 @@
-//! A recording of another build, shown from its own tables: nothing is computed again.
+//! A recording of another build, shown from its own tables or messages: nothing is computed again.
 //!
-//! The scenario says what there is, and the tables where it was. What they do not say (scans, conditions, metrics) is
-//! not shown, and nobody is inspected.
+//! The scenario says what there is, and the tables or messages where it was. What they do not say (scans, conditions,
+//! metrics) is not shown, and nobody is inspected.
 
 mod events;
 mod places;
@@ -11,17 +11,19 @@ use serde_json::{Value, json};
 use sidestep::kernel::checkpoint::CheckpointError;
 use sidestep::kernel::cycle::PhaseTimes;
 use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
-use sidestep::kernel::view::{Entry, Frame, Inspection, Look, PlaceRows, Scenery, Who};
+use sidestep::kernel::view::{Body, Entry, Frame, Inspection, Look, PlaceRows, Scenery, Who};
 use sidestep::kernel::words::{Lines, Said};
 use sidestep::kernel::world::Decides;
 use sidestep::kernel::{Cycle, Digest, InputError, Interrupt, Plan, Simulation};
+use sidestep_record::McapScenes;
 use std::path::Path;
 
-/// A recorded run that is shown from its tables, as if it went on.
+/// A recorded run that is shown as if it went on.
 pub(crate) struct Played {
     /// The same scenario at its start, as this build understands it.
     start: Box<dyn Simulation>,
-    places: Places,
+    cycle_s: f64,
+    bodies: Bodies,
     events: Vec<Entry>,
     cycle: Cycle,
     until: Cycle,
@@ -29,12 +31,44 @@ pub(crate) struct Played {
     shown: Cycle,
 }
 
+/// Where the bodies of a moment are told.
+enum Bodies {
+    Tables(Places),
+    Messages(McapScenes),
+}
+
+impl Bodies {
+    /// Returns the bodies of a cycle.
+    fn at(&mut self, cycle: Cycle) -> Vec<Body> {
+        match self {
+            Self::Tables(places) => places.at(cycle),
+            // The file could be read when it was opened. What cannot be read now is not shown.
+            Self::Messages(scenes) => scenes.bodies(cycle).unwrap_or_default(),
+        }
+    }
+}
+
 impl Played {
+    /// Opens the messages of a recording for viewers.
+    ///
+    /// # Errors
+    /// When they are damaged.
+    pub(crate) fn of_messages(
+        start: Box<dyn Simulation>,
+        file: &Path,
+        until: Cycle,
+    ) -> Result<Self, InputError> {
+        let mut scenes = McapScenes::open(file)?;
+        let events = scenes.events()?;
+        scenes.bodies(until)?;
+        Ok(Self::new(start, Bodies::Messages(scenes), events, until))
+    }
+
     /// Opens the tables of a folder.
     ///
     /// # Errors
     /// When they are damaged.
-    pub(crate) fn open(
+    pub(crate) fn of_tables(
         mut start: Box<dyn Simulation>,
         folder: &Path,
         until: Cycle,
@@ -43,7 +77,12 @@ impl Played {
         let rows = start.place_rows();
         let events = events::read(folder, &rows, &first)?;
         let places = Places::new(folder, rows, start.scenery(), first, until)?;
-        Ok(Self { start, places, events, cycle: 0, until, shown: 0 })
+        Ok(Self::new(start, Bodies::Tables(places), events, until))
+    }
+
+    fn new(start: Box<dyn Simulation>, bodies: Bodies, events: Vec<Entry>, until: Cycle) -> Self {
+        let cycle_s = start.scenery().cycle_s;
+        Self { start, cycle_s, bodies, events, cycle: 0, until, shown: 0 }
     }
 
     /// Returns the events since the last frame; none where the time went back.
@@ -130,8 +169,8 @@ impl Simulation for Played {
     fn watch_odometry(&mut self) {}
 
     fn frame(&mut self, _: Look) -> Frame {
-        let time_s = self.cycle as f64 * self.places.scenery().cycle_s;
-        let bodies = self.places.at(self.cycle);
+        let time_s = self.cycle as f64 * self.cycle_s;
+        let bodies = self.bodies.at(self.cycle);
         Frame { cycle: self.cycle, time_s, bodies, log: self.log(), ..Frame::default() }
     }
 

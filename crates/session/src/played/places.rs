@@ -51,10 +51,6 @@ impl Places {
         Ok(places)
     }
 
-    pub(super) fn scenery(&self) -> &Scenery {
-        &self.scenery
-    }
-
     /// Returns the number of cycles of a window, and its first.
     fn span(&self, rows: &PlaceRows, cycle: Cycle) -> (Cycle, Cycle) {
         let bodies = self.first.iter().filter(|body| body.kind == rows.kind).count();

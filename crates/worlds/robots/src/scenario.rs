@@ -80,7 +80,7 @@ pub(super) struct ProfileFile {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct MapSection {
-    pub(super) file: Option<PathBuf>,
+    pub(super) file: Option<Spanned<PathBuf>>,
     pub(super) ascii: Option<String>,
     pub(super) office: Option<Spanned<OfficeSpec>>,
     pub(super) box_size_m: Option<Number<BoxSide>>,

@@ -2,6 +2,7 @@
 
 use super::*;
 use sidestep::kernel::view::{Frame, Look, Place, Who as Body};
+use sidestep_record::{McapEnd, McapOrigin, McapRecorder, Origin, Status};
 use sidestep_session::{Journey, Keep, Recorded, Unwatched};
 use std::path::PathBuf;
 
@@ -71,6 +72,84 @@ fn a_recording_of_another_build_shows_everybody_where_they_were() {
         shown.restore(&back).expect("its own");
         assert_eq!(places(&shown.frame(Look::BODIES)), places(&again.frame(Look::BODIES)));
     }
+}
+
+/// Records some cycles of a scenario to an MCAP file, as a build of another version would.
+fn filmed_by_another(text: &str, cycles: u64, path: &std::path::Path) {
+    let source = Source::new("s.toml", text, "");
+    let mut run = WORLDS.compile(&source).expect("valid").start(&source, 1);
+    run.watch();
+    let origin = McapOrigin {
+        world: run.world().into(),
+        build: "0.0.9+abc".into(),
+        origin: Origin {
+            program_version: "0.0.9".into(),
+            scenario: text.into(),
+            seed: run.plan().seed,
+        },
+        files: Vec::new(),
+        cycles_planned: run.plan().cycles,
+        every: 1,
+    };
+    let mut recorder = McapRecorder::create(path, origin, &run.scenery()).expect("a file");
+    for _ in 0..cycles {
+        recorder.frame(&run.frame(Look::BODIES)).expect("written");
+        run.advance(1);
+    }
+    recorder.frame(&run.frame(Look::BODIES)).expect("written");
+    let digest = run.digest().to_string();
+    let end = McapEnd { status: Status::Complete, cycles_done: cycles, digest };
+    recorder.finish(&end).expect("finished");
+}
+
+#[test]
+fn a_film_of_another_build_shows_everybody_where_they_were_and_says_so() {
+    for (text, cycles) in [(ROBOTS, 200), (CHAINS, 60), (AIRPLANES, 20)] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let film = path(&folder);
+        filmed_by_another(text, cycles, &film);
+        let source = Source::new("s.toml", text, "");
+        let mut again = WORLDS.compile(&source).expect("valid").start(&source, 1);
+        let recorded = Recorded::open(WORLDS, &film).expect("a film");
+        assert!(recorded.start(1).is_err(), "it is not computed again");
+        let mut shown = recorded.shown(1).expect("its messages are there");
+        for cycle in [0, cycles / 5, cycles / 2, cycles] {
+            again.advance(cycle - again.cycle());
+            shown.advance(cycle - shown.cycle());
+            let (one, other) = (again.frame(Look::BODIES), shown.frame(Look::BODIES));
+            assert!(!places(&one).is_empty());
+            assert_eq!(places(&one), places(&other), "{} at {cycle}", again.world());
+            assert_eq!(one.bodies.len(), other.bodies.len());
+        }
+        let (_page, told) = opened(folder);
+        let words = banner(&told["answer"]["status"]);
+        assert!(words.contains("0.0.9+abc") && words.contains("its own messages"), "{words}");
+    }
+}
+
+#[test]
+fn a_film_of_another_build_has_its_events() {
+    let folder = tempfile::tempdir().expect("a folder");
+    filmed_by_another(ROBOTS, 200, &path(&folder));
+    let source = Source::new("s.toml", ROBOTS, "");
+    let mut again = WORLDS.compile(&source).expect("valid").start(&source, 1);
+    again.watch();
+    let told = |frame: Frame| -> Vec<_> {
+        frame.log.into_iter().map(|e| (e.cycle, e.level, e.who, e.words)).collect()
+    };
+    let mut then = Vec::new();
+    for _ in 0..200 {
+        again.advance(1);
+        then.extend(told(again.frame(Look::BODIES)));
+    }
+    let recorded = Recorded::open(WORLDS, &path(&folder)).expect("a film");
+    let mut shown = recorded.shown(1).expect("its messages are there");
+    shown.advance(200);
+    let shown = told(shown.frame(Look::BODIES));
+    assert!(!shown.is_empty());
+    // The last event may come at the very end, which no frame of the film is behind.
+    then.retain(|event| event.0 < 200);
+    assert_eq!(shown, then);
 }
 
 #[test]

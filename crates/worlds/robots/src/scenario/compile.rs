@@ -272,10 +272,11 @@ fn known_tables(
     let (mut sensors, mut effectors) = (BTreeMap::new(), BTreeMap::new());
     let presets = Source::new("presets", include_str!("../presets.toml"), "");
     add_profile(Arc::new(presets), &mut sensors, &mut effectors)?;
-    for profile in &file.profiles {
-        let path = source.path(profile.get_ref());
-        let profile = Source::read(&path, &[])?;
-        add_profile(Arc::new(profile), &mut sensors, &mut effectors)?;
+    for named in &file.profiles {
+        let profile = Source::read(&source.path(named.get_ref()), &[]);
+        let added = profile
+            .and_then(|profile| add_profile(Arc::new(profile), &mut sensors, &mut effectors));
+        added.map_err(|error| source.naming(named.span(), error))?;
     }
     add_all(source, &file.sensors, &mut sensors);
     add_all(source, &file.effectors, &mut effectors);

@@ -45,7 +45,8 @@ fn read_map(
         (Some(file), None, None) => {
             let resolution_m = s.resolution_m.map(f64::from);
             let boxes = AsBoxes { box_size_m, resolution_m, unknown: s.unknown };
-            let map = sidestep_import::map_file(&source.path(file), boxes)?;
+            let map = sidestep_import::map_file(&source.path(file.get_ref()), boxes);
+            let map = map.map_err(|error| source.naming(file.span(), error))?;
             Ok((map, Vec::new()))
         }
         (None, Some(art), None) => {

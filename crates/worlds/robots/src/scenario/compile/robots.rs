@@ -41,7 +41,8 @@ impl Compiler<'_> {
         scen: &Spanned<std::path::PathBuf>,
         span: &Range<usize>,
     ) -> Result<Group, InputError> {
-        let rows = sidestep_import::movingai::load_scen(&self.source.path(scen.get_ref()))?;
+        let rows = sidestep_import::movingai::load_scen(&self.source.path(scen.get_ref()));
+        let rows = rows.map_err(|error| self.source.naming(scen.span(), error))?;
         let count = s.count.as_ref().map_or(rows.len(), |c| *c.get_ref() as usize);
         if count > rows.len() {
             let cause = format!("count = {count}, but the list has {} rows", rows.len());
@@ -54,7 +55,8 @@ impl Compiler<'_> {
         let (mut places, mut types) = (Vec::new(), Vec::new());
         let place = self.source.path(scen.get_ref()).display().to_string();
         for row in &rows[..count] {
-            row.check_against(&place, &self.map)?;
+            let checked = row.check_against(&place, &self.map);
+            checked.map_err(|error| self.source.naming(scen.span(), error))?;
             let goals = vec![Arc::new(FlowField::towards(&free, size, &[row.goal]))];
             let avoidance = avoidance.clone();
             if !goals[0].is_goal(row.goal.0, row.goal.1) {
