@@ -62,6 +62,13 @@ def fk(arm: Arm | str | os.PathLike[str], joints: ArrayLike | None = None) -> Pl
     computed too.
 
     Raises InputError when a file or a shape is wrong.
+
+    >>> import sidestep
+    >>> arm = sidestep.Arm("scenarios/chain/arm.urdf")
+    >>> arm
+    Arm(...)
+    >>> sidestep.fk(arm, [arm.posture()] * 3).tip.shape
+    (3, 3)
     """
     arm = arm if isinstance(arm, Arm) else Arm(arm)
     values = arm.posture() if joints is None else joints
@@ -101,6 +108,15 @@ def ik(
     other either. The answers do not depend on ``workers``.
 
     Raises InputError when a file, a shape or an option is wrong; a target out of reach is none: its row says why.
+
+    >>> import sidestep
+    >>> arm = sidestep.Arm("scenarios/chain/arm.urdf")
+    >>> there = sidestep.fk(arm, [[0.3] * len(arm.joints), [0.1] * len(arm.joints)]).tip
+    >>> found = sidestep.ik(arm, [*there, [0, 0, 50]], restarts=5)
+    >>> found.reached.tolist()
+    [True, True, False]
+    >>> found.reasons
+    [None, None, "the target is ... m from the arm's first connector, and its rods reach 0.950000 m"]
     """
     arm = arm if isinstance(arm, Arm) else Arm(arm)
     places = _rows("targets", targets)
@@ -119,7 +135,7 @@ def ik(
     begin = _rows("start", arm.posture() if start is None else start)
     if len(begin) not in (1, len(places)):
         raise wrong("start", f"has {len(begin)} rows", f"give one row, or one per target, {len(places)}")
-    spheres = [] if obstacles is None else _wide("obstacles", _rows("obstacles", obstacles), 4)
+    spheres = np.empty((0, 4)) if obstacles is None else _rows("obstacles", obstacles)
     options = {
         "free": list(free),
         "engine": engine,
@@ -130,7 +146,7 @@ def ik(
         "nearest": nearest,
         "restarts": restarts,
         "seed": seed,
-        "obstacles": [tuple(sphere) for sphere in spheres],
+        "obstacles": _wide("obstacles", spheres, 4).tolist(),
         "body": body,
         "ignore_limits": ignore_limits,
         "workers": workers,

@@ -8,6 +8,7 @@ equal to the bit.
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import time
@@ -218,7 +219,7 @@ def width(executor: Executor) -> int:
             return count
     client = getattr(executor, "_client", None)
     if client is not None and hasattr(client, "nthreads"):
-        return max(1, sum(client.nthreads().values()))
+        return max(1, sum(int(threads) for threads in client.nthreads().values()))
     return os.cpu_count() or 1
 
 
@@ -227,7 +228,7 @@ class RayExecutor(Executor):
 
     def __init__(self) -> None:
         try:
-            import ray
+            ray: Any = importlib.import_module("ray")
         except ImportError as error:
             raise ImportError("engine=\"ray\" needs Ray: pip install 'sidestep[ray]'") from error
         if not ray.is_initialized():

@@ -204,9 +204,8 @@ def paired(a: ArrayLike, b: ArrayLike) -> Paired:
     (-2.0, True)
     """
     counts, intervals, p_values, signs, ratio = _native.stats_paired(_values("a", a), _values("b", b))
-    return Paired(
-        *counts, *map(_interval, intervals), *p_values, *signs, ratio[0], _interval(ratio[1])
-    )
+    student, bootstrap = map(_interval, intervals)
+    return Paired(*counts, student, bootstrap, *p_values, *signs, ratio[0], _interval(ratio[1]))
 
 
 def holm(p_values: Sequence[float | None]) -> list[float | None]:
