@@ -39,7 +39,7 @@ HALL = """
 ........................................
 """
 #: Contacts cost as much as this way brings.
-CONTACT_M = 3.0
+CONTACT_M = 1.5
 #: The numbers of the beams in a mirror: they are counted counter-clockwise from ahead.
 MIRROR = [0, 7, 6, 5, 4, 3, 2, 1]
 FORWARD, LEFT, RIGHT = 0, 1, 2

@@ -6,6 +6,7 @@ import os
 import pathlib
 import signal
 import subprocess
+import sys
 import threading
 import time
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
@@ -52,9 +53,9 @@ def files(folder):
 
 
 def begun(folder):
-    """Whether the journal has a run, after its first line."""
+    """How many runs the journal has, after its first line."""
     journals = (folder / "shares").glob("*.journal")
-    return any(journal.read_bytes().count(b"\n") > 1 for journal in journals)
+    return sum(max(journal.read_bytes().count(b"\n") - 1, 0) for journal in journals)
 
 
 def told(command, *args):
@@ -178,6 +179,34 @@ def test_ctrl_c_stops_a_sweep_and_the_same_call_goes_on(floor, tmp_path):
     swept = sidestep.sweep(floor, **options, out=out, workers=2)
     assert 0 < swept.told["took"]["runs"] < 40
     whole = sidestep.sweep(floor, **options, out=tmp_path / "whole", workers=2)
+    assert files(out) == files(tmp_path / "whole")
+
+
+DRIVER = """
+import sys
+from concurrent.futures import ThreadPoolExecutor
+import sidestep
+floor, out = sys.argv[1:]
+with ThreadPoolExecutor(2) as pool:
+    sidestep.sweep(floor, set={"cycles": 20_000}, replicate=40, out=out, engine=pool)
+"""
+
+
+def test_a_killed_driver_loses_nothing_that_is_in_the_journal(floor, tmp_path):
+    out = tmp_path / "s"
+    driver = subprocess.Popen([sys.executable, "-c", DRIVER, floor, out])
+    while not begun(out):
+        assert driver.poll() is None, "it has ended before"
+        time.sleep(0.01)
+    driver.kill()
+    driver.wait()
+    finished = len(sidestep.read(out)["results"])
+    assert 0 < finished < 40
+    options = {"set": {"cycles": 20_000}, "replicate": 40}
+    with ThreadPoolExecutor(2) as pool:
+        swept = sidestep.sweep(floor, **options, out=out, engine=pool)
+    assert swept.told["took"]["runs"] == 40 - finished
+    sidestep.sweep(floor, **options, out=tmp_path / "whole")
     assert files(out) == files(tmp_path / "whole")
 
 
@@ -349,16 +378,37 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_table(floor, tmp_path
     assert files(tmp_path / "dask") == files(tmp_path / "local")
 
 
-def test_ray_gives_the_same_table(floor, tmp_path):
+def test_a_ray_cluster_that_loses_a_node_gives_the_same_table(floor, tmp_path, monkeypatch):
     ray = needs("ray")
-    options = {"vary": VARY, "replicate": 6}
+    from ray.cluster_utils import Cluster
+
+    monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+    options = {"vary": VARY, "replicate": 12, "set": {"cycles": 40_000}}
     sidestep.sweep(floor, **options, out=tmp_path / "local")
-    ray.init(
-        num_cpus=2, include_dashboard=False, log_to_driver=False,
-        object_store_memory=120_000_000, _node_ip_address="127.0.0.2",
-    )  # fmt: skip
+    node = {"num_cpus": 1, "object_store_memory": 120_000_000}
+    cluster = Cluster(
+        initialize_head=True,
+        head_node_args={**node, "node_ip_address": "127.0.0.2", "include_dashboard": False},
+    )
+    others = [cluster.add_node(**node, node_ip_address=f"127.0.0.{k}") for k in (3, 4)]
+    ray.init(address=cluster.address, log_to_driver=False)
     try:
-        sidestep.sweep(floor, **options, out=tmp_path / "ray", engine="ray")
+        done, at_kill = threading.Event(), []
+
+        def kill():
+            while not done.is_set() and not begun(tmp_path / "ray"):
+                time.sleep(0.01)
+            cluster.remove_node(others[0], allow_graceful=False)
+            at_kill.append(begun(tmp_path / "ray"))
+
+        thread = threading.Thread(target=kill)
+        thread.start()
+        swept = sidestep.sweep(floor, **options, out=tmp_path / "ray", engine="ray")
+        done.set()
+        thread.join()
+        assert 0 < at_kill[0] < 48, "the node was there to the end"
     finally:
         ray.shutdown()
+        cluster.shutdown()
+    assert swept.told["took"]["at_once"] == 3
     assert files(tmp_path / "ray") == files(tmp_path / "local")
