@@ -17,32 +17,49 @@ Python runs it.
 ['at_boxes', 'contact', 'contact_side', 'due', 'heading']
 """
 
+from . import collectives, learn, stats
+from ._arm import Placed, Reached, fk, ik
 from ._errors import (
     CheckpointError,
     ClosedError,
+    EngineError,
     InputError,
     OrderError,
     RecordError,
     ReplayError,
     SidestepError,
 )
-from ._native import Scenario, Simulation, Space, Table, Team, __version__, read, schema, worlds
+from ._native import Arm, Scenario, Simulation, Space, Table, Team, __version__, read, schema, worlds
+
+from ._sweep import Sweep, compare, sweep
 
 __all__ = [
+    "Arm",
     "CheckpointError",
     "ClosedError",
+    "EngineError",
     "InputError",
     "OrderError",
+    "Placed",
+    "Reached",
     "RecordError",
     "ReplayError",
     "Scenario",
     "SidestepError",
     "Simulation",
     "Space",
+    "Sweep",
     "Table",
     "Team",
     "__version__",
+    "collectives",
+    "compare",
+    "fk",
+    "ik",
+    "learn",
     "read",
     "schema",
+    "stats",
+    "sweep",
     "worlds",
 ]

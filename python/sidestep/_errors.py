@@ -55,5 +55,14 @@ class ReplayError(SidestepError, RuntimeError):
     """A run that stopped, or did not come out as recorded; the text says what replays it."""
 
 
+class EngineError(SidestepError, RuntimeError):
+    """An executor that cannot run the tasks of a sweep; what is finished is kept, and the same call goes on."""
+
+
 class ClosedError(SidestepError, RuntimeError):
     """A simulation that was closed is used."""
+
+
+def wrong(place: str, cause: str, remedy: str) -> InputError:
+    """Returns the error of an argument."""
+    return InputError(f"{place}: {cause}\n  help: {remedy}", place, None, None, None, cause, remedy)

@@ -8,15 +8,31 @@ from numpy.typing import ArrayLike, NDArray
 
 __version__: str
 __all__ = [
+    "Arm",
+    "Learned",
     "Scenario",
     "Simulation",
     "Space",
     "Table",
     "Team",
     "__version__",
+    "compare_methods",
+    "learn_effector",
+    "learn_sensor",
+    "minimize_objective",
+    "minimize_pairs",
     "read",
     "rebuild",
+    "run_sweep",
+    "run_task",
     "schema",
+    "stats_correlation",
+    "stats_holm",
+    "stats_mean",
+    "stats_next",
+    "stats_paired",
+    "stats_quantile",
+    "stats_share",
     "unpack_scenario",
     "worlds",
 ]
@@ -165,3 +181,102 @@ def rebuild(
     scenario: tuple[str, list[tuple[str, bytes]]], workers: int, checkpoint: bytes
 ) -> Simulation: ...
 def unpack_scenario(text: str, files: list[tuple[str, bytes]]) -> Scenario: ...
+
+# Sweeps: what `_sweep.py` and `_engines.py` stand on.
+
+def run_sweep(
+    sweep: Scenario | str | PathLike[str] | Mapping[str, Any],
+    options: Mapping[str, Any],
+    out: str | PathLike[str] | None,
+    workers: int,
+    begin: Callable[[str, list[tuple[int, int, int, int]]], Any] | None,
+) -> tuple[Table, Table, dict[str, Any]]: ...
+def run_task(
+    build: str,
+    scenarios: Sequence[tuple[int, tuple[str, list[tuple[str, bytes]]]]],
+    cells: Sequence[tuple[int, int, int, int]],
+) -> list[str]: ...
+def compare_methods(
+    scenario: Scenario | str | PathLike[str] | Mapping[str, Any],
+    methods: Sequence[str],
+    runs: int,
+    seed: int | None,
+    workers: int,
+) -> dict[str, Any]: ...
+
+# Analysis: what `_arm.py`, `stats.py`, `learn.py` and `collectives.py` stand on.
+
+_Ends = tuple[float, float] | None
+_Reals = NDArray[np.float64]
+
+@final
+class Arm:
+    def __new__(
+        cls,
+        urdf: str | PathLike[str],
+        *,
+        base: str | None = None,
+        tip: str | None = None,
+        srdf: str | PathLike[str] | None = None,
+        group: str | None = None,
+    ) -> Arm: ...
+    @property
+    def robot(self) -> str: ...
+    @property
+    def base(self) -> str: ...
+    @property
+    def tip(self) -> str: ...
+    @property
+    def joints(self) -> list[str]: ...
+    @property
+    def units(self) -> list[Literal["rad", "m"]]: ...
+    @property
+    def limits(self) -> _Reals: ...
+    def posture(self, name: str | None = None) -> _Reals: ...
+    def forward(self, joints: _Reals) -> dict[str, Any]: ...
+    def inverse(self, targets: _Reals, start: _Reals, options: Mapping[str, Any]) -> dict[str, Any]: ...
+
+@final
+class Learned:
+    @property
+    def kind(self) -> Literal["sensor", "effector"]: ...
+    @property
+    def report(self) -> dict[str, Any]: ...
+    def profile(self, name: str, text: str | None = None) -> str: ...
+
+def learn_effector(
+    text: str | None, run: str | PathLike[str] | None, options: tuple[float, int]
+) -> Learned: ...
+def learn_sensor(
+    text: str | None,
+    run: str | PathLike[str] | None,
+    shape: Mapping[str, Any],
+    options: tuple[float, int],
+) -> Learned: ...
+def minimize_pairs(
+    own: Sequence[_Reals], pairs: Sequence[tuple[int, int, _Reals]], options: Mapping[str, Any]
+) -> dict[str, Any]: ...
+def minimize_objective(
+    strategies: Sequence[int],
+    objective: Callable[[NDArray[np.int64]], float],
+    options: Mapping[str, Any],
+) -> dict[str, Any]: ...
+def stats_mean(
+    values: _Reals,
+) -> tuple[float | None, float | None, _Ends, _Ends, int, int]: ...
+def stats_share(successes: int, n: int) -> tuple[tuple[float, float], tuple[float, float]]: ...
+def stats_quantile(values: _Reals, q: float) -> tuple[float | None, _Ends, float | None]: ...
+def stats_paired(
+    a: _Reals, b: _Reals
+) -> tuple[
+    tuple[int, int, float | None],
+    tuple[_Ends, _Ends],
+    tuple[float | None, float | None],
+    tuple[int, int, int],
+    tuple[float | None, _Ends],
+]: ...
+def stats_holm(p_values: Sequence[float | None]) -> list[float | None]: ...
+def stats_correlation(a: _Reals, b: _Reals) -> tuple[float, _Ends, int] | None: ...
+def stats_next(
+    half_width: float, relative: bool, runs: tuple[int, int], columns: Sequence[_Reals]
+) -> tuple[int, str | None]: ...

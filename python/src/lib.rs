@@ -5,19 +5,27 @@
 //! simulation.rs  a run that Python advances, observes and orders
 //! space.rs       what goes in and out       decide.rs  functions in Python that decide
 //! table.rs       rows -> Arrow, NumPy       arrays.rs  ids, values and columns of bodies
+//! sweep.rs       many runs, by threads or by others
+//! arm.rs         kinematics of arms         learn.rs   error models from tables
+//! stats.rs       intervals and pairs        collectives.rs  games of tables or of an objective
 //! json.rs        values of other sorts
 //! error.rs       the exceptions             watch.rs   Ctrl-C
 //! ```
 //!
 //! It stands on the crate `session`, as the command does: the same scenario and seed give the same bits.
 
+mod arm;
 mod arrays;
+mod collectives;
 mod decide;
 mod error;
 mod json;
+mod learn;
 mod scenario;
 mod simulation;
 mod space;
+mod stats;
+mod sweep;
 mod table;
 mod watch;
 
@@ -32,6 +40,20 @@ mod _native {
     use super::simulation::{Simulation, rebuild};
     #[pymodule_export]
     use super::space::{Space, Team};
+    // Sweeps and analysis.
+    #[pymodule_export]
+    use super::arm::Arm;
+    #[pymodule_export]
+    use super::collectives::{minimize_objective, minimize_pairs};
+    #[pymodule_export]
+    use super::learn::{Learned, learn_effector, learn_sensor};
+    #[pymodule_export]
+    use super::stats::{
+        stats_correlation, stats_holm, stats_mean, stats_next, stats_paired, stats_quantile,
+        stats_share,
+    };
+    #[pymodule_export]
+    use super::sweep::{compare_methods, run_sweep, run_task};
     #[pymodule_export]
     use super::table::{Table, read};
     use pyo3::prelude::*;

@@ -2,6 +2,7 @@
 
 use crate::error;
 use crate::json::list;
+use crate::sweep::read_folder;
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::types::UInt32Type;
 use arrow_array::{
@@ -16,8 +17,12 @@ use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict};
+use sidestep::experiment::sweep::{Role, RunColumn};
 use sidestep::kernel::ports::{ColumnSpec, ColumnType, TableSchema, Values};
+use sidestep::scenario::{Meaning, told};
+use sidestep::worlds::WORLDS;
 use sidestep_record::{read_table, tables};
+use sidestep_session::sweep::Folder;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -42,6 +47,17 @@ impl Table {
         let arrays = arrays.collect::<Result<Vec<_>, _>>().map_err(|e| bug(&e))?;
         let batch = RecordBatch::try_new(arrow, arrays).map_err(|e| bug(&e))?;
         Ok(Self { schema, batch })
+    }
+
+    /// Returns a table of a sweep's runs; numbers are not copied.
+    pub(crate) fn of_runs(name: &str, columns: Vec<RunColumn>, world: &str) -> PyResult<Self> {
+        let meanings = WORLDS.named(world).map_or(&[][..], |world| world.meanings());
+        let spec = |column: &RunColumn| ColumnSpec {
+            is_nullable: true,
+            ..ColumnSpec::new(&column.name, column.values.ty(), &meaning(column, meanings))
+        };
+        let schema = TableSchema::new(name, columns.iter().map(spec).collect());
+        Self::new(schema, columns.into_iter().map(|column| column.values).collect())
     }
 
     fn position(&self, name: &str) -> PyResult<usize> {
@@ -141,6 +157,23 @@ impl Table {
             Box::new(RecordBatchIterator::new(batches, self.batch.schema()));
         PyCapsule::new_with_value(py, FFI_ArrowArrayStream::new(reader), c"arrow_array_stream")
     }
+}
+
+/// Returns one sentence about a column of a table of runs.
+fn meaning(column: &RunColumn, meanings: &[Meaning]) -> String {
+    let words = match column.role {
+        Role::Cell => "Number of the run.",
+        Role::Variant => "Number of its variant.",
+        Role::Replicate => {
+            "Number of the run among those of its variant; equal ones have the same seed."
+        }
+        Role::Seed => "The seed.",
+        Role::Parameter => "Value of this key in the scenario.",
+        Role::Metric => told(meanings, &column.name).meaning,
+        Role::Digest => "Digest of the last state.",
+        Role::Cost => "A time that the run took; it differs when the run is made again.",
+    };
+    words.to_string()
 }
 
 fn bug(error: &ArrowError) -> PyErr {
@@ -245,7 +278,7 @@ where
 /// Returns the tables of a run folder or a sweep's folder by name.
 ///
 /// ``tables`` names those that are wanted; all of them otherwise. A table of a run that has not ended reaches to its last
-/// checkpoint.
+/// checkpoint. A sweep has ``results``, one row per finished run, and ``timings``.
 ///
 /// Raises InputError when there is no such folder or table, or a file is damaged.
 #[pyfunction]
@@ -256,6 +289,9 @@ pub(crate) fn read<'py>(
     tables: Option<Vec<String>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let wanted = tables;
+    if Folder::is_at(&folder) {
+        return read_folder(py, &folder, wanted.as_ref());
+    }
     let read = || {
         let names = wanted.map_or_else(|| self::tables(&folder), Ok)?;
         names.into_iter().map(|name| read_table(&folder, &name, ..).map(|t| (name, t))).collect()

@@ -1,8 +1,14 @@
-//! Ctrl-C: between two slices of a run, Python is asked for signals.
+//! Ctrl-C: between two slices of a run, or while work goes on in other threads, Python is asked for signals.
 
 use pyo3::prelude::*;
+use sidestep::kernel::Interrupt;
 use sidestep_session::{Error, Watcher};
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Time that a cycle has to come to its end.
+const PATIENCE: Duration = Duration::from_secs(1);
 
 /// A watcher that stops a run between two cycles when Python has a signal to handle.
 #[derive(Debug, Default)]
@@ -11,16 +17,19 @@ pub(crate) struct Signals(Mutex<Option<PyErr>>);
 impl Signals {
     /// Returns the exception of the signal, if there was one.
     pub(crate) fn into_result(self) -> PyResult<()> {
-        let raised = self.0.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let raised = self.0.into_inner().unwrap_or_else(PoisonError::into_inner);
         raised.map_or(Ok(()), Err)
     }
 }
 
 impl Watcher for Signals {
     fn go_on(&self) -> bool {
-        let Err(raised) = Python::attach(|py| py.check_signals()) else { return true };
-        *self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(raised);
-        false
+        // Python tells of a signal once.
+        let mut raised = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if raised.is_none() {
+            *raised = Python::attach(|py| py.check_signals()).err();
+        }
+        raised.is_none()
     }
 
     fn warn(&self, error: &Error) {
@@ -31,4 +40,57 @@ impl Watcher for Signals {
             let _ = PyErr::warn(py, &category, &text, 1);
         });
     }
+}
+
+/// A watcher of work in other threads, which hear of no signals: the calling one looks for them.
+#[derive(Debug, Default)]
+struct Attended {
+    signals: Signals,
+    is_over: AtomicBool,
+    interrupt: Interrupt,
+}
+
+impl Attended {
+    /// Asks Python for signals; the first stops the work, at once where its cycles take long.
+    fn look(&self, stopped: &mut Option<Instant>) {
+        match stopped {
+            Some(since) if since.elapsed() > PATIENCE => self.interrupt.raise(),
+            Some(_) => {}
+            None if self.signals.go_on() => {}
+            None => {
+                self.is_over.store(true, Ordering::Relaxed);
+                *stopped = Some(Instant::now());
+            }
+        }
+    }
+}
+
+impl Watcher for Attended {
+    fn go_on(&self) -> bool {
+        !self.is_over.load(Ordering::Relaxed)
+    }
+
+    fn warn(&self, error: &Error) {
+        self.signals.warn(error);
+    }
+
+    fn interrupt(&self) -> Interrupt {
+        self.interrupt.clone()
+    }
+}
+
+/// Does work in other threads, while this one waits without Python's lock and looks for signals.
+///
+/// # Errors
+/// The exception of a signal.
+pub(crate) fn attended<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce(&dyn Watcher) -> T + Send,
+) -> PyResult<T> {
+    let watcher = Attended::default();
+    let done = py.detach(|| {
+        let mut stopped = None;
+        sidestep_session::attended(|| work(&watcher), || watcher.look(&mut stopped))
+    });
+    watcher.signals.into_result().map(|()| done)
 }

@@ -4,7 +4,7 @@ use crate::cells;
 use crate::study::{Progress, all_of, setting};
 use serde::Serialize;
 use sidestep::experiment::sweep::seeds::remedy;
-use sidestep::kernel::{Digest, InputError, Simulation};
+use sidestep::kernel::{Digest, InputError, Interrupt, Simulation};
 use sidestep::scenario::{Seeds, Source};
 use sidestep::statistics::{Interval, wilson};
 use sidestep::worlds::airspace::airspace_run;
@@ -58,12 +58,26 @@ pub fn compare(
     workers: usize,
     progress: &mut Progress<'_>,
 ) -> Result<Vec<MethodResult>, InputError> {
+    compare_heeding(source, methods, (seed, runs), workers, (progress, &Interrupt::default()))
+}
+
+/// Compares methods like [`compare`], and unwinds when the interrupt is raised.
+///
+/// # Errors
+/// When the scenario is wrong.
+pub fn compare_heeding(
+    source: &Source,
+    methods: &[Method],
+    (seed, runs): (u64, usize),
+    workers: usize,
+    (progress, interrupt): (&mut Progress<'_>, &Interrupt),
+) -> Result<Vec<MethodResult>, InputError> {
     let mut results = Vec::new();
     for method in methods {
         let source =
             source.clone().with(&[setting("airspace.method", method.name()).to_override()])?;
         let report = |share| progress(method.name(), share);
-        let flights = Flights { source: &source, workers };
+        let flights = Flights { source: &source, workers, interrupt };
         let (seeds, all) = flights.all((seed, runs), report)?;
         results.push(result(method.name(), seeds, &all));
     }
@@ -74,6 +88,7 @@ pub fn compare(
 struct Flights<'a> {
     source: &'a Source,
     workers: usize,
+    interrupt: &'a Interrupt,
 }
 
 /// Number of flights that tell whether seeds change anything, where the world cannot tell.
@@ -106,7 +121,9 @@ impl Flights<'_> {
         seeds: &[u64],
         report: impl FnMut(f64),
     ) -> Result<Vec<(Metrics, Digest)>, InputError> {
-        let run = |seed: &u64| flown(&self.source.clone().with(&[format!("seed={seed}")])?);
+        let run = |seed: &u64| {
+            flown(&self.source.clone().with(&[format!("seed={seed}")])?, self.interrupt)
+        };
         all_of(seeds, self.workers, report, run)
     }
 }
@@ -116,8 +133,9 @@ fn ends(flights: &[(Metrics, Digest)]) -> Vec<Metrics> {
 }
 
 /// Runs a scenario to its end.
-fn flown(source: &Source) -> Result<(Metrics, Digest), InputError> {
+fn flown(source: &Source, interrupt: &Interrupt) -> Result<(Metrics, Digest), InputError> {
     let mut run = airspace_run(source, 1)?;
+    run.heed(interrupt.clone());
     let cycles = run.plan().cycles;
     while run.cycle() < cycles && !run.is_over() {
         run.advance(cycles - run.cycle());

@@ -12,12 +12,14 @@
 //! sweep/        many runs of one scenario              summary.rs    the results of a run
 //! live/         viewers that watch and steer           beat.rs       when a cycle is due
 //! watcher.rs    progress, and whether to go on         identity.rs   the build that made a run
+//! attend.rs     work that its caller looks after
 //! ```
 //!
 //! Nothing here knows a terminal, the options of a command, or a world: functions that need the
 //! list of worlds take [`Worlds`](sidestep::scenario::Worlds), and report their progress to a
 //! [`Watcher`].
 
+mod attend;
 mod beat;
 mod compare;
 mod driver;
@@ -42,6 +44,7 @@ pub mod export;
 pub mod report;
 pub mod sweep;
 
+pub use attend::attended;
 pub use beat::Beat;
 pub use driver::{Effort, Sinks, drive};
 pub use error::Error;

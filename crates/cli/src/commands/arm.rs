@@ -4,11 +4,9 @@ use super::arm_picture::ArmPicture;
 use crate::console::{aligned, fixed};
 use clap::Args;
 use serde::Serialize;
-use sidestep::import::urdf::srdf::Semantics;
-use sidestep::import::urdf::{Model, Solids};
 use sidestep::kernel::InputError;
 use sidestep::worlds::chain::kinematics::{
-    ArmBody, Pose, Rod, SerialChain, Sphere, Variable, Vector,
+    ArmFiles, ChosenArm, Pose, Rod, Sphere, Variable, Vector,
 };
 use std::path::PathBuf;
 
@@ -46,11 +44,7 @@ pub(crate) struct ArmArgs {
 
 /// An arm in a posture.
 pub(crate) struct Arm {
-    pub(crate) model: Model,
-    /// Pairs of links that may touch, as the SRDF says.
-    may_touch: Vec<(usize, usize)>,
-    urdf: PathBuf,
-    pub(crate) chain: SerialChain,
+    pub(crate) chosen: ChosenArm,
     pub(crate) values: Vec<f64>,
 }
 
@@ -60,44 +54,23 @@ impl ArmArgs {
     /// # Errors
     /// When a file, a link, a group, the posture or the values are wrong.
     pub(crate) fn load(&self) -> Result<Arm, InputError> {
-        let model = Model::load(&self.urdf)?;
-        let semantics = self.srdf.as_ref().map(|path| Semantics::load(path, &model)).transpose()?;
-        let chain = self.chain(&model, semantics.as_ref())?;
-        let (place, values) = match (&self.joints, &self.posture, &semantics) {
-            (Some(text), ..) => ("--joints", numbers("--joints", text)?),
-            (None, Some(name), Some(semantics)) => {
-                let posture = semantics.posture("--posture", name)?;
-                ("--posture", chain.with_posture(&model, &posture))
-            }
-            _ => ("--joints", chain.rest()),
+        let chosen = self.files().load()?;
+        let (place, values) = match &self.joints {
+            Some(text) => ("--joints", numbers("--joints", text)?),
+            None => ("--posture", chosen.posture(self.posture.as_deref())?),
         };
-        chain.check_count(place, &values)?;
-        let masks = semantics.map(|semantics| semantics.disabled_collisions).unwrap_or_default();
-        let may_touch = masks.iter().map(|mask| mask.links).collect();
-        Ok(Arm { model, may_touch, urdf: self.urdf.clone(), chain, values })
+        chosen.chain.check_count(place, &values)?;
+        Ok(Arm { chosen, values })
     }
 
-    fn chain(
-        &self,
-        model: &Model,
-        semantics: Option<&Semantics>,
-    ) -> Result<SerialChain, InputError> {
-        if let (Some(name), Some(semantics)) = (&self.group, semantics) {
-            let (base, tip) = semantics.ends("--group", name, model)?;
-            return SerialChain::new(model, base, tip, "--group");
+    fn files(&self) -> ArmFiles {
+        ArmFiles {
+            urdf: self.urdf.clone(),
+            base: self.base.clone(),
+            tip: self.tip.clone(),
+            srdf: self.srdf.clone(),
+            group: self.group.clone(),
         }
-        let link = |option, name: &Option<String>, otherwise| match name {
-            Some(name) => model.link(option, name),
-            None => Ok(otherwise),
-        };
-        let base = link("--base", &self.base, model.root)?;
-        let tip = link("--tip", &self.tip, model.default_tip())?;
-        let place = match (&self.tip, &self.base) {
-            (Some(_), _) => "--tip".into(),
-            (None, Some(_)) => "--base".into(),
-            (None, None) => self.urdf.display().to_string(),
-        };
-        SerialChain::new(model, base, tip, &place)
     }
 }
 
@@ -154,20 +127,14 @@ struct RodSize {
 }
 
 impl Arm {
-    /// Returns the shapes of its links, and remarks on those that are not among them.
-    pub(crate) fn body(&self) -> (ArmBody, Vec<String>) {
-        let Solids { solids, remarks } = self.model.solids(&self.urdf);
-        (ArmBody::new(&self.model, &self.chain, &solids, &self.may_touch), remarks)
-    }
-
     /// Returns the positions of the arm at these joint values.
     pub(crate) fn at(&self, values: &[f64]) -> Placed {
-        let chain = &self.chain;
+        let chain = &self.chosen.chain;
         let frames = chain.forward(values);
         let skeleton = chain.skeleton();
         let Pose { rotation, origin_m } = frames.tip;
         Placed {
-            robot: self.model.name.clone(),
+            robot: self.chosen.model.name.clone(),
             base_link: chain.base.clone(),
             tip_link: chain.tip.clone(),
             tip: origin_m,

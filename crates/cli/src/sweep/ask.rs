@@ -2,8 +2,7 @@
 
 use crate::plan::ChangeArgs;
 use clap::Args;
-use sidestep::experiment::sweep::file::MAX_RUNS;
-use sidestep::experiment::sweep::{Factor, Setting, Sweep, Until, Wanted};
+use sidestep::experiment::sweep::{Changes, Factor, Setting, Sweep, Until, Wanted};
 use sidestep::kernel::InputError;
 use std::path::Path;
 
@@ -71,41 +70,20 @@ impl ManyArgs {
     /// # Errors
     /// When the file or an option is wrong.
     pub(crate) fn sweep(&self, file: &Path, changes: &ChangeArgs) -> Result<Sweep, InputError> {
-        let mut sweep = Sweep::read(file)?;
-        sweep.fixed.extend(settings(&changes.settings())?);
-        for text in &self.vary {
-            sweep.design.factors.push(Factor::parse(text)?);
-        }
-        if let Some(until) = &self.until {
-            // An option replaces the precision alone; the other keys of the file's `until` stay.
-            let metrics = sweep.until.take().map(|of_file| of_file.metrics);
-            sweep.replicates = if metrics.is_some() { sweep.replicates } else { MAX_RUNS };
-            sweep.until = Some(Until { metrics: metrics.unwrap_or_default(), ..until.clone() });
-        }
-        if let Some(n) = self.replicate {
-            (sweep.until, sweep.replicates) = (None, n);
-        }
-        if let Some(max) = self.max {
-            if sweep.until.is_none() {
-                let cause = "it bounds the runs of a sweep that goes on until it is precise";
-                return Err(InputError::new("--max", cause, "give --until ci=0.05 as well"));
-            }
-            sweep.replicates = max;
-        }
-        if !self.metrics.is_empty() {
-            sweep.metrics.clone_from(&self.metrics);
-        }
-        let applies_to = |until: &Until| until.metrics.is_empty() || !self.metrics.is_empty();
-        if let Some(until) = sweep.until.as_mut().filter(|until| applies_to(until)) {
-            until.metrics.clone_from(&sweep.metrics);
-        }
-        if !self.baseline.is_empty() {
-            sweep.baseline = wanted(&self.baseline)?;
-        }
-        sweep.first_seed = changes.seed.or(sweep.first_seed);
-        sweep.record |= self.record_runs;
-        sweep.check()?;
-        Ok(sweep)
+        let sweep = Sweep::read(file)?;
+        let factor = |text: &String| Factor::parse(text);
+        let baseline = (!self.baseline.is_empty()).then(|| wanted(&self.baseline)).transpose()?;
+        sweep.changed(Changes {
+            fixed: settings(&changes.settings())?,
+            factors: self.vary.iter().map(factor).collect::<Result<_, _>>()?,
+            until: self.until.clone(),
+            replicates: self.replicate,
+            max_runs: self.max,
+            metrics: self.metrics.clone(),
+            baseline,
+            first_seed: changes.seed,
+            record: self.record_runs,
+        })
     }
 }
 

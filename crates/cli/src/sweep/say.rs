@@ -7,7 +7,7 @@ use serde_json::json;
 use sidestep::experiment::sweep::rounds::{Stopped, stopped};
 use sidestep::experiment::sweep::{LeftOut, Plan, RunTable, Shard, Summary};
 use sidestep_document::Table;
-use sidestep_session::sweep::{Done, Effort, Ended, Folder};
+use sidestep_session::sweep::{self, Done, Effort, Ended, Folder};
 use std::path::Path;
 
 /// Largest number of failed runs that are listed.
@@ -22,16 +22,6 @@ fn time_words(effort: &Effort) -> String {
         1000.0 * effort.simulation_s_per_run(),
         effort.overhead_ms_per_run(),
     )
-}
-
-fn time_json(effort: &Effort) -> serde_json::Value {
-    json!({
-        "runs": effort.runs,
-        "at_once": effort.at_once,
-        "wall_s": effort.wall_s,
-        "simulation_s_per_run": effort.simulation_s_per_run(),
-        "overhead_ms_per_run": effort.overhead_ms_per_run(),
-    })
 }
 
 /// A sweep and the console that it is reported to.
@@ -50,37 +40,27 @@ pub(crate) struct Told<'a> {
 /// When a metric that is to be reported does not exist.
 pub(crate) fn tell(told: Told<'_>, ended: Ended, already: &str) -> Result<ExitCode, Failure> {
     let Told { plan, folder, console } = told;
-    let Done { table, effort, was_done } = match ended {
+    let done = match ended {
         Ended::Done(done) => done,
         Ended::Interrupted(runs) => return Ok(interrupted(told, runs)),
     };
-    if was_done {
+    if done.was_done {
         console.note(already);
     }
+    let table = &done.table;
     let stages = Stages::new(console);
-    let summary = plan.summary_watched(&table, &mut |share| stages.at("intervals", share));
+    let summary = plan.summary_watched(table, &mut |share| stages.at("intervals", share));
     stages.clear();
     let summary = summary?;
-    let stopped = stopped(plan, &table);
-    let failed = failures(told, &table);
-    let json = json!({
-        "status": "complete",
-        "name": plan.name,
-        "world": plan.world,
-        "parameters": plan.parameters,
-        "first_seed": plan.first_seed,
-        "runs": table.runs(),
-        "failed": failed,
-        "stopped": stopped,
-        "took": (effort.runs > 0).then(|| time_json(&effort)),
-        "results": folder.map(Folder::results_file),
-        "summary": summary,
-    });
+    let failed = failures(told, table);
+    let json = done.told(plan, folder, &summary);
     let short = || match folder {
         Some(folder) => format!("{}\n", folder.results_file().display()),
         None => tables(&summary),
     };
-    console.result_or_short(&json, short, || text(told, &table, &summary, &stopped, effort));
+    console.result_or_short(&json, short, || {
+        text(told, table, &summary, &stopped(plan, table), done.effort)
+    });
     Ok(if failed == 0 { ExitCode::Done } else { ExitCode::Failed })
 }
 
@@ -178,14 +158,12 @@ fn left_out(summary: &Summary) -> Option<String> {
 /// Prints the first failed runs and how to run them again, and returns the number of all.
 fn failures(told: Told<'_>, table: &RunTable) -> usize {
     let Told { plan, folder, console } = told;
-    let Some(column) = table.column("failure") else { return 0 };
     let cell = table.column("cell");
     let cell_of = |row: usize| {
         let id = cell.and_then(|c| c.values.number(row)).map(|id| id as u64);
         id.and_then(|id| plan.cell_of(id))
     };
-    let rows = (0..table.runs()).filter(|&row| !column.values.text(row).is_empty());
-    let failed: Vec<usize> = rows.collect();
+    let failed: Vec<usize> = sweep::failed(table).collect();
     for &row in failed.iter().take(NAMED) {
         let Some(cell) = cell_of(row) else { continue };
         let again = folder.map_or_else(String::new, |folder| {
@@ -193,7 +171,7 @@ fn failures(told: Told<'_>, table: &RunTable) -> usize {
             format!("\n  again: sidestep run {} --seed {}", scenario.display(), cell.seed)
         });
         let variant = &plan.variants[cell.variant as usize];
-        let why = column.values.text(row);
+        let why = table.column("failure").map_or_else(String::new, |c| c.values.text(row));
         console.warn(format!("a run failed: {variant}, seed {}: {why}{again}", cell.seed));
     }
     if failed.len() > NAMED {
@@ -217,7 +195,7 @@ pub(crate) fn tell_share(told: Told<'_>, shard: Shard, ended: Ended) -> ExitCode
         "share": shard.to_string(),
         "runs": table.runs(),
         "failed": failed,
-        "took": (effort.runs > 0).then(|| time_json(&effort)),
+        "took": (effort.runs > 0).then(|| effort.told()),
     });
     console.result_or_short(&json, String::new, || {
         let time = (effort.runs > 0).then(|| ("time".to_string(), time_words(&effort)));

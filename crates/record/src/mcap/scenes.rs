@@ -84,6 +84,10 @@ impl McapScenes {
         options: IndexedReaderOptions,
         mut take: impl FnMut(T) -> ControlFlow<()>,
     ) -> Result<(), InputError> {
+        if !self.summary.channels.values().any(|channel| channel.topic == topic) {
+            // The reader would take no such topic for all topics.
+            return Ok(());
+        }
         // What is packed may be larger, but a damaged length must not ask for all memory.
         let most = self.source.length.saturating_mul(1 << 10).max(LEAST_LIMIT);
         let limit = usize::try_from(most).unwrap_or(usize::MAX);

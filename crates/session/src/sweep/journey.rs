@@ -1,5 +1,6 @@
 //! From a sweep to the table of its runs: in memory, in a folder, or share by share.
 
+use super::crew::Engine;
 use super::effort::Effort;
 use super::prepare::prepare;
 use super::work::{Take, Work};
@@ -56,10 +57,10 @@ impl Done {
 ///
 /// # Errors
 /// When the sweep is wrong, or the watcher asks to stop before the first run.
-pub fn in_memory(
+pub fn in_memory<'a>(
     worlds: Worlds,
     sweep: &Sweep,
-    workers: usize,
+    engine: impl Into<Engine<'a>>,
     watcher: &dyn Watcher,
 ) -> Result<(Plan, Ended), Error> {
     if sweep.record {
@@ -72,7 +73,8 @@ pub fn in_memory(
         Ok(())
     })?;
     let source = |variant: u32| Ok(sources[variant as usize].clone());
-    let work = Work { worlds, plan: &plan, source: &source, record: None, workers, watcher };
+    let (agents, engine) = (plan.agents, engine.into());
+    let work = Work { worlds, agents, source: &source, record: None, engine, watcher };
     let mut log = Log::new(&plan);
     let effort = log.run_all(&work, &mut |_| Ok(()))?;
     let ended = match watcher.go_on() {
@@ -158,10 +160,10 @@ fn check_build(folder: &Folder) -> Result<(), InputError> {
 ///
 /// # Errors
 /// When runs cannot be read or stored.
-pub fn go_on(
+pub fn go_on<'a>(
     worlds: Worlds,
     folder: &Folder,
-    workers: usize,
+    engine: impl Into<Engine<'a>>,
     watcher: &dyn Watcher,
 ) -> Result<Ended, Error> {
     if folder.is_complete() {
@@ -172,7 +174,7 @@ pub fn go_on(
     gather(folder, Some(Shard::ALL), |outcome| log.note(outcome))?;
     let mut effort = Effort::default();
     if let Some(mut journal) = folder.journal(share_of(Shard::ALL), |o: Outcome| log.note(o))? {
-        with_work(worlds, folder, workers, watcher, |work| {
+        with_work(worlds, folder, engine.into(), watcher, |work| {
             let mut keep = |outcome: &Outcome| Ok(journal.append(outcome)?);
             effort = log.run_all(work, &mut keep).map_err(|e| saved(e, folder.path()))?;
             Ok(())
@@ -233,7 +235,7 @@ pub fn share(
     gather(folder, Some(shard), |outcome| _ = elsewhere.insert(outcome.cell))?;
     let cells: Vec<Cell> = plan.share(shard).filter(|c| !elsewhere.contains(&c.id)).collect();
     let mut effort = Effort::default();
-    with_work(worlds, folder, workers, watcher, |work| {
+    with_work(worlds, folder, workers.into(), watcher, |work| {
         let mut keep = |outcome: &Outcome| Ok(journal.append(outcome)?);
         effort = log.run(work, &cells, &mut keep).map_err(|e| saved(e, folder.path()))?;
         Ok(())
@@ -309,11 +311,16 @@ pub(super) fn gather(
 fn with_work(
     worlds: Worlds,
     folder: &Folder,
-    workers: usize,
+    engine: Engine<'_>,
     watcher: &dyn Watcher,
     run: impl FnOnce(&Work<'_>) -> Result<(), Error>,
 ) -> Result<(), Error> {
     let plan = folder.plan();
+    if plan.record && matches!(engine, Engine::Crew(_)) {
+        let cause = "its runs are recorded in its folder, which others cannot write to";
+        let remedy = "run it on threads of this process, or sweep without recording";
+        return Err(InputError::new(folder.path().display(), cause, remedy).into());
+    }
     let checked: Vec<AtomicBool> = plan.variants.iter().map(|_| AtomicBool::new(false)).collect();
     let source = |variant: u32| {
         // A scenario that was edited in between would make runs of another sweep.
@@ -327,7 +334,7 @@ fn with_work(
     let place = |cell: u64| -> PathBuf { folder.run_folder(cell) };
     let record: Option<&(dyn Fn(u64) -> PathBuf + Sync)> =
         if plan.record { Some(&place) } else { None };
-    run(&Work { worlds, plan, source: &source, record, workers, watcher })
+    run(&Work { worlds, agents: plan.agents, source: &source, record, engine, watcher })
 }
 
 /// Adds to an error of storing which runs are saved, and how to continue.

@@ -20,7 +20,7 @@ pub(super) fn prepare(
     mut each: impl FnMut(u32, &Source, &dyn Compiled) -> Result<(), Error>,
 ) -> Result<Plan, Error> {
     let fixed: Vec<String> = sweep.fixed.iter().map(Setting::to_override).collect();
-    let base = source_of(worlds, &sweep.scenario, &fixed)?;
+    let base = base(worlds, sweep, &fixed)?;
     let mut variants = sweep.design.variants(&sweep.place)?;
     Plan::check_size(variants.len(), sweep.replicates, &sweep.place)?;
     let (mut agents, mut first) = (0, None);
@@ -32,7 +32,10 @@ pub(super) fn prepare(
         let share = f64::from(k) / count as f64;
         watched.at(Progress::Stage { what: "checking variants", share });
         let (source, compiled) = variant(worlds, &base, wanted).map_err(|e| {
-            let plain = read(worlds, &sweep.scenario, &fixed).err();
+            let plain = match sweep.given {
+                Some(_) => worlds.compile(&base).err(),
+                None => read(worlds, &sweep.scenario, &fixed).err(),
+            };
             of_variant(wanted, &base, plain, e)
         })?;
         wanted.seeds = compiled.seeds();
@@ -49,6 +52,14 @@ pub(super) fn prepare(
     // A sweep without a name of its own goes by that of its scenario.
     let name = if plan.name.is_empty() { of_scenario.name } else { plan.name };
     Ok(Plan { agents, name, ..plan })
+}
+
+/// Returns the scenario with what all variants share.
+fn base(worlds: Worlds, sweep: &Sweep, fixed: &[String]) -> Result<Source, InputError> {
+    match &sweep.given {
+        Some(source) => source.clone().with(fixed),
+        None => source_of(worlds, &sweep.scenario, fixed),
+    }
 }
 
 /// Checks that the requested metrics exist: it is better to know before all runs than after them.

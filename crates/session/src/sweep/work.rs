@@ -1,15 +1,17 @@
 //! Cells -> outcomes: many at once, or one after another on all workers.
 
+use super::crew::{Crew, Deal, Engine};
 use crate::journey::recorded_run;
 use crate::recording::Recording;
 use crate::watcher::{Progress, Watched, Within};
 use crate::{Error, Watcher};
 use serde_json::json;
 use sidestep::experiment::sweep::work::{self, run_cells};
-use sidestep::experiment::sweep::{Cell, Outcome, Plan, start};
+use sidestep::experiment::sweep::{Cell, Outcome, start};
 use sidestep::kernel::InputError;
 use sidestep::scenario::{Source, Worlds};
 use sidestep_record::Existing;
+use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -21,12 +23,13 @@ const LARGE: u64 = 20_000;
 /// Everything that is needed to run cells.
 pub(super) struct Work<'a> {
     pub(super) worlds: Worlds,
-    pub(super) plan: &'a Plan,
+    /// Number of agents of the largest variant.
+    pub(super) agents: u64,
     /// The scenario of a variant.
     pub(super) source: &'a (dyn Fn(u32) -> Result<Source, InputError> + Sync),
     /// Returns the folder in which the run of a cell is recorded, if it is.
     pub(super) record: Option<&'a (dyn Fn(u64) -> PathBuf + Sync)>,
-    pub(super) workers: usize,
+    pub(super) engine: Engine<'a>,
     pub(super) watcher: &'a dyn Watcher,
 }
 
@@ -46,22 +49,41 @@ impl Work<'_> {
         (before, total): (u64, u64),
         take: &mut Take<'_>,
     ) -> Result<(), Error> {
-        let at_once = self.at_once(cells.len());
-        let each = (self.workers / at_once).max(1);
         let watched = Watched(self.watcher);
         watched.at(Progress::Runs { before, done: before, of: total });
         let mut done = before;
-        run_cells(cells, at_once, |cell| self.cell(*cell, each), &mut |outcome| {
+        let mut take = |outcome| {
             take(outcome)?;
             done += 1;
             watched.at(Progress::Runs { before, done, of: total });
             Ok(())
+        };
+        match self.engine {
+            Engine::Crew(crew) => self.dealt(crew, cells, &mut take),
+            Engine::Workers(workers) => {
+                let at_once = self.at_once(cells.len());
+                let each = (workers / at_once).max(1);
+                run_cells(cells, at_once, |cell| self.cell(*cell, each), &mut take)
+            }
+        }
+    }
+
+    /// Lets a crew run the cells. Whichever outcome of a cell comes first counts.
+    fn dealt(&self, crew: &dyn Crew, cells: &[Cell], take: &mut Take<'_>) -> Result<(), Error> {
+        let mut open: BTreeSet<u64> = cells.iter().map(|cell| cell.id).collect();
+        crew.run(&Deal { cells, work: self }, &mut |outcome| match open.remove(&outcome.cell) {
+            true => take(outcome),
+            false => Ok(()),
         })
     }
 
     /// Returns how many of `runs` are in progress at once; each has its part of the workers.
     pub(super) fn at_once(&self, runs: usize) -> usize {
-        let most = if self.plan.agents >= LARGE { 1 } else { self.workers };
+        let most = match self.engine {
+            Engine::Crew(crew) => crew.at_once(),
+            Engine::Workers(_) if self.agents >= LARGE => 1,
+            Engine::Workers(workers) => workers,
+        };
         most.min(runs).max(1)
     }
 

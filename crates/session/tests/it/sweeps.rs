@@ -1,10 +1,12 @@
 //! Many runs of one scenario.
 
 use crate::support::{Place, WORLDS};
-use sidestep::experiment::sweep::{RunTable, Shard, Sweep};
-use sidestep_session::Unwatched;
+use sidestep::experiment::sweep::{Cell, Outcome, RunTable, Shard, Sweep};
 use sidestep_session::report::document;
-use sidestep_session::sweep::{Ended, Folder, collect, go_on, in_memory, planned, share};
+use sidestep_session::sweep::{
+    Crew, Deal, Ended, Engine, Folder, Taken, Task, collect, go_on, in_memory, planned, share,
+};
+use sidestep_session::{Error, Unwatched, build};
 
 const SWEEP: &str = "format = 1\nscenario = \"pond.toml\"\nreplicates = 3\n\
                      [set]\n\"cycles\" = 700\n[vary]\n\"pond.frogs\" = [4, 20]\n";
@@ -65,4 +67,73 @@ fn runs_of_a_sweep_are_recorded_and_reported() {
             pages.markdown
         );
     }
+}
+
+/// Others who get tasks, the last cells first, and do only some of them in a call.
+struct Others {
+    in_a_call: usize,
+}
+
+impl Others {
+    fn task(deal: &Deal<'_>, cells: &[Cell]) -> Task {
+        let mut variants: Vec<u32> = cells.iter().map(|cell| cell.variant).collect();
+        variants.sort_unstable();
+        variants.dedup();
+        let scenario = |variant: u32| (variant, deal.scenario(variant).expect("there"));
+        let scenarios = variants.into_iter().map(scenario).collect();
+        Task { build: build().into(), scenarios, cells: cells.to_vec() }
+    }
+
+    fn outcomes(deal: &Deal<'_>, cells: &[Cell]) -> Vec<Outcome> {
+        Self::task(deal, cells).run(WORLDS, &Unwatched).expect("run")
+    }
+}
+
+impl Crew for Others {
+    fn run(&self, deal: &Deal<'_>, take: &mut Taken<'_>) -> Result<(), Error> {
+        for cells in deal.cells().chunks(2).rev().take(self.in_a_call) {
+            for outcome in Self::outcomes(deal, cells) {
+                take(outcome.clone())?;
+                // A task that was sent twice comes twice.
+                take(outcome)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn at_once(&self) -> usize {
+        2
+    }
+}
+
+#[test]
+fn others_who_run_the_cells_come_to_the_same_table_in_any_order_and_any_number_of_calls() {
+    let place = Place::new();
+    let sweep = sweep(&place);
+    let (_, ended) = in_memory(WORLDS, &sweep, 2, &Unwatched).expect("run");
+    let table = done(ended);
+    for in_a_call in [1, usize::MAX] {
+        let others = Others { in_a_call };
+        let (_, ended) = in_memory(WORLDS, &sweep, Engine::Crew(&others), &Unwatched).expect("run");
+        assert_eq!(done(ended), table);
+        let path = place.path(&format!("others {in_a_call}"));
+        let folder = planned(WORLDS, &sweep, &path, &Unwatched).expect("planned");
+        let ended = go_on(WORLDS, &folder, Engine::Crew(&others), &Unwatched).expect("run");
+        assert_eq!(done(ended), table);
+    }
+}
+
+#[test]
+fn a_task_of_another_build_is_refused_and_so_is_recording_by_others() {
+    let task = Task { build: "0.0.1+0".into(), scenarios: Vec::new(), cells: Vec::new() };
+    let told = task.run(WORLDS, &Unwatched).expect_err("another build").to_string();
+    assert!(told.contains("0.0.1+0") && told.contains(build()), "{told}");
+
+    let place = Place::new();
+    let sweep = Sweep { record: true, ..sweep(&place) };
+    let folder = planned(WORLDS, &sweep, &place.path("sweep"), &Unwatched).expect("planned");
+    let others = Others { in_a_call: 1 };
+    let told = go_on(WORLDS, &folder, Engine::Crew(&others), &Unwatched);
+    let told = told.err().expect("recorded by others").to_string();
+    assert!(told.contains("which others cannot write to"), "{told}");
 }

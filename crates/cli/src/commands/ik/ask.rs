@@ -6,7 +6,7 @@ use sidestep::import::urdf::Origin;
 use sidestep::kernel::InputError;
 use sidestep::worlds::chain::ik::Engine;
 use sidestep::worlds::chain::kinematics::{
-    ArmBody, ArmGoal, Asked, Axis, MOST_SOLUTIONS, Pose, Sphere, Turn, Vector,
+    ArmBody, ArmGoal, Asked, MOST_SOLUTIONS, Pose, Sphere, Vector,
 };
 
 /// The options that all targets share.
@@ -136,7 +136,7 @@ impl GoalArgs {
         if !counts {
             return Ok((None, Vec::new()));
         }
-        let (body, remarks) = arm.body();
+        let (body, remarks) = arm.chosen.body();
         if is_own && body.is_empty() {
             let cause = ["no link has a collision shape that can be read".to_owned()];
             let cause = [&cause[..], &remarks[..]].concat().join("; ");
@@ -186,31 +186,8 @@ impl GoalArgs {
 
     /// Returns the part of a target's pose that counts.
     fn asked(&self, is_turned: bool) -> Result<Asked, InputError> {
-        let refused = |cause: &str, remedy: &str| Err(InputError::new("--free", cause, remedy));
         let is_free = |axis: FreeAxis| self.free.contains(&axis);
-        let free_turns: Vec<Axis> = FreeAxis::ABOUT
-            .into_iter()
-            .zip(Axis::ALL)
-            .filter_map(|(free, axis)| is_free(free).then_some(axis))
-            .collect();
-        if !is_turned && !free_turns.is_empty() {
-            return refused("a turn is free, and none is asked for", "add --rpy or --quaternion");
-        }
-        let turn = match free_turns[..] {
-            _ if !is_turned => Turn::Free,
-            [] => Turn::Whole,
-            [axis] => Turn::Axis(axis),
-            [_, _, _] => Turn::Free,
-            _ => {
-                let remedy = "free one turn, which leaves the direction of its axis, or all three";
-                return refused("two turns are free", remedy);
-            }
-        };
-        let along = FreeAxis::ALONG.map(|axis| !is_free(axis));
-        if along == [false; 3] && turn == Turn::Free {
-            return refused("everything is free", "leave something that the tip shall do");
-        }
-        Ok(Asked { along, turn })
+        Asked::with_free(is_turned, FreeAxis::ALONG.map(is_free), FreeAxis::ABOUT.map(is_free))
     }
 }
 

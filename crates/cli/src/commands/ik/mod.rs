@@ -112,7 +112,7 @@ pub(crate) fn ik(args: &IkArgs, console: Console) -> Result<ExitCode, Failure> {
     }
     let (body, remarks) = args.goal.body(&arm)?;
     let goal = args.goal.goal(args.pose()?, &body)?;
-    let answer = arm.chain.solve(&goal, &arm.values)?;
+    let answer = arm.chosen.chain.solve(&goal, &arm.values)?;
     remarks.iter().for_each(|remark| console.note(remark));
     let found = Found::new(&arm, &goal, answer, remarks);
     if let Some(path) = &args.png {

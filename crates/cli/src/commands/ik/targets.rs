@@ -61,14 +61,14 @@ pub(super) fn answer(
     let goals = read(path)?.into_iter().map(|target| args.goal(target, &body));
     let goals = goals.collect::<Result<Vec<_>, InputError>>()?;
     let started = ProcessTime::now();
-    let solved = goals.iter().map(|goal| arm.chain.solve(goal, &arm.values));
+    let solved = goals.iter().map(|goal| arm.chosen.chain.solve(goal, &arm.values));
     let solved = solved.collect::<Result<Vec<_>, InputError>>()?;
     let cpu_us = started.elapsed().as_secs_f64() * 1e6;
     let answers = Answers {
         targets: goals.len(),
         reached: solved.iter().filter(|answer| answer.reached).count(),
         remarks,
-        joint_names: arm.chain.variables.iter().map(|v| v.name.clone()).collect(),
+        joint_names: arm.chosen.chain.variables.iter().map(|v| v.name.clone()).collect(),
         cpu_us_per_target: cpu_us / goals.len().max(1) as f64,
         answers: solved.into_iter().map(Row::new).collect(),
     };

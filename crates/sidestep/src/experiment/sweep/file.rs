@@ -27,6 +27,8 @@ pub struct Sweep {
     pub name: String,
     /// The scenario's file.
     pub scenario: PathBuf,
+    /// The scenario itself, where it was read already and is no file.
+    pub given: Option<Source>,
     /// Settings of every variant, applied before its own.
     pub fixed: Vec<Setting>,
     /// The variants.
@@ -143,6 +145,7 @@ impl Sweep {
             place: scenario.display().to_string(),
             name: String::new(),
             scenario,
+            given: None,
             fixed: Vec::new(),
             design: Design::default(),
             replicates: REPLICATES,
@@ -152,6 +155,12 @@ impl Sweep {
             baseline: Wanted::default(),
             record: false,
         }
+    }
+
+    /// Returns a sweep like [`Sweep::of_scenario`] of a scenario that was read already.
+    pub fn of_source(source: Source) -> Self {
+        let place = source.place.clone();
+        Self { given: Some(source), ..Self::of_scenario(place) }
     }
 
     /// Reads a sweep file; a scenario file stands for [`Sweep::of_scenario`]. The key `scenario`
@@ -192,6 +201,7 @@ impl Sweep {
         Ok(Self {
             place: source.place.clone(),
             scenario: source.path(&file.scenario),
+            given: None,
             fixed: settings(&file.set),
             design: Design {
                 list: file.variant.iter().map(|t| reader.listed(t)).collect::<Result<_, _>>()?,

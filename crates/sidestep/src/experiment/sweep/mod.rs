@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! file.rs      a sweep file (TOML) -> Sweep, with errors that point
+//! changes.rs   changes that a command or a program makes to it
 //! variant.rs   a scenario and a variant of it: settings, and perhaps a name
 //! design.rs    the variants: a full grid, a list, a Latin hypercube, or products of them
 //! baseline.rs  what each variant is compared with, within the other factors
@@ -30,6 +31,7 @@
 
 pub mod baseline;
 pub mod cell;
+mod changes;
 mod charts;
 pub mod compare;
 pub mod design;
@@ -51,6 +53,7 @@ pub mod work;
 
 pub use baseline::{Baseline, Wanted};
 pub use cell::{Outcome, Started, start};
+pub use changes::Changes;
 pub use compare::Comparison;
 pub use design::{Design, Factor, Hypercube, Range};
 pub use file::{Sweep, Until};

@@ -8,6 +8,7 @@
 //! bend        joint limits -> bend limits, where one joint alone bends a connector
 //! recover     connectors -> joint values
 //! body/       collision shapes of links
+//! chosen      the files of a robot, and which part of it is the arm
 //! inverse/    a target -> joint values, inside limits
 //! ```
 //!
@@ -23,6 +24,7 @@
 
 mod bend;
 mod body;
+mod chosen;
 mod inverse;
 mod pose;
 mod recover;
@@ -33,6 +35,7 @@ mod tests;
 
 pub use bend::BendLimit;
 pub use body::ArmBody;
+pub use chosen::{ArmFiles, ChosenArm};
 pub use inverse::{
     Against, ArmAnswer, ArmGoal, ArmReason, Asked, Axis, Hit, MOST_SOLUTIONS, Part, Posture,
     Sphere, Turn,

@@ -60,6 +60,39 @@ impl Asked {
     /// Position and orientation.
     pub const POSE: Self = Self { along: [true; 3], turn: Turn::Whole };
 
+    /// Returns the part of a target that counts, whose orientation is asked for or not, where some axes of its frame
+    /// are free: `along` them, and the turn `about` them. Errors name the option `--free` of the command.
+    ///
+    /// # Errors
+    /// When a turn is free and none is asked for, two turns are free, or everything is.
+    pub fn with_free(
+        is_turned: bool,
+        along: [bool; 3],
+        about: [bool; 3],
+    ) -> Result<Self, InputError> {
+        let refused = |cause: &str, remedy: &str| Err(InputError::new("--free", cause, remedy));
+        let free = Axis::ALL.into_iter().zip(about).filter_map(|(axis, free)| free.then_some(axis));
+        let free: Vec<Axis> = free.collect();
+        if !is_turned && !free.is_empty() {
+            return refused("a turn is free, and none is asked for", "add --rpy or --quaternion");
+        }
+        let turn = match free[..] {
+            _ if !is_turned => Turn::Free,
+            [] => Turn::Whole,
+            [axis] => Turn::Axis(axis),
+            [_, _, _] => Turn::Free,
+            _ => {
+                let remedy = "free one turn, which leaves the direction of its axis, or all three";
+                return refused("two turns are free", remedy);
+            }
+        };
+        let along = along.map(|free| !free);
+        if along == [false; 3] && turn == Turn::Free {
+            return refused("everything is free", "leave something that the tip shall do");
+        }
+        Ok(Self { along, turn })
+    }
+
     /// Whether all of the position counts.
     pub fn whole_position(self) -> bool {
         self.along == [true; 3]

@@ -1,0 +1,46 @@
+//! What a finished sweep tells programs.
+
+use super::effort::Effort;
+use super::journey::{Done, Folder};
+use serde_json::{Value, json};
+use sidestep::experiment::sweep::rounds::stopped;
+use sidestep::experiment::sweep::{Plan, RunTable, Summary};
+
+impl Done {
+    /// Returns what `sidestep sweep --json` prints: the summary, how many runs failed, and what stopped each variant.
+    pub fn told(&self, plan: &Plan, folder: Option<&Folder>, summary: &Summary) -> Value {
+        json!({
+            "status": "complete",
+            "name": plan.name,
+            "world": plan.world,
+            "parameters": plan.parameters,
+            "first_seed": plan.first_seed,
+            "runs": self.table.runs(),
+            "failed": failed(&self.table).count(),
+            "stopped": stopped(plan, &self.table),
+            "took": (self.effort.runs > 0).then(|| self.effort.told()),
+            "results": folder.map(Folder::results_file),
+            "summary": summary,
+        })
+    }
+}
+
+/// Returns the rows of runs that failed.
+pub fn failed(table: &RunTable) -> impl Iterator<Item = usize> {
+    let column = table.column("failure");
+    let is_told = move |row: &usize| column.is_some_and(|c| !c.values.text(*row).is_empty());
+    (0..table.runs()).filter(is_told)
+}
+
+impl Effort {
+    /// Returns it for programs.
+    pub fn told(&self) -> Value {
+        json!({
+            "runs": self.runs,
+            "at_once": self.at_once,
+            "wall_s": self.wall_s,
+            "simulation_s_per_run": self.simulation_s_per_run(),
+            "overhead_ms_per_run": self.overhead_ms_per_run(),
+        })
+    }
+}

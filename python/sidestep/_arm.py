@@ -1,0 +1,170 @@
+"""Kinematics of arms: many postures, or many targets, in one call."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._errors import wrong
+from ._native import Arm
+
+_Floats = NDArray[np.float64]
+
+
+class Placed(NamedTuple):
+    """Positions of an arm in the frame of its base, one row per posture."""
+
+    #: Position of the tip in m, of the shape (n, 3).
+    tip: _Floats
+    #: Rotation matrices of the tip, of the shape (n, 3, 3).
+    rotation: _Floats
+    #: The same as quaternions x, y, z, w, of the shape (n, 4).
+    quaternion: _Floats
+    #: Positions in m of the connectors, the points that the chain world moves, of the shape (n, connectors, 3).
+    connectors: _Floats
+    #: Whether all joints are inside their limits, of the shape (n,).
+    inside_limits: NDArray[np.bool_]
+
+
+class Reached(NamedTuple):
+    """Answers to targets, one row per target."""
+
+    #: Joint values from the base out, in rad or m, of the shape (n, joints); where a target is not reached, those that
+    #: came nearest.
+    joints: _Floats
+    #: Whether it is reached, of the shape (n,).
+    reached: NDArray[np.bool_]
+    #: Distance of the tip from the target in m, along the axes that count, of the shape (n,).
+    error_m: _Floats
+    #: Angle in rad by which the tip is turned otherwise than asked, of the shape (n,).
+    error_rad: _Floats
+    #: Steps over all starts, of the shape (n,).
+    iterations: NDArray[np.int64]
+    #: Postures that the search started from, of the shape (n,).
+    starts: NDArray[np.int64]
+    #: Why a target is not reached; None where it is.
+    reasons: list[str | None]
+    #: Further postures that reach the target, of the shape (found, joints) each; with ``solutions`` above 1 alone.
+    others: list[_Floats]
+    #: Meshes that stand as boxes, and shapes that could not be read.
+    remarks: list[str]
+
+
+def fk(arm: Arm | str | os.PathLike[str], joints: ArrayLike | None = None) -> Placed:
+    """Forward kinematics: the positions of an arm's tip and connectors.
+
+    ``arm`` is an :class:`Arm` or a URDF file. ``joints`` are values in rad or m, one for each of ``arm.joints``, of the shape
+    (joints,) or (n, joints); without any, each is as near to zero as its limits allow. Values outside of the limits are
+    computed too.
+
+    Raises InputError when a file or a shape is wrong.
+
+    >>> import sidestep
+    >>> arm = sidestep.Arm("scenarios/chain/arm.urdf")
+    >>> arm
+    Arm(...)
+    >>> sidestep.fk(arm, [arm.posture()] * 3).tip.shape
+    (3, 3)
+    """
+    arm = arm if isinstance(arm, Arm) else Arm(arm)
+    values = arm.posture() if joints is None else joints
+    return Placed(**arm.forward(_rows("joints", values)))
+
+
+def ik(
+    arm: Arm | str | os.PathLike[str],
+    targets: ArrayLike,
+    *,
+    rpy: ArrayLike | None = None,
+    quaternion: ArrayLike | None = None,
+    start: ArrayLike | None = None,
+    free: Sequence[str] = (),
+    engine: Literal["auto", "chain", "dls"] = "auto",
+    tolerance_m: float = 1e-6,
+    tolerance_rad: float = 1e-6,
+    solutions: int = 1,
+    apart: float = 0.1,
+    nearest: bool = False,
+    restarts: int = 100,
+    seed: int = 0,
+    obstacles: ArrayLike | None = None,
+    body: Literal["rods", "shapes", "own"] = "shapes",
+    ignore_limits: bool = False,
+    workers: int = 1,
+) -> Reached:
+    """Inverse kinematics: joint values that bring an arm's tip to targets, as ``sidestep ik`` finds them.
+
+    ``targets`` are positions of the tip in m in the frame of the base, of the shape (3,) or (n, 3). ``rpy`` (roll, pitch and yaw
+    in rad, of the shape (n, 3)) or ``quaternion`` (x, y, z, w, of the shape (n, 4)) ask for orientations; one for all may be of
+    one dimension. ``free`` names axes of the target's frame that do not count: ``"x"``, ``"y"``, ``"z"``, and ``"rx"``, ``"ry"``,
+    ``"rz"`` for turns about them. The search starts from ``start``, joint values of the shape (joints,) or (n, joints), then
+    from ``restarts`` random postures. With ``solutions`` above 1 it goes on until it has as many that are ``apart`` rad in some
+    joint; ``nearest`` finds those nearest to the start. ``obstacles`` are spheres, rows of x, y, z and radius in m; ``body`` is the
+    arm that they count for: ``"rods"`` between connectors, the links' collision ``"shapes"``, or ``"own"``, which must not touch each
+    other either. The answers do not depend on ``workers``.
+
+    Raises InputError when a file, a shape or an option is wrong; a target out of reach is none: its row says why.
+
+    >>> import sidestep
+    >>> arm = sidestep.Arm("scenarios/chain/arm.urdf")
+    >>> there = sidestep.fk(arm, [[0.3] * len(arm.joints), [0.1] * len(arm.joints)]).tip
+    >>> found = sidestep.ik(arm, [*there, [0, 0, 50]], restarts=5)
+    >>> found.reached.tolist()
+    [True, True, False]
+    >>> found.reasons
+    [None, None, "the target is ... m from the arm's first connector, and its rods reach 0.950000 m"]
+    """
+    arm = arm if isinstance(arm, Arm) else Arm(arm)
+    places = _rows("targets", targets)
+    if rpy is not None and quaternion is not None:
+        raise wrong("rpy", "a quaternion is asked for, too", "give one of them")
+    for name, turns, width in (("rpy", rpy, 3), ("quaternion", quaternion, 4)):
+        if turns is not None:
+            rows = _rows(name, turns)
+            if rows.shape[1] != width or len(rows) not in (1, len(places)):
+                told = f"({len(places)}, {width}) or ({width},)"
+                raise wrong(name, f"has the shape {rows.shape}", f"give an array of the shape {told}")
+            rows = np.broadcast_to(rows, (len(places), width))
+            places = np.hstack([_wide("targets", places, 3), rows])
+    if rpy is None and quaternion is None:
+        places = _wide("targets", places, 3)
+    begin = _rows("start", arm.posture() if start is None else start)
+    if len(begin) not in (1, len(places)):
+        raise wrong("start", f"has {len(begin)} rows", f"give one row, or one per target, {len(places)}")
+    spheres = np.empty((0, 4)) if obstacles is None else _rows("obstacles", obstacles)
+    options = {
+        "free": list(free),
+        "engine": engine,
+        "tolerance_m": tolerance_m,
+        "tolerance_rad": tolerance_rad,
+        "solutions": solutions,
+        "apart": apart,
+        "nearest": nearest,
+        "restarts": restarts,
+        "seed": seed,
+        "obstacles": _wide("obstacles", spheres, 4).tolist(),
+        "body": body,
+        "ignore_limits": ignore_limits,
+        "workers": workers,
+    }
+    return Reached(**arm.inverse(np.ascontiguousarray(places), begin, options))
+
+
+def _rows(name: str, values: ArrayLike) -> _Floats:
+    try:
+        array = np.atleast_2d(np.asarray(values, dtype=np.float64))
+    except (TypeError, ValueError) as error:
+        raise wrong(name, f"are no numbers: {error}", "give an array of numbers") from error
+    if array.ndim != 2:
+        raise wrong(name, f"has the shape {array.shape}", "give an array of one or two dimensions")
+    return np.ascontiguousarray(array)
+
+
+def _wide(name: str, rows: _Floats, width: int) -> _Floats:
+    if rows.shape[1] != width:
+        raise wrong(name, f"has the shape {rows.shape}", f"give an array of the shape (n, {width})")
+    return rows

@@ -1,0 +1,124 @@
+"""Error models of real sensors and wheels, learned from tables: arrays, data frames, or what a run has recorded.
+
+Every probability says on how many counts it rests, and has Wilson's 95 % interval. Other logs (MRCLAM, CARMEN, ROS 2 bags) are
+learned from by ``sidestep learn``.
+
+>>> from sidestep import learn
+>>> moves = {"action": ["forward"] * 4, "ahead_boxes": [1, 1, 1, 0], "left_boxes": [0] * 4, "turn_deg": [0] * 4}
+>>> learned = learn.effector(moves)
+>>> learned.report["rounded_counts"]
+{'0,0': 1, '1,0': 3}
+>>> "[effectors.mine]" in learned.profile("mine")
+True
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from . import _native
+from ._errors import wrong
+from ._native import Learned
+
+__all__ = ["Learned", "effector", "sensor"]
+
+#: Columns of a table, or the folder of a run that recorded it.
+Columns = Mapping[str, Any] | str | os.PathLike[str] | Any
+
+MOTIONS = ("action", "ahead_boxes", "left_boxes", "turn_deg", "contact")
+READINGS = (
+    "sensor", "true", "reported", "true_distance_m", "reported_distance_m", "true_class", "reported_class", "bearing_error_deg",
+)  # fmt: skip
+
+
+def effector(moves: Columns, *, alpha: float = 0.5, hold_out: int = 2) -> Learned:
+    """Learns what an effector's actions come to.
+
+    ``moves`` has a row per move, as a dict of columns or a data frame (pandas, polars, :class:`sidestep.Table`): ``action``
+    (``"forward"``, ``"left"``, ``"right"``, ``"stay"``), ``ahead_boxes`` and ``left_boxes``, displacements in boxes in the frame
+    of the start, ``turn_deg``, positive to the left, and perhaps ``contact`` (``"yes"`` where an obstacle stopped it: such rows
+    are left out). Or the folder of a run with ``record.calibration = true``. ``alpha`` is added to every count before rows
+    become probabilities; every ``hold_out``-th move is held out to test the fit.
+
+    Raises InputError when columns are missing or differ in length, or a value is out of range.
+    """
+    text, run = _table(moves, MOTIONS)
+    return _native.learn_effector(text, run, (alpha, hold_out))
+
+
+def sensor(
+    readings: Columns,
+    *,
+    edges_m: Sequence[float] | None = None,
+    classes: Sequence[str] = (),
+    bearings_deg: Sequence[float] | None = None,
+    range_m: float | None = None,
+    name: str | None = None,
+    alpha: float = 0.5,
+    hold_out: int = 2,
+) -> Learned:
+    """Learns what a sensor reports.
+
+    ``readings`` has a row per reading, as a dict of columns or a data frame: ``true`` and ``reported``, one word each
+    (``"nothing"`` for no observation), and ``true_distance_m`` and ``reported_distance_m``, or ``true_class`` and
+    ``reported_class``. Or the folder of a run with ``record.calibration = true``, with ``name`` if it has several sensors.
+    ``edges_m`` divide distances into ``classes``, near to far, one more than edges; ``bearings_deg`` of the beams, positive
+    to the left, and ``range_m`` are for the profile. ``alpha`` and ``hold_out`` are as for :func:`effector`.
+
+    Raises InputError when columns are missing or differ in length, or a value is out of range.
+
+    >>> from sidestep import learn
+    >>> seen = {"true": ["wall", "wall", "nothing"], "reported": ["wall", "nothing", "nothing"],
+    ...         "true_distance_m": [1.0, 1.5, None], "reported_distance_m": [1.1, None, None]}
+    >>> learned = learn.sensor(seen, edges_m=[2.0], classes=["near", "far"], range_m=4.0)
+    >>> one = learned.report["probabilities"][0]
+    >>> one["row"], one["column"], one["count"], one["of"]
+    ('nothing', 'nothing', 1.0, 1.0)
+    """
+    text, run = _table(readings, READINGS)
+    shape = {
+        "edges_m": None if edges_m is None else [float(edge) for edge in edges_m],
+        "classes": list(classes),
+        "bearings_deg": None if bearings_deg is None else [float(b) for b in bearings_deg],
+        "range_m": range_m,
+        "sensor": name,
+    }
+    return _native.learn_sensor(text, run, shape, (alpha, hold_out))
+
+
+def _table(columns: Columns, known: Sequence[str]) -> tuple[str | None, str | None]:
+    """Returns a table as the text of one, or the folder that holds it."""
+    if isinstance(columns, str | os.PathLike):
+        return None, os.fspath(columns)
+    names = [name for name in known if _has(columns, name)]
+    if not names:
+        raise wrong("columns", f"there is none of {', '.join(known)}", "give a dict of columns or a data frame")
+    lists = [np.asarray(columns[name]).tolist() for name in names]
+    lengths = {name: len(column) for name, column in zip(names, lists, strict=True)}
+    if len(set(lengths.values())) > 1:
+        told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        raise wrong("columns", f"their lengths differ: {told}", "give one value of each per row")
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows([_word(cell) for cell in row] for row in zip(*lists, strict=True))
+    return text.getvalue(), None
+
+
+def _has(columns: Any, name: str) -> bool:
+    keys = getattr(columns, "columns", None)
+    return name in (columns if keys is None else list(keys))
+
+
+def _word(cell: Any) -> Any:
+    if cell is None or cell != cell:
+        return ""
+    if isinstance(cell, bool):
+        return "yes" if cell else "no"
+    return repr(cell) if isinstance(cell, float) else cell

@@ -1,0 +1,202 @@
+"""Figures of runs, with Matplotlib: tracks, separation, groups. Needs the extra ``plot``: ``pip install 'sidestep[plot]'``.
+
+Each function draws into ``ax``, or into a new figure, and returns the axes. What is drawn comes from the rows that a run has
+recorded: its folder, or what ``Simulation.tables()`` or :func:`sidestep.read` returns.
+
+>>> import sidestep
+>>> from sidestep import plot
+>>> sim = sidestep.Simulation("scenarios/airspace/superconflict.toml", record=True)
+>>> sim.run(30)
+30
+>>> rows = sim.tables()
+>>> plot.separation(rows, limit_m=500.0).get_ylabel()
+'nearest two, m'
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+from collections.abc import Collection, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._errors import wrong
+from ._native import Simulation, Table, read
+
+__all__ = ["Places", "groups", "places", "separation", "tracks"]
+
+#: Where a run's rows are.
+Rows = str | os.PathLike[str] | Mapping[str, Table] | Table
+
+
+class Places(NamedTuple):
+    """Where agents were, one row per agent and cycle, in the order of the cycles: arrays of the shape (rows,)."""
+
+    #: The cycle at whose start it was there.
+    cycle: NDArray[np.int64]
+    #: Number of the agent: of the robot, person, airplane or chain.
+    agent: NDArray[np.int64]
+    #: Number of the part: of a chain's connector; 0 for others.
+    part: NDArray[np.int64]
+    #: Place in m; of a body on a grid, the corner of its box that is lowest in both.
+    x_m: NDArray[np.float64]
+    y_m: NDArray[np.float64]
+
+
+def _axes(ax: Any) -> Any:
+    if ax is not None:
+        return ax
+    try:
+        pyplot = importlib.import_module("matplotlib.pyplot")
+    except ImportError as error:
+        raise ImportError("figures need Matplotlib: pip install 'sidestep[plot]'") from error
+    return pyplot.subplots()[1]
+
+
+def _table(rows: Rows, name: str) -> Table:
+    if isinstance(rows, Table):
+        return rows
+    tables = rows if isinstance(rows, Mapping) else read(rows, [name])
+    if name not in tables:
+        raise wrong("rows", f"there is no table `{name}`", f"record one: it has {', '.join(tables) or 'none'}")
+    return tables[name]
+
+
+def places(rows: Rows, kinds: Collection[str] = ("robot", "person")) -> Places:
+    """Returns where agents were, of the table ``trajectories`` of any world, in m.
+
+    Of a world on a grid, ``kinds`` are those of the bodies wanted: ``"robot"``, ``"person"``, ``"door"``.
+
+    Raises InputError when the run has recorded no places.
+
+    >>> import sidestep
+    >>> from sidestep import plot
+    >>> sim = sidestep.Simulation("scenarios/robots/one-robot.toml", record=True)
+    >>> _ = sim.step(5)
+    >>> plot.places(sim.tables()).cycle.tolist()
+    [0, 1, 2, 3, 4]
+    """
+    table = _table(rows, "trajectories")
+    cycle = np.asarray(table["cycle"], dtype=np.int64)
+    if "col_boxes" in table:
+        return _of_boxes(table, cycle, kinds)
+    name = "chain" if "chain" in table else "airplane"
+    agent = np.asarray(table[name], dtype=np.int64)
+    part = np.asarray(table["connector"], dtype=np.int64) if name == "chain" else np.zeros_like(agent)
+    x_m, y_m = np.asarray(table["x_m"]), np.asarray(table["y_m"])
+    # Where a cycle has several legs, the first begins with it.
+    first = np.unique(np.stack([cycle, agent, part]), axis=1, return_index=True)[1]
+    return Places(cycle[first], agent[first], part[first], x_m[first], y_m[first])
+
+
+def _of_boxes(table: Table, cycle: NDArray[np.int64], kinds: Collection[str]) -> Places:
+    about = table.about
+    body = np.asarray(table["body"], dtype=np.int64)
+    wanted = np.zeros(len(body), dtype=bool)
+    for kind in kinds:
+        # Bodies of one kind have ids in a row, such as 0-7.
+        if ids := about.get(f"ids_{kind}"):
+            first, last = map(int, ids.split("-"))
+            wanted |= (first <= body) & (body <= last)
+    box_m, yaw_rad = float(about["box_m"]), float(about["yaw_rad"])
+    east_m = np.asarray(table["col_boxes"], dtype=np.float64) * box_m
+    north_m = np.asarray(table["row_boxes"], dtype=np.float64) * box_m
+    x_m = float(about["origin_x_m"]) + np.cos(yaw_rad) * east_m - np.sin(yaw_rad) * north_m
+    y_m = float(about["origin_y_m"]) + np.sin(yaw_rad) * east_m + np.cos(yaw_rad) * north_m
+    part = np.zeros_like(body)
+    return Places(cycle[wanted], body[wanted], part[wanted], x_m[wanted], y_m[wanted])
+
+
+def tracks(rows: Rows, *, agents: Collection[int] | None = None, ax: Any = None) -> Any:
+    """Draws where agents went, a line for each; a dot marks where it was last.
+
+    ``agents`` are the numbers of those wanted, all by default.
+
+    Raises InputError when the run has recorded no places.
+    """
+    where, axes = places(rows), _axes(ax)
+    for agent in np.unique(where.agent):
+        if agents is not None and agent not in agents:
+            continue
+        color = None
+        for part in np.unique(where.part[where.agent == agent]):
+            own = (where.agent == agent) & (where.part == part)
+            (line,) = axes.plot(where.x_m[own], where.y_m[own], linewidth=1, color=color)
+            color = line.get_color()
+            axes.plot(where.x_m[own][-1:], where.y_m[own][-1:], "o", markersize=4, color=color)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("x, m")
+    axes.set_ylabel("y, m")
+    return axes
+
+
+def separation(rows: Rows, *, limit_m: float | None = None, ax: Any = None) -> Any:
+    """Draws how near the nearest two agents were to each other at the start of each cycle, with a line at ``limit_m``.
+
+    Parts of one agent do not count. Within a cycle two may have been nearer: the metric ``min_separation_m`` of airplanes says how
+    near.
+
+    Raises InputError when the run has recorded no places, or of fewer than two agents.
+    """
+    where = places(rows)
+    if len(np.unique(where.agent)) < 2:
+        raise wrong("rows", "there are no two agents", "give a run with more")
+    cycles, starts = np.unique(where.cycle, return_index=True)
+    nearest = [
+        _nearest(where.agent[own], where.x_m[own], where.y_m[own])
+        for own in np.split(np.arange(len(where.cycle)), starts[1:])
+    ]
+    axes = _axes(ax)
+    axes.plot(cycles, nearest, linewidth=1)
+    if limit_m is not None:
+        axes.axhline(limit_m, linestyle="--", color="0.4", linewidth=1)
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("cycle")
+    axes.set_ylabel("nearest two, m")
+    return axes
+
+
+def _nearest(agent: NDArray[Any], x_m: NDArray[Any], y_m: NDArray[Any]) -> float:
+    """Returns the distance of the nearest two of different agents; NaN where there are no two."""
+    least = np.inf
+    for k in range(len(agent) - 1):
+        others = agent[k + 1 :] != agent[k]
+        if others.any():
+            distance = np.hypot(x_m[k + 1 :] - x_m[k], y_m[k + 1 :] - y_m[k])[others]
+            least = min(least, float(distance.min()))
+    return least if np.isfinite(least) else float("nan")
+
+
+def groups(run: Simulation | Mapping[str, Any] | str | os.PathLike[str], *, ax: Any = None) -> Any:
+    """Draws how large the groups of agents were that had to agree among each other.
+
+    ``run`` is a simulation, its metrics, or, of airplanes, its folder or tables, whose table ``optimizations`` has them.
+
+    Raises InputError when there are none.
+
+    >>> import sidestep
+    >>> from sidestep import plot
+    >>> sim = sidestep.Simulation("scenarios/robots/default.toml")
+    >>> _ = sim.run(50)
+    >>> plot.groups(sim).get_xlabel()
+    'bodies of a group'
+    """
+    of = run.metrics() if isinstance(run, Simulation) else run
+    if isinstance(of, Mapping) and "group_sizes" in of:
+        counts = list(of["group_sizes"])
+        ends = [(2**k, 2 ** (k + 1) - 1) for k in range(len(counts))]
+        labels = [str(low) if low == high else f"{low}-{high}" for low, high in ends]
+    elif isinstance(of, Mapping) and "optimizations" in of and not isinstance(of["optimizations"], Table):
+        raise wrong("run", "metrics of airplanes have no sizes of groups", "give the run's folder or tables")
+    else:
+        sizes, numbers = np.unique(_table(of, "optimizations")["airplanes"], return_counts=True)
+        labels, counts = [str(size) for size in sizes], numbers.tolist()
+    axes = _axes(ax)
+    axes.bar(labels, counts)
+    axes.set_yscale("log" if max(counts, default=0) > 100 else "linear")
+    axes.set_xlabel("bodies of a group")
+    axes.set_ylabel("groups, over all cycles")
+    return axes

@@ -1,0 +1,267 @@
+"""Intervals, paired differences and the stopping rule: those of the command and of its reports.
+
+Intervals are two-sided at 95 %. A value that is NaN, infinite or None is missing: it is counted, and no part of a mean. All take
+values of different runs as independent, which different seeds make them; robots of one run are not.
+
+>>> from sidestep import stats
+>>> stats.mean([4.0, 5.0, 7.0, float("nan")])
+Mean(mean=5.33..., sd=1.52..., interval=Interval(low=1.53..., high=9.12...), ..., n=3, missing=1)
+>>> stats.paired([4.0, 5.0, 7.0], [6.0, 6.0, 9.0]).lower     # in 3 of 3 pairs the first is lower
+3
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _native
+from ._errors import wrong
+
+__all__ = [
+    "Correlation",
+    "Interval",
+    "Mean",
+    "Next",
+    "Paired",
+    "Quantile",
+    "Share",
+    "StoppingRule",
+    "correlation",
+    "holm",
+    "mean",
+    "paired",
+    "quantile",
+    "share",
+]
+
+
+class Interval(NamedTuple):
+    """An interval, ends included."""
+
+    low: float
+    high: float
+
+
+class Mean(NamedTuple):
+    """A mean of values, in their unit."""
+
+    #: Arithmetic mean; None without values.
+    mean: float | None
+    #: Standard deviation (divisor n - 1); None below two values.
+    sd: float | None
+    #: Student's interval of the mean.
+    interval: Interval | None
+    #: The bootstrap's (BCa) interval of the mean, for skewed values; None where all are equal.
+    bootstrap: Interval | None
+    #: Number of values.
+    n: int
+    #: Number of values that are missing.
+    missing: int
+
+
+class Share(NamedTuple):
+    """A share of runs."""
+
+    #: From 0 to 1; None without runs.
+    share: float | None
+    #: Wilson's interval: its coverage is 95 % on average over shares.
+    interval: Interval
+    #: Clopper and Pearson's interval: its coverage is never below 95 %.
+    exact: Interval
+
+
+class Quantile(NamedTuple):
+    """A quantile of values, in their unit."""
+
+    #: The estimate; None without values.
+    value: float | None
+    #: Interval by order statistics; None with too few values for an honest one.
+    interval: Interval | None
+    #: The coverage of that interval, 0.95 or more.
+    coverage: float | None
+
+
+class Paired(NamedTuple):
+    """Two treatments, a and b, of the same cases, such as the same seeds."""
+
+    #: Number of complete pairs.
+    n: int
+    #: Number of cases of which one or both values are missing.
+    incomplete: int
+    #: Mean of a - b.
+    difference: float | None
+    #: Student's interval of it.
+    interval: Interval | None
+    #: The bootstrap's interval of it.
+    bootstrap: Interval | None
+    #: Two-sided p-value of Student's paired test of no difference.
+    p_value: float | None
+    #: Two-sided p-value of the sign test, which assumes nothing of the values.
+    sign_p_value: float | None
+    #: Numbers of pairs in which a is lower, equal, and higher.
+    lower: int
+    equal: int
+    higher: int
+    #: Mean of a over mean of b; None where values are negative, or the mean of b may be 0.
+    ratio: float | None
+    #: Fieller's interval of it.
+    ratio_interval: Interval | None
+
+
+class Correlation(NamedTuple):
+    """Spearman's rank correlation."""
+
+    #: From -1 to 1.
+    value: float
+    #: Its interval; None below four pairs, or where the order is perfect.
+    interval: Interval | None
+    #: Number of complete pairs.
+    n: int
+
+
+class Next(NamedTuple):
+    """The answer of a stopping rule."""
+
+    #: Number of runs to have in all; of those there are, if they are enough, the first so many are the result.
+    runs: int
+    #: Why they are enough; None if they are not.
+    reason: str | None
+
+
+def _values(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise wrong(name, f"are no numbers: {error}", "give numbers; NaN or None for missing ones") from error
+    if array.ndim != 1:
+        raise wrong(name, f"have the shape {array.shape}", "give an array of one dimension")
+    return np.ascontiguousarray(array)
+
+
+def _interval(ends: tuple[float, float] | None) -> Interval | None:
+    return None if ends is None else Interval(*ends)
+
+
+def mean(values: ArrayLike) -> Mean:
+    """Returns the mean of values of the shape (n,), with its intervals.
+
+    Trust ``interval`` from 5 values on if they are roughly symmetric, ``bootstrap`` from 20 on if they are skewed.
+
+    Raises InputError when they are no numbers.
+
+    >>> from sidestep import stats
+    >>> stats.mean([2, 2, 2]).interval
+    Interval(low=2.0, high=2.0)
+    """
+    center, sd, student, bootstrap, n, missing = _native.stats_mean(_values("values", values))
+    return Mean(center, sd, _interval(student), _interval(bootstrap), n, missing)
+
+
+def share(successes: int, n: int) -> Share:
+    """Returns the share of ``successes`` among ``n`` runs, with its intervals.
+
+    Raises InputError when there are more successes than runs.
+
+    >>> from sidestep import stats
+    >>> stats.share(9, 10).interval
+    Interval(low=0.59..., high=0.98...)
+    """
+    if successes < 0 or n < 0:
+        raise wrong("share", f"{successes} of {n} cannot be", "give numbers from 0 on")
+    wilson, exact = _native.stats_share(successes, n)
+    return Share(successes / n if n else None, Interval(*wilson), Interval(*exact))
+
+
+def quantile(values: ArrayLike, q: float) -> Quantile:
+    """Returns the quantile ``q``, between 0 and 1, of values of the shape (n,).
+
+    >>> from sidestep import stats
+    >>> stats.quantile(range(100), 0.5).value
+    49.5
+    """
+    if not 0.0 < q < 1.0:
+        raise wrong("q", f"is {q}", "give a number between 0 and 1")
+    value, interval, coverage = _native.stats_quantile(_values("values", values), q)
+    return Quantile(value, _interval(interval), coverage)
+
+
+def paired(a: ArrayLike, b: ArrayLike) -> Paired:
+    """Compares two treatments of the same cases: values of the shape (n,) each, case by case.
+
+    The interval of the difference is much narrower than two separate ones where cases differ among themselves, and their
+    overlap says nothing about pairs.
+
+    Raises InputError when there is another number of both.
+
+    >>> from sidestep import stats
+    >>> compared = stats.paired([10.0, 21.0, 29.5, 42.0], [12.0, 23.0, 31.0, 44.5])
+    >>> compared.difference, compared.interval.high < 0
+    (-2.0, True)
+    """
+    counts, intervals, p_values, signs, ratio = _native.stats_paired(_values("a", a), _values("b", b))
+    student, bootstrap = map(_interval, intervals)
+    return Paired(*counts, student, bootstrap, *p_values, *signs, ratio[0], _interval(ratio[1]))
+
+
+def holm(p_values: Sequence[float | None]) -> list[float | None]:
+    """Returns p-values adjusted by Holm: whichever are below 0.05 stand, with 95 % confidence in all of them together.
+
+    >>> from sidestep import stats
+    >>> stats.holm([0.01, 0.04, None])
+    [0.02, 0.04, None]
+    """
+    return _native.stats_holm(list(p_values))
+
+
+def correlation(a: ArrayLike, b: ArrayLike) -> Correlation | None:
+    """Returns Spearman's rank correlation of two quantities of the shape (n,); None where one of them is constant.
+
+    >>> from sidestep import stats
+    >>> stats.correlation([1, 2, 3, 4], [1, 4, 9, 16]).value
+    1.0
+    """
+    first, second = _values("a", a), _values("b", b)
+    if first.shape != second.shape:
+        raise wrong("correlation", f"{len(first)} and {len(second)} values are no pairs", "give two of each case")
+    found: Any = _native.stats_correlation(first, second)
+    return None if found is None else Correlation(found[0], _interval(found[1]), found[2])
+
+
+@dataclass(frozen=True)
+class StoppingRule:
+    """The rule that ends a sweep at a precision: when Student's interval of the mean is narrow enough.
+
+    ``half_width`` is in the unit of the values or, if ``relative``, a share of the mean. The first look is after ``min_runs``.
+    The answer is a function of the values alone, whoever made how many of them at once.
+
+    >>> from sidestep import stats
+    >>> rule = stats.StoppingRule(0.05)
+    >>> rule.next([])
+    Next(runs=10, reason=None)
+    >>> values = [10.0, 10.2, 9.9, 10.1, 9.8, 10.0, 10.3, 9.7, 10.0, 10.1]
+    >>> rule.next(values)
+    Next(runs=10, reason='the interval is as narrow as wanted')
+    """
+
+    half_width: float
+    relative: bool = True
+    min_runs: int = 10
+    max_runs: int = 1000
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.half_width < float("inf")):
+            raise wrong("half_width", f"is {self.half_width}", "give a number above 0")
+        if not 2 <= self.min_runs <= self.max_runs:
+            raise wrong("min_runs", f"is {self.min_runs}", f"give a number from 2 to max_runs, {self.max_runs}")
+
+    def next(self, *columns: ArrayLike) -> Next:
+        """Returns how many runs to have, after the values of those there are: one column per quantity, in the order of the
+        runs. With several columns they are enough when they are for all."""
+        values = [_values("columns", column) for column in columns]
+        runs = (self.min_runs, self.max_runs)
+        return Next(*_native.stats_next(self.half_width, self.relative, runs, values))

@@ -1,0 +1,333 @@
+//! Arms of robot models: forward and inverse kinematics of many postures and targets at once.
+
+use crate::error::{self, wrong};
+use crate::json::list;
+use crate::watch::attended;
+use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, ToPyArray};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use sidestep::experiment::sweep::work::run_cells;
+use sidestep::kernel::InputError;
+use sidestep::worlds::chain::ik::Engine;
+use sidestep::worlds::chain::kinematics::{
+    ArmAnswer, ArmBody, ArmFiles, ArmGoal, Asked, ChosenArm, Frames, Pose, Sphere, Vector,
+};
+use std::path::PathBuf;
+
+/// An arm of a robot model (URDF): its joints from a base link to a tip link.
+///
+/// Arm(urdf, *, base=None, tip=None, srdf=None, group=None): `base` is the root link and `tip` the end of the longest arm where
+/// they are not named; `group` takes both from the SRDF file, which also says which links may touch. Positions are in m in the
+/// frame of the base, angles in rad. It never changes, and threads may share it.
+///
+/// Raises InputError when a file, a link or the group is wrong.
+#[pyclass(module = "sidestep", frozen)]
+pub(crate) struct Arm(ChosenArm);
+
+/// Returns the error of an option of the command as that of an argument.
+fn told(e: &InputError) -> PyErr {
+    match e.place().strip_prefix("--") {
+        Some(name) => wrong(&name.replace('-', "_"), e.cause(), e.remedy()),
+        None => error::input(e),
+    }
+}
+
+/// Returns the rows of an array of this width.
+fn rows(name: &str, array: &PyReadonlyArray2<'_, f64>, width: usize) -> PyResult<Vec<Vec<f64>>> {
+    let array = array.as_array();
+    if array.ncols() != width {
+        let cause = format!("has rows of {} numbers", array.ncols());
+        return Err(wrong(name, cause, format!("give an array of the shape (n, {width})")));
+    }
+    let rows: Vec<Vec<f64>> = array.rows().into_iter().map(|row| row.to_vec()).collect();
+    match rows.iter().position(|row| !row.iter().all(|x| x.is_finite())) {
+        None => Ok(rows),
+        Some(k) => {
+            let cause = format!("row {k} is {:?}", rows[k]);
+            Err(wrong(name, cause, "give finite numbers"))
+        }
+    }
+}
+
+fn vector(row: &[f64]) -> Vector {
+    std::array::from_fn(|k| row[k])
+}
+
+fn shaped<'py>(
+    py: Python<'py>,
+    flat: Vec<f64>,
+    shape: Vec<usize>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    PyArray1::from_vec(py, flat).reshape(shape)
+}
+
+#[pymethods]
+impl Arm {
+    #[new]
+    #[pyo3(signature = (urdf, *, base=None, tip=None, srdf=None, group=None))]
+    fn new(
+        urdf: PathBuf,
+        base: Option<String>,
+        tip: Option<String>,
+        srdf: Option<PathBuf>,
+        group: Option<String>,
+    ) -> PyResult<Self> {
+        if group.is_some() && srdf.is_none() {
+            return Err(wrong("group", "groups are in SRDF files", "give srdf as well"));
+        }
+        if group.is_some() && (base.is_some() || tip.is_some()) {
+            return Err(wrong("group", "it names base and tip", "leave base and tip out"));
+        }
+        let chosen = ArmFiles { urdf, base, tip, srdf, group }.load();
+        chosen.map(Self).map_err(|e| told(&e))
+    }
+
+    /// Name of the robot.
+    #[getter]
+    fn robot(&self) -> &str {
+        &self.0.model.name
+    }
+
+    /// Name of the base link.
+    #[getter]
+    fn base(&self) -> &str {
+        &self.0.chain.base
+    }
+
+    /// Name of the tip link.
+    #[getter]
+    fn tip(&self) -> &str {
+        &self.0.chain.tip
+    }
+
+    /// Names of the joints that have a value, from the base out.
+    #[getter]
+    fn joints(&self) -> Vec<&str> {
+        self.0.chain.variables.iter().map(|v| v.name.as_str()).collect()
+    }
+
+    /// Units of their values: rad or m.
+    #[getter]
+    fn units(&self) -> Vec<&'static str> {
+        self.0.chain.variables.iter().map(|v| v.motion.unit()).collect()
+    }
+
+    /// Lowest and highest values, of the shape (joints, 2); infinite where a joint has no limits.
+    #[getter]
+    fn limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let free = [f64::NEG_INFINITY, f64::INFINITY];
+        let of = |limits: &sidestep::import::urdf::Limits| [limits.lower, limits.upper];
+        let variables = &self.0.chain.variables;
+        let flat = variables.iter().flat_map(|v| v.limits.as_ref().map_or(free, of)).collect();
+        shaped(py, flat, vec![variables.len(), 2])
+    }
+
+    /// The joint values of a named posture of the SRDF file; without a name each is as near to zero as its limits
+    /// allow.
+    ///
+    /// Raises InputError when there is no such posture.
+    #[pyo3(signature = (name=None))]
+    fn posture<'py>(
+        &self,
+        py: Python<'py>,
+        name: Option<&str>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(PyArray1::from_vec(py, self.0.posture(name).map_err(|e| told(&e))?))
+    }
+
+    fn __repr__(&self) -> String {
+        let (robot, chain) = (&self.0.model.name, &self.0.chain);
+        format!("Arm({robot}, {} to {}, {} joints)", chain.base, chain.tip, chain.variables.len())
+    }
+
+    /// Forward kinematics: what `sidestep.fk` stands on. Joint values of the shape (n, joints).
+    fn forward<'py>(
+        &self,
+        py: Python<'py>,
+        joints: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let chain = &self.0.chain;
+        let rows = rows("joints", &joints, chain.variables.len())?;
+        let skeleton = chain.skeleton();
+        let frames: Vec<Frames> = py.detach(|| rows.iter().map(|row| chain.forward(row)).collect());
+        let (n, dict) = (rows.len(), PyDict::new(py));
+        let flat = |of: &dyn Fn(&Frames) -> Vec<f64>| frames.iter().flat_map(of).collect();
+        dict.set_item("tip", shaped(py, flat(&|f| f.tip.origin_m.to_vec()), vec![n, 3])?)?;
+        let rotation = flat(&|f| f.tip.rotation.concat());
+        dict.set_item("rotation", shaped(py, rotation, vec![n, 3, 3])?)?;
+        let quaternion = flat(&|f| f.tip.quaternion().to_vec());
+        dict.set_item("quaternion", shaped(py, quaternion, vec![n, 4])?)?;
+        let connectors = flat(&|f| chain.connectors(&skeleton, f).concat());
+        let count = chain.connectors(&skeleton, &chain.forward(&chain.rest())).len();
+        dict.set_item("connectors", shaped(py, connectors, vec![n, count, 3])?)?;
+        let inside: Vec<bool> =
+            rows.iter().map(|row| chain.outside_limits(row).is_empty()).collect();
+        dict.set_item("inside_limits", inside.to_pyarray(py))?;
+        Ok(dict)
+    }
+
+    /// Inverse kinematics: what `sidestep.ik` stands on. Targets of the shape (n, 3), (n, 6) with roll, pitch and yaw, or (n, 7)
+    /// with a quaternion x, y, z, w.
+    fn inverse<'py>(
+        &self,
+        py: Python<'py>,
+        targets: PyReadonlyArray2<'py, f64>,
+        start: PyReadonlyArray2<'py, f64>,
+        options: Options,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let chain = &self.0.chain;
+        let targets = rows("targets", &targets, targets.as_array().ncols())?;
+        let start = rows("start", &start, chain.variables.len())?;
+        let (goal, remarks) = options.goal(&self.0)?;
+        let goals = targets.iter().map(|target| options.aimed(&goal, target));
+        let goals = goals.collect::<PyResult<Vec<ArmGoal>>>()?;
+        let numbers: Vec<usize> = (0..goals.len()).collect();
+        let solved = attended(py, |watcher| {
+            let mut solved: Vec<(usize, ArmAnswer)> = Vec::with_capacity(goals.len());
+            let solve = |k: &usize| {
+                let start = &start[if start.len() == 1 { 0 } else { *k }];
+                let answer = || chain.solve(&goals[*k], start).map(|answer| (*k, answer));
+                watcher.go_on().then(answer)
+            };
+            run_cells(&numbers, options.workers.max(1), solve, &mut |answer| {
+                solved.push(answer);
+                Ok::<_, InputError>(())
+            })?;
+            solved.sort_by_key(|(k, _)| *k);
+            Ok(solved.into_iter().map(|(_, answer)| answer).collect::<Vec<_>>())
+        })?;
+        answers(py, solved.map_err(|e: InputError| told(&e))?, chain.variables.len(), remarks)
+    }
+}
+
+/// The options of all targets.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct Options {
+    free: Vec<String>,
+    engine: String,
+    tolerance_m: f64,
+    tolerance_rad: f64,
+    solutions: usize,
+    apart: f64,
+    nearest: bool,
+    restarts: usize,
+    seed: u64,
+    obstacles: Vec<[f64; 4]>,
+    body: String,
+    ignore_limits: bool,
+    workers: usize,
+}
+
+impl Options {
+    /// Returns what all targets share, and remarks on the arm's body.
+    fn goal(&self, arm: &ChosenArm) -> PyResult<(ArmGoal, Vec<String>)> {
+        let engine = match self.engine.as_str() {
+            "auto" => Engine::Auto,
+            "chain" => Engine::Chain,
+            "dls" => Engine::Dls,
+            other => return Err(unknown("engine", other, "auto, chain or dls")),
+        };
+        let (own, shapes) = match self.body.as_str() {
+            "rods" => (false, false),
+            "shapes" => (false, !self.obstacles.is_empty()),
+            "own" => (true, true),
+            other => return Err(unknown("body", other, "rods, shapes or own")),
+        };
+        let (body, remarks) = match shapes.then(|| arm.body()) {
+            Some((body, remarks)) => (Some(body), remarks),
+            None => (None, Vec::new()),
+        };
+        if own && body.as_ref().is_none_or(ArmBody::is_empty) {
+            let cause = [&["no link has a collision shape that can be read".into()], &remarks[..]];
+            let remedy = "give the links boxes, cylinders, spheres or STL meshes";
+            return Err(wrong("body", cause.concat().join("; "), remedy));
+        }
+        let sphere =
+            |[x, y, z, radius_m]: &[f64; 4]| Sphere { center_m: [*x, *y, *z], radius_m: *radius_m };
+        let goal = ArmGoal {
+            engine,
+            tolerance_m: self.tolerance_m,
+            tolerance_rad: self.tolerance_rad,
+            restarts: self.restarts,
+            seed: self.seed,
+            solutions: self.solutions,
+            nearest: self.nearest,
+            apart: self.apart,
+            ignore_limits: self.ignore_limits,
+            spheres: self.obstacles.iter().map(sphere).collect(),
+            body,
+            own_body: own,
+            ..ArmGoal::new([0.0; 3])
+        };
+        Ok((goal, remarks))
+    }
+
+    /// Returns the goal of one target.
+    fn aimed(&self, goal: &ArmGoal, target: &[f64]) -> PyResult<ArmGoal> {
+        let place = vector(target);
+        let target_pose = match target.len() {
+            3 => Pose { origin_m: place, ..Pose::IDENTITY },
+            6 => Pose::from_origin(&sidestep::import::urdf::Origin {
+                xyz_m: place,
+                rpy_rad: vector(&target[3..]),
+            }),
+            _ => {
+                let xyzw = std::array::from_fn(|k| target[3 + k]);
+                Pose::from_quaternion("targets", place, xyzw).map_err(|e| told(&e))?
+            }
+        };
+        let is_free = |name: &str| self.free.iter().any(|free| free == name);
+        if let Some(other) =
+            self.free.iter().find(|f| !["x", "y", "z", "rx", "ry", "rz"].contains(&f.as_str()))
+        {
+            return Err(unknown("free", other, "x, y, z, rx, ry, rz"));
+        }
+        let (along, about) = (["x", "y", "z"].map(is_free), ["rx", "ry", "rz"].map(is_free));
+        let asked = Asked::with_free(target.len() > 3, along, about).map_err(|e| told(&e))?;
+        Ok(ArmGoal { target: target_pose, asked, ..goal.clone() })
+    }
+}
+
+fn unknown(name: &str, value: &str, known: &str) -> PyErr {
+    wrong(name, format!("`{value}` is none of {known}"), format!("give {known}"))
+}
+
+/// Returns answers as arrays, one row for each target.
+fn answers<'py>(
+    py: Python<'py>,
+    answers: Vec<ArmAnswer>,
+    width: usize,
+    remarks: Vec<String>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    let n = answers.len();
+    let joints = answers.iter().flat_map(|answer| answer.values.clone()).collect();
+    dict.set_item("joints", shaped(py, joints, vec![n, width])?)?;
+    let reached: Vec<bool> = answers.iter().map(|answer| answer.reached).collect();
+    dict.set_item("reached", reached.to_pyarray(py))?;
+    for (name, of) in
+        [("error_m", (|a| a.error_m) as fn(&ArmAnswer) -> f64), ("error_rad", |a| a.error_rad)]
+    {
+        dict.set_item(name, PyArray1::from_iter(py, answers.iter().map(of)))?;
+    }
+    for (name, of) in
+        [("iterations", (|a| a.iterations) as fn(&ArmAnswer) -> usize), ("starts", |a| a.starts)]
+    {
+        dict.set_item(name, PyArray1::from_iter(py, answers.iter().map(|a| of(a) as i64)))?;
+    }
+    dict.set_item(
+        "reasons",
+        list(py, answers.iter().map(|a| a.reason.as_ref().map(ToString::to_string)))?,
+    )?;
+    let others = PyList::empty(py);
+    for answer in &answers {
+        let flat: Vec<f64> = answer.others.iter().flat_map(|other| other.values.clone()).collect();
+        let rows: Bound<'_, PyArray2<f64>> =
+            PyArray1::from_vec(py, flat).reshape([answer.others.len(), width])?;
+        others.append(rows)?;
+    }
+    dict.set_item("others", others)?;
+    dict.set_item("remarks", remarks)?;
+    Ok(dict)
+}

@@ -1,0 +1,223 @@
+//! Probability collectives: games of tables, or of an objective in Python.
+
+use crate::error::wrong;
+use crate::json::list;
+use crate::watch::attended;
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use sidestep::collectives::{
+    Choice, Estimator, Game, Order, Outcome, PairwiseGame, Settings, Stop, Update, Utility,
+    optimize,
+};
+use sidestep::kernel::Seed;
+use sidestep::kernel::stream::{Purpose, Streams};
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::{Mutex, PoisonError};
+
+/// The random streams of the players' samples.
+const SAMPLES: Purpose = Purpose(0);
+
+/// The settings of an optimization, as `sidestep.collectives.minimize` hands them over.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct Options {
+    estimator: String,
+    block: usize,
+    ageing: f64,
+    update: String,
+    step: f64,
+    order: String,
+    utility: String,
+    cooling: f64,
+    threshold: f64,
+    calm_rounds: u32,
+    max_rounds: u32,
+    choice: String,
+    seed: u64,
+}
+
+fn one_of<T: Copy>(name: &str, word: &str, known: &[(&str, T)]) -> PyResult<T> {
+    let found = known.iter().find(|(name, _)| *name == word).map(|(_, value)| *value);
+    found.ok_or_else(|| {
+        let names = known.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(" or ");
+        wrong(name, format!("`{word}` is not known"), format!("give {names}"))
+    })
+}
+
+/// Refuses a number outside of (0, 1].
+fn share(name: &str, value: f64) -> PyResult<f64> {
+    match value > 0.0 && value <= 1.0 {
+        true => Ok(value),
+        false => Err(wrong(name, format!("is {value}"), "give a number above 0, up to 1")),
+    }
+}
+
+impl Options {
+    fn settings(&self) -> PyResult<Settings> {
+        if self.block == 0 || !(0.0..=1.0).contains(&self.ageing) {
+            let cause = format!("blocks of {} samples that age by {}", self.block, self.ageing);
+            return Err(wrong("block", cause, "give 1 sample or more, and an ageing from 0 to 1"));
+        }
+        let step = share("step", self.step)?;
+        let sampled = Estimator::Sampled { block: self.block, ageing: self.ageing };
+        let (newton, brouwer) = (Update::NearestNewton { step }, Update::Brouwer { step });
+        Ok(Settings {
+            estimator: one_of(
+                "estimator",
+                &self.estimator,
+                &[("exact", Estimator::Exact), ("sampled", sampled)],
+            )?,
+            update: one_of("update", &self.update, &[("newton", newton), ("brouwer", brouwer)])?,
+            order: one_of(
+                "order",
+                &self.order,
+                &[("parallel", Order::Parallel), ("sequence", Order::Sequence)],
+            )?,
+            utility: one_of(
+                "utility",
+                &self.utility,
+                &[("joint", Utility::Joint), ("private", Utility::Private)],
+            )?,
+            cooling: share("cooling", self.cooling)?,
+            stop: Stop {
+                threshold: self.threshold,
+                calm_rounds: self.calm_rounds.max(1),
+                max_rounds: self.max_rounds,
+            },
+            choice: one_of(
+                "choice",
+                &self.choice,
+                &[("argmax", Choice::Argmax), ("draw", Choice::Draw)],
+            )?,
+        })
+    }
+
+    fn uniform(&self) -> impl Fn(usize, u64) -> f64 + use<> {
+        let streams = Streams::new(Seed(self.seed));
+        // One pair of numbers for each player and draw, so that any of them comes without those before it.
+        move |player, k| streams.draws(player as u32, k, SAMPLES).uniform()
+    }
+}
+
+/// Minimizes a sum over players and pairs: what `sidestep.collectives.minimize` stands on.
+#[pyfunction]
+pub(crate) fn minimize_pairs<'py>(
+    py: Python<'py>,
+    own: Vec<PyReadonlyArray1<'py, f64>>,
+    pairs: Vec<(usize, usize, PyReadonlyArray2<'py, f64>)>,
+    options: Options,
+) -> PyResult<Bound<'py, PyDict>> {
+    let own: Vec<Vec<f64>> = own.iter().map(|costs| costs.as_array().to_vec()).collect();
+    let sizes: Vec<usize> = own.iter().map(Vec::len).collect();
+    if own.is_empty() || sizes.contains(&0) {
+        return Err(wrong(
+            "own",
+            "a player has no strategy",
+            "give each player's costs, one or more",
+        ));
+    }
+    let mut game = PairwiseGame::new(own);
+    for (a, b, costs) in &pairs {
+        let costs = costs.as_array();
+        let place = format!("pairs[{a}, {b}]");
+        if a == b || *a >= sizes.len() || *b >= sizes.len() {
+            let remedy = format!("give two different numbers below {}", sizes.len());
+            return Err(wrong(&place, "these are no two players", remedy));
+        }
+        if costs.dim() != (sizes[*a], sizes[*b]) {
+            let cause = format!("has the shape {:?}", costs.dim());
+            let remedy = format!("give a row per strategy of {a}: ({}, {})", sizes[*a], sizes[*b]);
+            return Err(wrong(&place, cause, remedy));
+        }
+        game.add_pair(*a, *b, costs.iter().copied().collect());
+    }
+    let (settings, uniform) = (options.settings()?, options.uniform());
+    let outcome = attended(py, |watcher| {
+        let interrupt = watcher.interrupt();
+        let run = || {
+            let _heeded = interrupt.heeded_here();
+            optimize(&game, &settings, uniform)
+        };
+        let ended = catch_unwind(AssertUnwindSafe(run));
+        ended.map(Some).unwrap_or_else(|payload: Box<dyn Any + Send>| {
+            if interrupt.explains(payload.as_ref()) { None } else { resume_unwind(payload) }
+        })
+    })?;
+    // Nothing interrupts it but a signal, which is raised before.
+    let outcome = outcome.ok_or_else(|| wrong("minimize", "was interrupted", "call it again"))?;
+    let cost = game.cost(&outcome.joint);
+    told(py, &outcome, cost)
+}
+
+/// A game whose cost Python computes.
+struct Objective {
+    strategies: Vec<usize>,
+    cost: Py<PyAny>,
+    raised: Mutex<Option<PyErr>>,
+}
+
+impl Objective {
+    fn ask(&self, joint: &[usize]) -> PyResult<f64> {
+        Python::attach(|py| {
+            let joint: Vec<i64> = joint.iter().map(|k| *k as i64).collect();
+            let cost: f64 = self.cost.bind(py).call1((joint.to_pyarray(py),))?.extract()?;
+            if cost.is_nan() {
+                return Err(wrong("objective", "its cost is not a number", "return a number"));
+            }
+            py.check_signals().map(|()| cost)
+        })
+    }
+}
+
+impl Game for Objective {
+    fn strategies(&self) -> &[usize] {
+        &self.strategies
+    }
+
+    fn cost(&self, joint: &[usize]) -> f64 {
+        let mut raised = self.raised.lock().unwrap_or_else(PoisonError::into_inner);
+        // The first exception is raised when the rounds are over, which take no time any more.
+        if raised.is_some() {
+            return 0.0;
+        }
+        self.ask(joint).unwrap_or_else(|error| {
+            *raised = Some(error);
+            0.0
+        })
+    }
+}
+
+/// Minimizes a cost that Python computes, by samples: what `sidestep.collectives.minimize` stands on.
+#[pyfunction]
+pub(crate) fn minimize_objective<'py>(
+    py: Python<'py>,
+    strategies: Vec<usize>,
+    objective: Py<PyAny>,
+    options: Options,
+) -> PyResult<Bound<'py, PyDict>> {
+    if strategies.is_empty() || strategies.contains(&0) {
+        let remedy = "give a number of strategies for each player, 1 or more";
+        return Err(wrong("strategies", "a player has no strategy", remedy));
+    }
+    let game = Objective { strategies, cost: objective, raised: Mutex::default() };
+    let outcome = optimize(&game, &options.settings()?, options.uniform());
+    let cost = game.cost(&outcome.joint);
+    let raised = game.raised.into_inner().unwrap_or_else(PoisonError::into_inner);
+    raised.map_or(Ok(()), Err)?;
+    told(py, &outcome, cost)
+}
+
+fn told<'py>(py: Python<'py>, outcome: &Outcome, cost: f64) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    let joint: Vec<i64> = outcome.joint.iter().map(|k| *k as i64).collect();
+    dict.set_item("joint", joint.to_pyarray(py))?;
+    dict.set_item("cost", cost)?;
+    let arrays = |rows: &[Vec<f64>]| list(py, rows.iter().map(|row| PyArray1::from_slice(py, row)));
+    dict.set_item("q", arrays(&outcome.q)?)?;
+    dict.set_item("expected", arrays(&outcome.expected)?)?;
+    dict.set_item("rounds", outcome.rounds)?;
+    dict.set_item("converged", outcome.converged)?;
+    Ok(dict)
+}

@@ -1,0 +1,133 @@
+//! Error models of sensors and effectors, learned from tables.
+
+use crate::error;
+use crate::json::to_python;
+use pyo3::prelude::*;
+use sidestep::import::table::CsvTable;
+use sidestep::kernel::InputError;
+use sidestep::learn::EstimateOptions;
+use sidestep::learn::effector::{self, EffectorModel};
+use sidestep::learn::profile;
+use sidestep::learn::sensor::{self, SensorModel, SensorOptions};
+use sidestep_session::csv_table;
+use std::path::PathBuf;
+
+/// An error model that was learned: its counts, probabilities with intervals, and its form in a profile.
+#[pyclass(module = "sidestep", frozen)]
+pub(crate) struct Learned(Model);
+
+enum Model {
+    Sensor(Box<SensorModel>),
+    Effector(Box<EffectorModel>),
+}
+
+#[pymethods]
+impl Learned {
+    /// Whether it is a sensor or an effector.
+    #[getter]
+    fn kind(&self) -> &'static str {
+        match self.0 {
+            Model::Sensor(_) => "sensor",
+            Model::Effector(_) => "effector",
+        }
+    }
+
+    /// Everything that `sidestep learn --json` prints: counts, probabilities with their counts and 95 % intervals, thin rows,
+    /// tests of the fit on events held out, warnings.
+    #[getter]
+    fn report(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let value = match &self.0 {
+            Model::Sensor(model) => serde_json::to_value(&model.report),
+            Model::Effector(model) => serde_json::to_value(&model.report),
+        };
+        let bug = |e: serde_json::Error| error::RecordError::new_err(e.to_string());
+        to_python(py, &value.map_err(bug)?)
+    }
+
+    /// Returns the text of a profile with it under this name: a new one, or `text` with it added or replaced.
+    ///
+    /// Raises InputError when the text is no profile, or the name does not fit.
+    #[pyo3(signature = (name, text=None))]
+    fn profile(&self, name: &str, text: Option<&str>) -> PyResult<String> {
+        let empty = profile::empty(name);
+        let text = text.unwrap_or(&empty);
+        let written = match &self.0 {
+            Model::Sensor(model) => profile::with_sensor("profile", text, name, model),
+            Model::Effector(model) => profile::with_effector("profile", text, name, model),
+        };
+        written.map_err(|e| error::input(&e))
+    }
+
+    fn __str__(&self) -> String {
+        match &self.0 {
+            Model::Sensor(model) => model.report.to_string(),
+            Model::Effector(model) => model.report.to_string(),
+        }
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Learned({})", self.kind())
+    }
+}
+
+/// Returns a table: the text of one, or that which a run recorded.
+fn table(text: Option<&str>, run: Option<PathBuf>, name: &str) -> Result<CsvTable, InputError> {
+    match (text, run) {
+        (_, Some(run)) => csv_table(&run, name),
+        (text, None) => CsvTable::parse(&name, text.unwrap_or_default()),
+    }
+}
+
+fn estimate((alpha, hold_out_every): (f64, usize)) -> EstimateOptions {
+    EstimateOptions { alpha, hold_out_every, ..EstimateOptions::default() }
+}
+
+/// Learns an effector: what `sidestep.learn.effector` stands on.
+#[pyfunction]
+pub(crate) fn learn_effector(
+    py: Python<'_>,
+    text: Option<String>,
+    run: Option<PathBuf>,
+    options: (f64, usize),
+) -> PyResult<Learned> {
+    let learned = py.detach(|| {
+        effector::learn_csv(&table(text.as_deref(), run, "motions")?, &estimate(options))
+    });
+    let model = learned.map_err(|e| error::input(&e))?;
+    Ok(Learned(Model::Effector(Box::new(model))))
+}
+
+/// The shape of a sensor, as `sidestep.learn.sensor` hands it over.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct Shape {
+    edges_m: Option<Vec<f64>>,
+    classes: Vec<String>,
+    bearings_deg: Option<Vec<f64>>,
+    range_m: Option<f64>,
+    sensor: Option<String>,
+}
+
+/// Learns a sensor: what `sidestep.learn.sensor` stands on.
+#[pyfunction]
+pub(crate) fn learn_sensor(
+    py: Python<'_>,
+    text: Option<String>,
+    run: Option<PathBuf>,
+    shape: Shape,
+    options: (f64, usize),
+) -> PyResult<Learned> {
+    let default = SensorOptions::default();
+    let options = SensorOptions {
+        estimate: estimate(options),
+        distance_edges_m: shape.edges_m.unwrap_or(default.distance_edges_m),
+        distance_classes: shape.classes,
+        bearings_deg: shape.bearings_deg.unwrap_or(default.bearings_deg),
+        range_m: shape.range_m.unwrap_or(default.range_m),
+        sensor: shape.sensor,
+    };
+    let learned =
+        py.detach(|| sensor::learn_csv(&table(text.as_deref(), run, "readings")?, &options));
+    let model = learned.map_err(|e| error::input(&e))?;
+    Ok(Learned(Model::Sensor(Box::new(model))))
+}

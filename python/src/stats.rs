@@ -1,0 +1,131 @@
+//! Statistics: intervals, pairs, and the stopping rule; a value that is not finite is missing.
+
+use crate::error::wrong;
+use numpy::PyReadonlyArray1;
+use pyo3::prelude::*;
+use sidestep::statistics::{self, Bootstrap, Interval, Next, Pairs, Sample, StoppingRule};
+
+/// The lower and upper ends of an interval.
+type Ends = Option<(f64, f64)>;
+/// Values that come from Python.
+type Values<'py> = PyReadonlyArray1<'py, f64>;
+
+fn ends(interval: Interval) -> (f64, f64) {
+    (interval.low, interval.high)
+}
+
+fn options(values: &Values<'_>) -> Vec<Option<f64>> {
+    values.as_array().iter().map(|value| value.is_finite().then_some(*value)).collect()
+}
+
+/// Mean, standard deviation, Student's and the bootstrap's interval of the mean, the number of values and of those
+/// missing: what `sidestep.stats.mean` stands on.
+#[pyfunction]
+pub(crate) fn stats_mean(
+    py: Python<'_>,
+    values: Values<'_>,
+) -> (Option<f64>, Option<f64>, Ends, Ends, usize, usize) {
+    let sample = Sample::of(options(&values));
+    let bootstrap = py.detach(|| Bootstrap::default().mean(&sample.values));
+    let (n, missing) = (sample.values.len(), sample.missing);
+    (
+        statistics::mean(&sample.values),
+        statistics::sample_sd(&sample.values),
+        statistics::mean_interval(&sample.values).map(ends),
+        bootstrap.map(ends),
+        n,
+        missing,
+    )
+}
+
+/// Wilson's and Clopper and Pearson's intervals of a share: what `sidestep.stats.share` stands on.
+#[pyfunction]
+pub(crate) fn stats_share(successes: u64, n: u64) -> PyResult<((f64, f64), (f64, f64))> {
+    if successes > n {
+        let cause = format!("{successes} of {n} cannot be");
+        return Err(wrong("successes", cause, "give at most as many as there are trials"));
+    }
+    let wilson = statistics::wilson(successes as f64, n as f64);
+    let exact = match n {
+        0 => Interval { low: 0.0, high: 1.0 },
+        _ => statistics::clopper_pearson(successes, n),
+    };
+    Ok((ends(wilson), ends(exact)))
+}
+
+/// A quantile, its interval by order statistics and the coverage of that: what `sidestep.stats.quantile` stands on.
+#[pyfunction]
+pub(crate) fn stats_quantile(values: Values<'_>, q: f64) -> (Option<f64>, Ends, Option<f64>) {
+    let sorted = Sample::of(options(&values)).sorted();
+    let interval = statistics::quantile_interval(&sorted, q);
+    let coverage = interval.map(|found| found.coverage);
+    (statistics::percentile(&sorted, q), interval.map(|found| ends(found.interval)), coverage)
+}
+
+/// What two treatments of the same cases come to.
+type Compared = (
+    (usize, usize, Option<f64>),
+    (Ends, Ends),
+    (Option<f64>, Option<f64>),
+    (usize, usize, usize),
+    (Option<f64>, Ends),
+);
+
+/// Differences and ratios of pairs: what `sidestep.stats.paired` stands on.
+#[pyfunction]
+pub(crate) fn stats_paired(py: Python<'_>, a: Values<'_>, b: Values<'_>) -> PyResult<Compared> {
+    let (a, b) = (options(&a), options(&b));
+    if a.len() != b.len() {
+        let cause = format!("{} and {} values are no pairs", a.len(), b.len());
+        return Err(wrong(
+            "paired",
+            cause,
+            "give two values for each case, NaN where one is missing",
+        ));
+    }
+    let pairs = Pairs::of(&a, &b);
+    let bootstrap = py.detach(|| pairs.difference_bootstrap(&Bootstrap::default()));
+    let ratio = pairs.ratio();
+    Ok((
+        (pairs.n(), pairs.incomplete(), pairs.difference()),
+        (pairs.difference_interval().map(ends), bootstrap.map(ends)),
+        (pairs.p_value(), pairs.sign_p_value()),
+        pairs.signs(),
+        (ratio.map(|(ratio, _)| ratio), ratio.map(|(_, interval)| ends(interval))),
+    ))
+}
+
+/// P-values adjusted by Holm: what `sidestep.stats.holm` stands on.
+#[pyfunction]
+pub(crate) fn stats_holm(p_values: Vec<Option<f64>>) -> Vec<Option<f64>> {
+    statistics::holm(&p_values)
+}
+
+/// The rank correlation of two quantities with its interval and p-value: what `sidestep.stats.correlation` stands on.
+#[pyfunction]
+pub(crate) fn stats_correlation(a: Values<'_>, b: Values<'_>) -> Option<(f64, Ends, usize)> {
+    let pair = |(a, b): (Option<f64>, Option<f64>)| Some((a?, b?));
+    let pairs: Vec<(f64, f64)> =
+        options(&a).into_iter().zip(options(&b)).filter_map(pair).collect();
+    let found = statistics::rank_correlation(&pairs)?;
+    Some((found.value, found.interval.map(ends), pairs.len()))
+}
+
+/// The stopping rule: what `sidestep.stats.StoppingRule` stands on. Returns the number of runs, and why they are enough if
+/// they are.
+#[pyfunction]
+pub(crate) fn stats_next(
+    half_width: f64,
+    relative: bool,
+    runs: (usize, usize),
+    columns: Vec<Values<'_>>,
+) -> (usize, Option<&'static str>) {
+    let (min_runs, max_runs) = runs;
+    let rule = StoppingRule { half_width, relative, min_runs, max_runs };
+    let columns: Vec<Vec<Option<f64>>> = columns.iter().map(options).collect();
+    let columns: Vec<&[Option<f64>]> = columns.iter().map(Vec::as_slice).collect();
+    match rule.next_of(&columns) {
+        Next::Run(runs) => (runs, None),
+        Next::Enough(runs, reason) => (runs, Some(reason.words())),
+    }
+}

@@ -1,0 +1,371 @@
+//! Sweeps: the plan, the journal and the stopping rule of the command, with runs in threads or by others.
+
+use crate::error::{self, wrong};
+use crate::json::{to_python, to_toml};
+use crate::scenario::{Bundle, Made, made};
+use crate::table::Table;
+use crate::watch::{Signals, attended};
+use pyo3::exceptions::PyStopIteration;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyMapping};
+use serde_json::json;
+use sidestep::experiment::sweep::{
+    Cell, Changes, Factor, Outcome, Plan, RunColumn, Setting, Sweep, Wanted,
+};
+use sidestep::kernel::workers::available;
+use sidestep::kernel::{InputError, Interrupt};
+use sidestep::scenario::{Resolved, Source};
+use sidestep::worlds::WORLDS;
+use sidestep::worlds::airspace::scenario::Compiled;
+use sidestep::worlds::airspace::world::Method;
+use sidestep_papers::methods;
+use sidestep_session::sweep::{self, Crew, Deal, Ended, Engine, Folder, Taken, Task};
+use sidestep_session::{Error, Watcher, build};
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// The changes of a sweep, as `sidestep.sweep` hands them over.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct Options<'py> {
+    vary: Option<Bound<'py, PyMapping>>,
+    set: Option<Bound<'py, PyMapping>>,
+    replicate: Option<u32>,
+    until: Option<String>,
+    max_runs: Option<u32>,
+    metrics: Vec<String>,
+    baseline: Option<Bound<'py, PyMapping>>,
+    baseline_name: Option<String>,
+    seed: Option<u64>,
+    record: bool,
+}
+
+/// A sweep that is asked for; the scenario that it was made of, if there is one, keeps its files.
+struct Asked {
+    sweep: Sweep,
+    _made: Option<Arc<Made>>,
+}
+
+fn settings(mapping: Option<&Bound<'_, PyMapping>>) -> PyResult<Vec<Setting>> {
+    let Some(mapping) = mapping else { return Ok(Vec::new()) };
+    let setting = |entry: Bound<'_, PyAny>| {
+        let (key, value): (String, Bound<'_, PyAny>) = entry.extract()?;
+        Ok(Setting { value: to_toml(&value, &key)?, key })
+    };
+    mapping.items()?.iter().map(setting).collect()
+}
+
+impl Options<'_> {
+    fn factors(&self) -> PyResult<Vec<Factor>> {
+        let told = |key: &str| {
+            let remedy = "give a list, such as {\"robots.count\": [10, 20]}; what does not vary belongs into `set`";
+            wrong("vary", format!("`{key}` has no list of values"), remedy)
+        };
+        let factor = |Setting { key, value }: Setting| match value {
+            toml::Value::Array(values) if !values.is_empty() => Ok(Factor { key, values }),
+            _ => Err(told(&key)),
+        };
+        settings(self.vary.as_ref())?.into_iter().map(factor).collect()
+    }
+
+    fn changes(&self) -> PyResult<Changes> {
+        let until = |text: &String| {
+            let remedy =
+                "write \"ci=0.05\" (half width as a share of the mean) or \"abs=2.5\" (in units)";
+            text.parse().map_err(|cause: String| wrong("until", cause, remedy))
+        };
+        let is_asked = self.baseline.is_some() || self.baseline_name.is_some();
+        let wanted = Wanted {
+            name: self.baseline_name.clone(),
+            settings: settings(self.baseline.as_ref())?,
+        };
+        Ok(Changes {
+            fixed: settings(self.set.as_ref())?,
+            factors: self.factors()?,
+            until: self.until.as_ref().map(until).transpose()?,
+            replicates: self.replicate,
+            max_runs: self.max_runs,
+            metrics: self.metrics.clone(),
+            baseline: is_asked.then_some(wanted),
+            first_seed: self.seed,
+            record: self.record,
+        })
+    }
+
+    /// Returns the sweep of a file, a dict or a scenario.
+    fn asked(&self, of: &Bound<'_, PyAny>) -> PyResult<Asked> {
+        let (sweep, made) = of_any(of)?;
+        if self.max_runs.is_some() && self.until.is_none() && sweep.until.is_none() {
+            let cause = "it bounds the runs of a sweep that goes on until it is precise";
+            return Err(wrong("max_runs", cause, "give until=\"ci=0.05\" as well"));
+        }
+        let sweep = sweep.changed(self.changes()?).map_err(|e| error::input(&e))?;
+        Ok(Asked { sweep, _made: made })
+    }
+}
+
+/// Returns the sweep of a sweep file, or of a dict of the same keys, or of a scenario of any sort.
+fn of_any(of: &Bound<'_, PyAny>) -> PyResult<(Sweep, Option<Arc<Made>>)> {
+    if let Ok(path) = of.extract::<PathBuf>() {
+        return Ok((Sweep::read(&path).map_err(|e| error::input(&e))?, None));
+    }
+    if let Ok(mapping) = of.cast::<PyMapping>()
+        && mapping.contains("scenario")?
+    {
+        let mut table = crate::json::table(mapping, "")?;
+        table.entry("format").or_insert(toml::Value::Integer(1));
+        let text = toml::to_string(&table)
+            .map_err(|e| wrong("sweep", e.to_string(), "give what a sweep file may hold"))?;
+        let source = Source::new("sweep", text, "");
+        return Ok((Sweep::parse(&source).map_err(|e| error::input_of_dict(&e))?, None));
+    }
+    let made = made(of)?;
+    Ok((Sweep::of_source(made.source.clone()), Some(made)))
+}
+
+/// What a sweep has come to.
+struct Came {
+    results: Vec<RunColumn>,
+    timings: Vec<RunColumn>,
+    told: serde_json::Value,
+    world: String,
+}
+
+/// Runs a sweep with an engine, in a folder or in memory.
+fn run(
+    sweep: &Sweep,
+    out: Option<&PathBuf>,
+    engine: Engine<'_>,
+    watcher: &dyn Watcher,
+) -> Result<Option<Came>, Error> {
+    let (folder, plan, ended);
+    match out {
+        Some(out) => {
+            let there = sweep::planned_or_there(WORLDS, sweep, out, watcher)?;
+            ended = sweep::go_on(WORLDS, &there, engine, watcher)?;
+            plan = there.plan().clone();
+            folder = Some(there);
+        }
+        None => {
+            (plan, ended) = sweep::in_memory(WORLDS, sweep, engine, watcher)?;
+            folder = None;
+        }
+    }
+    let Ended::Done(done) = ended else { return Ok(None) };
+    came(&plan, folder.as_ref(), &done).map(Some).map_err(Error::from)
+}
+
+fn came(plan: &Plan, folder: Option<&Folder>, done: &sweep::Done) -> Result<Came, InputError> {
+    let summary = plan.summary(&done.table)?;
+    let own = |columns: Vec<&RunColumn>| columns.into_iter().cloned().collect();
+    Ok(Came {
+        results: own(done.table.results()),
+        timings: own(done.table.timings()),
+        told: done.told(plan, folder, &summary),
+        world: plan.world.clone(),
+    })
+}
+
+/// Others who run cells: a generator of Python that is driven from here.
+struct Others {
+    /// Called with the cells; gives a generator of wishes and outcomes.
+    begin: Py<PyAny>,
+    at_once: usize,
+    raised: Mutex<Option<PyErr>>,
+}
+
+/// A cell as Python has it: its number, variant, replicate and seed.
+type AsTuple = (u64, u32, u32, u64);
+
+impl Others {
+    /// Drives the generator: what it yields is the number of a variant whose scenario it wants, or a list of outcomes.
+    fn drive(&self, py: Python<'_>, deal: &Deal<'_>, take: &mut Taken<'_>) -> PyResult<()> {
+        let tuple = |cell: &Cell| (cell.id, cell.variant, cell.replicate, cell.seed);
+        let cells: Vec<AsTuple> = deal.cells().iter().map(tuple).collect();
+        let generator = self.begin.bind(py).call1((build(), cells))?;
+        let mut answer = py.None();
+        loop {
+            let yielded = match generator.call_method1("send", (answer,)) {
+                Err(ended) if ended.is_instance_of::<PyStopIteration>(py) => return Ok(()),
+                yielded => yielded?,
+            };
+            answer = py.None();
+            if let Ok(variant) = yielded.extract::<u32>() {
+                let Resolved { text, files } =
+                    deal.scenario(variant).map_err(|e| error::input(&e))?;
+                answer = (text, files).into_pyobject(py)?.into_any().unbind();
+                continue;
+            }
+            for outcome in yielded.extract::<Vec<String>>()? {
+                take(read(&outcome)?).map_err(|e| error::session(&e))?;
+            }
+        }
+    }
+}
+
+/// Reads an outcome that was sent.
+fn read(text: &str) -> PyResult<Outcome> {
+    let told = |e: serde_json::Error| {
+        let remedy = "install the same build of sidestep wherever tasks run";
+        wrong("an outcome of a task", e.to_string(), remedy)
+    };
+    serde_json::from_str(text).map_err(told)
+}
+
+impl Crew for Others {
+    fn run(&self, deal: &Deal<'_>, take: &mut Taken<'_>) -> Result<(), Error> {
+        Python::attach(|py| self.drive(py, deal, take)).map_err(|raised| {
+            *self.raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(raised);
+            // Whoever called raises it; nothing between looks at the reason.
+            Error::Interrupted
+        })
+    }
+
+    fn at_once(&self) -> usize {
+        self.at_once
+    }
+}
+
+/// Tables of results and of timings, and the summary.
+type Told<'py> = (Table, Table, Bound<'py, PyAny>);
+
+/// Runs a sweep on threads, all processors where `workers` is 0, or by a crew: what `sidestep.sweep` stands on.
+#[pyfunction]
+#[pyo3(signature = (sweep, options, out, workers, begin))]
+pub(crate) fn run_sweep<'py>(
+    py: Python<'py>,
+    sweep: &Bound<'py, PyAny>,
+    options: Options<'py>,
+    out: Option<PathBuf>,
+    workers: usize,
+    begin: Option<Py<PyAny>>,
+) -> PyResult<Told<'py>> {
+    let workers = if workers == 0 { available() } else { workers };
+    let asked = options.asked(sweep)?;
+    let (sweep, out) = (&asked.sweep, out.as_ref());
+    let came = match begin {
+        None => attended(py, |watcher| run(sweep, out, Engine::Workers(workers), watcher))?,
+        Some(begin) => {
+            let (signals, raised) = (Signals::default(), Mutex::default());
+            let others = Others { begin, at_once: workers, raised };
+            let came = py.detach(|| run(sweep, out, Engine::Crew(&others), &signals));
+            let raised = others.raised.into_inner().unwrap_or_else(PoisonError::into_inner);
+            raised.map_or(Ok(()), Err)?;
+            signals.into_result()?;
+            came
+        }
+    };
+    // A run is interrupted by a signal alone, which is raised before.
+    let came = came.and_then(|came| came.ok_or(Error::Interrupted));
+    let Came { results, timings, told, world } = came.map_err(|e| error::session(&e))?;
+    let results = Table::of_runs("results", results, &world)?;
+    let timings = Table::of_runs("timings", timings, &world)?;
+    Ok((results, timings, to_python(py, &told)?.into_bound(py)))
+}
+
+/// Runs some cells of a sweep that another process drives, and returns their outcomes as JSON: what tasks of
+/// `sidestep.sweep` call wherever they run.
+///
+/// Raises InputError when the sweep is of another build of sidestep.
+#[pyfunction]
+pub(crate) fn run_task(
+    py: Python<'_>,
+    build: String,
+    scenarios: Vec<(u32, Bundle)>,
+    cells: Vec<AsTuple>,
+) -> PyResult<Vec<String>> {
+    let resolved = |(variant, (text, files))| (variant, Resolved { text, files });
+    let cell = |(id, variant, replicate, seed)| Cell { id, variant, replicate, seed };
+    let task = Task {
+        build,
+        scenarios: scenarios.into_iter().map(resolved).collect(),
+        cells: cells.into_iter().map(cell).collect(),
+    };
+    let outcomes = attended(py, |watcher| task.run(WORLDS, watcher))?;
+    let outcomes = outcomes.map_err(|e| error::session(&e))?;
+    let text = |outcome: &Outcome| {
+        serde_json::to_string(outcome)
+            .map_err(|e| error::RecordError::new_err(format!("an outcome cannot be sent: {e}")))
+    };
+    outcomes.iter().map(text).collect()
+}
+
+/// Compares methods of collision avoidance on the same air traffic: what `sidestep.compare` stands on.
+#[pyfunction]
+pub(crate) fn compare_methods(
+    py: Python<'_>,
+    scenario: &Bound<'_, PyAny>,
+    methods: Vec<String>,
+    runs: usize,
+    seed: Option<u64>,
+    workers: usize,
+) -> PyResult<Py<PyAny>> {
+    let given = made(scenario)?;
+    let named = |name: &String| Method::ALL.into_iter().find(|m| m.name() == name);
+    let method = |name: &String| {
+        let known = Method::ALL.map(Method::name).join(", ");
+        let told = || wrong("methods", format!("there is no method `{name}`"), known);
+        named(name).ok_or_else(told)
+    };
+    let methods = methods.iter().map(method).collect::<PyResult<Vec<_>>>()?;
+    let Some(compiled) = given.compiled.as_any().downcast_ref::<Compiled>() else {
+        let cause = "methods of collision avoidance are of the world `airspace` alone";
+        return Err(wrong("scenario", cause, "give a scenario with world = \"airspace\""));
+    };
+    let span = (seed.unwrap_or(compiled.seed), runs);
+    let workers = if workers == 0 { available() } else { workers };
+    let results = attended(py, |watcher| {
+        let heeded = watcher.interrupt();
+        let run = || {
+            let progress = &mut |_: &str, _: f64| ();
+            methods::compare_heeding(&given.source, &methods, span, workers, (progress, &heeded))
+        };
+        catch_unwind(AssertUnwindSafe(run))
+            .unwrap_or_else(|payload| resume_unless(payload, &heeded))
+    })?;
+    let results = results.map_err(|e| error::input(&e))?;
+    to_python(py, &json!({ "name": compiled.name, "seed": span.0, "methods": results }))
+}
+
+/// Goes on unwinding, unless the interrupt explains it: then nobody looks at the results.
+fn resume_unless<T>(
+    payload: Box<dyn Any + Send>,
+    interrupt: &Interrupt,
+) -> Result<Vec<T>, InputError> {
+    match interrupt.explains(payload.as_ref()) {
+        true => Ok(Vec::new()),
+        false => resume_unwind(payload),
+    }
+}
+
+/// Returns the tables of a sweep's folder: of the runs that are finished.
+pub(crate) fn read_folder<'py>(
+    py: Python<'py>,
+    folder: &Path,
+    wanted: Option<&Vec<String>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let finished = py.detach(|| {
+        let folder = Folder::open(folder)?;
+        let finished = sweep::finished(&folder)?;
+        Ok((finished.table, folder.plan().world.clone()))
+    });
+    let (table, world) = finished.map_err(|e: InputError| error::input(&e))?;
+    let dict = PyDict::new(py);
+    for (name, columns) in [("results", table.results()), ("timings", table.timings())] {
+        if wanted.is_none_or(|wanted| wanted.iter().any(|other| other == name)) {
+            let columns = columns.into_iter().cloned().collect();
+            dict.set_item(name, Table::of_runs(name, columns, &world)?)?;
+        }
+    }
+    let unknown =
+        wanted.into_iter().flatten().find(|name| !["results", "timings"].contains(&name.as_str()));
+    match unknown {
+        Some(name) => {
+            let cause = format!("there is no table `{name}`");
+            Err(wrong(&folder.display().to_string(), cause, "a sweep has results and timings"))
+        }
+        None => Ok(dict),
+    }
+}

@@ -1,0 +1,252 @@
+"""Kinematics, learning, statistics and collectives: the command's answers, from arrays to arrays."""
+
+import json
+import subprocess
+
+import numpy as np
+import pytest
+
+import sidestep
+from sidestep import collectives, learn, stats
+
+
+@pytest.fixture
+def urdf(root):
+    return root / "scenarios/chain/arm.urdf"
+
+
+def told(command, *args):
+    done = subprocess.run([command, *map(str, args), "--json"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_forward_kinematics_is_that_of_the_command(urdf, command):
+    arm = sidestep.Arm(urdf)
+    joints = np.linspace(-0.3, 0.4, len(arm.joints))
+    words = told(command, "fk", urdf, "--joints", ",".join(map(str, joints)))
+    placed = sidestep.fk(arm, joints)
+    np.testing.assert_array_equal(placed.tip[0], words["tip"])
+    np.testing.assert_array_equal(placed.rotation[0], words["rotation"])
+    np.testing.assert_array_equal(placed.connectors[0], words["connectors"])
+    assert placed.inside_limits[0] == (not words["outside_limits"])
+    assert arm.joints == [joint["name"] for joint in words["joint_info"]]
+    many = sidestep.fk(arm, [joints] * 5)
+    assert many.rotation.shape == (5, 3, 3)
+    np.testing.assert_array_equal(many.tip, np.repeat(placed.tip, 5, axis=0))
+
+
+def test_inverse_kinematics_is_that_of_the_command_whatever_the_workers(urdf, command):
+    arm = sidestep.Arm(urdf)
+    low, high = np.clip(arm.limits, -3.0, 3.0).T
+    rng = np.random.default_rng(1)
+    places = sidestep.fk(arm, rng.uniform(low, high, (20, len(arm.joints))))
+    found = sidestep.ik(arm, places.tip, workers=2)
+    assert found.reached.all() and found.reasons == [None] * 20
+    np.testing.assert_allclose(sidestep.fk(arm, found.joints).tip, places.tip, atol=1e-6)
+    np.testing.assert_array_equal(found.joints, sidestep.ik(arm, places.tip, workers=1).joints)
+    one = told(command, "ik", urdf, "--target", ",".join(map(str, places.tip[0])))
+    np.testing.assert_array_equal(found.joints[0], one["joints"])
+    turned = sidestep.ik(arm, places.tip[:3], quaternion=places.quaternion[:3], solutions=2)
+    assert turned.reached.all() and max(turned.error_rad) < 1e-6
+
+
+def test_targets_out_of_reach_say_why(urdf):
+    found = sidestep.ik(urdf, [[0.0, 0.0, 99.0]], restarts=3)
+    assert not found.reached[0] and found.error_m[0] > 90
+    assert found.reasons[0]
+
+
+ARM_ERRORS = [
+    ({"targets": [1, 2]}, "targets: has the shape (1, 2)"),
+    ({"targets": [[0, 0, float("nan")]]}, "targets: row 0 is"),
+    ({"targets": "far"}, "targets: are no numbers"),
+    ({"targets": [0, 0, 1], "rpy": [0, 0, 0], "quaternion": [0, 0, 0, 1]}, "give one of them"),
+    ({"targets": [0, 0, 1], "rpy": [0, 0]}, "rpy: has the shape (1, 2)"),
+    ({"targets": [0, 0, 1], "quaternion": [0, 0, 0, 0]}, "targets:"),
+    ({"targets": [0, 0, 1], "free": ["rz"]}, "free: a turn is free, and none is asked for"),
+    ({"targets": [0, 0, 1], "free": ["up"]}, "`up` is none of x, y, z"),
+    ({"targets": [0, 0, 1], "engine": "fast"}, "`fast` is none of auto"),
+    ({"targets": [0, 0, 1], "start": [0]}, "start: has rows of 1 numbers"),
+    ({"targets": [0, 0, 1], "solutions": 0}, "solutions: is 0"),
+    ({"targets": [0, 0, 1], "obstacles": [[0, 0, 1]]}, "obstacles: has the shape (1, 3)"),
+]
+
+
+@pytest.mark.parametrize(("options", "words"), ARM_ERRORS, ids=[words for _, words in ARM_ERRORS])
+def test_wrong_targets_are_errors_that_name_the_argument(options, words, urdf):
+    with pytest.raises(sidestep.InputError) as caught:
+        sidestep.ik(urdf, **options)
+    assert words in str(caught.value)
+
+
+def test_a_link_that_is_not_there_is_named(urdf):
+    with pytest.raises(sidestep.InputError, match="tip: .* has no link `hand`"):
+        sidestep.Arm(urdf, tip="hand")
+
+
+def calibrated(tmp_path):
+    scenario = {
+        "world": "robots",
+        "cycles": 400,
+        "map": {"ascii": "..........\n..........\n..........\n.........."},
+        "record": {"calibration": True},
+        "robots": [{"count": 3, "effector": "nomad", "sensors": ["sonar-8"]}],
+    }
+    with sidestep.Simulation(scenario, out=tmp_path / "run") as sim:
+        sim.run()
+    return tmp_path / "run"
+
+
+def test_what_is_learned_from_arrays_is_what_the_command_learns_from_the_run(command, tmp_path):
+    run = calibrated(tmp_path)
+    tables = sidestep.read(run)
+    options = ["--edges", "0.3,1.5", "--classes", "near,medium,far"]
+    shape = {"edges_m": [0.3, 1.5], "classes": ["near", "medium", "far"]}
+    for kind, name, args, of in [
+        ("effector", "motions", [], learn.effector),
+        ("sensor", "readings", options, lambda table: learn.sensor(table, **shape)),
+    ]:
+        words = told(command, "learn", kind, "--run", run, *args)
+        of_run, of_columns = of(run).report, of(tables[name]).report
+        assert of_run == words
+        for report in (of_run, of_columns):
+            del report["source"]
+        assert of_columns == of_run
+        assert of_run["probabilities"][0]["of"] > 0
+
+
+def test_what_is_learned_becomes_part_of_a_scenario(tmp_path):
+    polars = pytest.importorskip("polars")
+    moves = polars.DataFrame(
+        {"action": ["forward"] * 50, "ahead_boxes": [1] * 45 + [0] * 5, "left_boxes": [0] * 50, "turn_deg": [0.0] * 50}
+    )
+    learned = learn.effector(moves)
+    (tmp_path / "mine.toml").write_text(learned.profile("mine"))
+    text = (
+        'format = 1\nworld = "robots"\nprofiles = ["mine.toml"]\nmap.ascii = "........"\n'
+        '[robots]\ncount = 2\neffector = "mine"\n'
+    )
+    assert sidestep.Scenario(text=text, base=tmp_path).agents == 2
+    both = learned.profile("other", learned.profile("mine"))
+    assert "[effectors.mine]" in both and "[effectors.other]" in both
+    assert "forward" in str(learned)
+
+
+def test_columns_that_do_not_fit_are_named():
+    with pytest.raises(sidestep.InputError, match="their lengths differ: action has 2, ahead_boxes has 1"):
+        learn.effector({"action": ["forward"] * 2, "ahead_boxes": [1]})
+    with pytest.raises(sidestep.InputError, match="there is none of action"):
+        learn.effector({"aktion": ["forward"]})
+    with pytest.raises(sidestep.InputError, match="left_boxes"):
+        learn.effector({"action": ["forward"], "ahead_boxes": [1]})
+
+
+def test_statistics_are_those_of_a_sweep():
+    floor = {
+        "world": "robots",
+        "cycles": 100,
+        "map": {"ascii": "........\n........"},
+        "robots": {"count": 2, "effector": "nomad"},
+    }
+    options = {"vary": {"robots.count": [2, 6]}, "baseline": {"robots.count": 2}}
+    swept = sidestep.sweep(floor, **options, replicate=12)
+    few, many = swept.values("distance_m", 0), swept.values("distance_m", 1)
+    summary = {metric["name"]: metric for metric in swept.summary["metrics"]}["distance_m"]
+    mean = stats.mean(many)
+    numbers = summary["variants"][1]["values"]["numbers"]
+    assert (mean.mean, mean.sd) == (numbers["mean"], numbers["sd"])
+    assert list(mean.interval) == numbers["interval"]
+    assert list(mean.bootstrap) == numbers["bootstrap"]
+    difference = stats.paired(many, few)
+    assert difference.n == 12 and difference.higher == 12
+    assert difference.interval.low < (many - few).mean() < difference.interval.high
+    assert difference.p_value < 0.001
+
+
+def test_missing_values_are_counted_and_not_averaged():
+    assert stats.mean([1.0, np.nan, 3.0, np.inf])[:1] == (2.0,)
+    assert stats.mean([1.0, np.nan, 3.0, np.inf]).missing == 2
+    assert stats.mean([]) == (None, None, None, None, 0, 0)
+    assert stats.paired([1.0, np.nan, 3.0], [0.0, 1.0, 2.5]).incomplete == 1
+    assert stats.paired([-1.0, 2.0], [0.0, 1.0]).ratio is None
+
+
+def test_the_stopping_rule_looks_at_rounds():
+    rule = stats.StoppingRule(0.1, max_runs=40)
+    values = np.tile([1.0, 2.0], 20)
+    runs = rule.next(values[:10]).runs
+    assert 10 < runs <= 40 and rule.next(values[: runs - 1]).runs == runs
+    assert rule.next(values).reason == "the maximum of runs is reached; the interval is wider than wanted"
+
+
+STATS_ERRORS = [
+    (lambda: stats.mean("abc"), "values: are no numbers"),
+    (lambda: stats.mean([[1.0]]), "values: have the shape"),
+    (lambda: stats.paired([1.0], [1.0, 2.0]), "1 and 2 values are no pairs"),
+    (lambda: stats.share(3, 2), "3 of 2 cannot be"),
+    (lambda: stats.quantile([1.0], 1.0), "q: is 1.0"),
+    (lambda: stats.StoppingRule(0.0), "half_width: is 0.0"),
+    (lambda: stats.StoppingRule(0.1, min_runs=1), "min_runs: is 1"),
+]
+
+
+@pytest.mark.parametrize(("ask", "words"), STATS_ERRORS, ids=[words for _, words in STATS_ERRORS])
+def test_wrong_values_are_errors(ask, words):
+    with pytest.raises(sidestep.InputError) as caught:
+        ask()
+    assert words in str(caught.value)
+
+
+def test_no_player_alone_can_do_better_and_an_objective_comes_near():
+    rng = np.random.default_rng(3)
+    own = [rng.uniform(0, 0.2, 3) for _ in range(4)]
+    pairs = {(a, b): np.eye(3) for a in range(4) for b in range(a)}
+
+    def cost(joint):
+        alone = sum(own[k][x] for k, x in enumerate(joint))
+        return alone + sum(table[joint[a], joint[b]] for (a, b), table in pairs.items())
+
+    exact = collectives.minimize(own, pairs)
+    assert exact.converged
+    sampled = collectives.minimize(objective=cost, strategies=[3] * 4, block=60, seed=2)
+    assert exact.cost == pytest.approx(cost(exact.joint))
+    for player, strategy in np.ndindex(4, 3):
+        other = exact.joint.copy()
+        other[player] = strategy
+        assert cost(other) >= exact.cost - 1e-12
+    assert sampled.cost == pytest.approx(cost(sampled.joint))
+    assert sampled.cost < exact.cost + 0.2
+    again = collectives.minimize(objective=cost, strategies=[3] * 4, block=60, seed=2)
+    assert (again.joint.tolist(), again.rounds) == (sampled.joint.tolist(), sampled.rounds)
+    for q in exact.q:
+        assert q.sum() == pytest.approx(1.0)
+
+
+def test_what_an_objective_raises_is_raised():
+    def objective(joint):
+        raise KeyError("mine")
+
+    with pytest.raises(KeyError, match="mine"):
+        collectives.minimize(objective=objective, strategies=[2, 2])
+
+
+GAME_ERRORS = [
+    ({"own": [[1.0], []]}, "a player has no strategy"),
+    ({"own": [[1.0, 2.0]] * 2, "pairs": {(0, 0): np.eye(2)}}, "these are no two players"),
+    ({"own": [[1.0, 2.0]] * 2, "pairs": {(0, 1): np.eye(3)}}, "has the shape (3, 3)"),
+    ({"own": [[1.0, np.inf]]}, "a cost that is not finite"),
+    ({"own": [[1.0]], "step": 0.0}, "step: is 0"),
+    ({"own": [[1.0]], "cooling": 2.0}, "cooling: is 2"),
+    ({"own": [[1.0]], "update": "slow"}, "`slow` is not known"),
+    ({"objective": len}, "an objective needs the numbers of strategies"),
+    ({"objective": len, "strategies": [2], "estimator": "exact"}, "has no closed form"),
+    ({"strategies": [2]}, "tables need each player's own costs"),
+]
+
+
+@pytest.mark.parametrize(("options", "words"), GAME_ERRORS, ids=[words for _, words in GAME_ERRORS])
+def test_games_that_are_none_are_errors(options, words):
+    with pytest.raises(sidestep.InputError) as caught:
+        collectives.minimize(**options)
+    assert words in str(caught.value)

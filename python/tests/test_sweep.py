@@ -1,0 +1,414 @@
+"""Sweeps: the same plan, journal, folder and table as the command makes, whoever runs the cells."""
+
+import concurrent.futures
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+
+import sidestep
+from sidestep import _engines
+from sidestep._native import run_task
+
+FLOOR = """format = 1
+world = "robots"
+cycles = 200
+map.ascii = '''
+..........
+..........
+....##....
+..........
+'''
+[robots]
+count = 4
+sensors = ["sonar-8"]
+effector = "nomad"
+behaviour = { kind = "wander" }
+"""
+VARY = {"robots.count": [2, 5], "robots.effector": ["nomad", "perfect"]}
+SPAWN = get_context("spawn")
+
+
+@pytest.fixture
+def floor(tmp_path):
+    path = tmp_path / "floor.toml"
+    path.write_text(FLOOR)
+    return path
+
+
+def files(folder):
+    """The files of a sweep that follow from its plan and runs alone."""
+    names = ["results.parquet", "cells.parquet", "sweep.json"]
+    names += [p.relative_to(folder) for p in (folder / "variants").rglob("*") if p.is_file()]
+    return {str(name): (folder / name).read_bytes() for name in names}
+
+
+def begun(folder):
+    """How many runs the journal has, after its first line."""
+    journals = (folder / "shares").glob("*.journal")
+    return sum(max(journal.read_bytes().count(b"\n") - 1, 0) for journal in journals)
+
+
+def told(command, *args):
+    done = subprocess.run([command, *map(str, args), "--json"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def by_command(command, floor, out, *args):
+    return told(
+        command, "sweep", floor, "--vary", "robots.count=2,5",
+        "--vary", "robots.effector=nomad,perfect", *args, "--out", out,
+    )  # fmt: skip
+
+
+def test_a_sweep_is_that_of_the_command_byte_for_byte(floor, command, tmp_path):
+    words = by_command(command, floor, tmp_path / "a", "--replicate", 3, "--seed", 7)
+    swept = sidestep.sweep(floor, vary=VARY, replicate=3, seed=7, out=tmp_path / "b", workers=2)
+    assert files(tmp_path / "a") == files(tmp_path / "b")
+    assert words["summary"] == swept.summary
+    assert words.keys() == swept.told.keys()
+    assert (len(swept), swept.failed, len(swept.timings)) == (12, 0, 12)
+    again = sidestep.sweep(floor, vary=VARY, replicate=3, seed=7, out=tmp_path / "a")
+    assert again.results["digest"].tolist() == swept.results["digest"].tolist()
+    assert again.told["took"] is None, "nothing was run again"
+
+
+def test_a_precision_ends_a_sweep_as_it_ends_that_of_the_command(floor, command, tmp_path):
+    args = ["--until", "ci=0.2", "--max", 40, "--metrics", "contacts"]
+    words = by_command(command, floor, tmp_path / "a", *args)
+    options = {"until": "ci=0.2", "max_runs": 40, "metrics": ["contacts"]}
+    local = sidestep.sweep(floor, vary=VARY, **options, out=tmp_path / "b")
+    with ThreadPoolExecutor(3) as pool:
+        others = sidestep.sweep(floor, vary=VARY, **options, out=tmp_path / "c", engine=pool)
+    assert files(tmp_path / "a") == files(tmp_path / "b") == files(tmp_path / "c")
+    assert words["stopped"] == local.told["stopped"] == others.told["stopped"]
+
+
+def test_a_sweep_file_a_dict_of_one_and_a_scenario_are_swept_alike(floor, tmp_path):
+    file = tmp_path / "sweep.toml"
+    file.write_text(
+        'format = 1\nscenario = "floor.toml"\nreplicates = 2\nvary.robots.count = [2, 5]\n'
+    )
+    of_dict = {"scenario": str(floor), "replicates": 2, "vary": {"robots.count": [2, 5]}}
+    options = {"vary": {"robots.count": [2, 5]}, "replicate": 2}
+    swept = [
+        sidestep.sweep(file),
+        sidestep.sweep(of_dict),
+        sidestep.sweep(floor, **options),
+        sidestep.sweep(sidestep.Scenario(floor), **options),
+        sidestep.sweep(sidestep.Scenario(text=FLOOR), **options),
+    ]
+    digests = [one.results["digest"].tolist() for one in swept]
+    assert len(digests[0]) == 4
+    assert digests == [digests[0]] * 5
+
+
+def test_tables_are_arrow_streams_and_are_read_back_from_the_folder(floor, tmp_path):
+    pyarrow = pytest.importorskip("pyarrow")
+    swept = sidestep.sweep(floor, vary=VARY, replicate=2, out=tmp_path / "s")
+    table = pyarrow.table(swept.results)
+    assert table.equals(pyarrow.table(sidestep.read(tmp_path / "s")["results"]))
+    assert table.column("robots.effector").to_pylist()[:3] == ["nomad"] * 2 + ["perfect"]
+    assert swept.results.meanings["digest"] == "Digest of the last state."
+    np.testing.assert_array_equal(
+        swept.values("contacts", 1), swept.results["contacts"][2:4]
+    )
+    assert list(sidestep.read(tmp_path / "s", ["timings"])) == ["timings"]
+
+
+def test_methods_are_compared_as_the_command_compares_them(command, root):
+    scenario = root / "scenarios/airspace/superconflict.toml"
+    words = told(command, "compare", scenario, "--runs", 2, "--methods", "mvp,none")
+    compared = sidestep.compare(scenario, methods=["mvp", "none"], runs=2)
+    for result in words["methods"] + compared["methods"]:
+        del result["optimize_cpu_s"]
+    assert compared == words
+
+
+WRONG = [
+    ({"vary": {"robots.count": 3}}, "vary: `robots.count` has no list of values"),
+    ({"vary": {"robots.cuont": [3]}}, "`cuont`"),
+    ({"replicate": 0}, "replicate: is 0"),
+    ({"replicate": 3, "until": "ci=0.1"}, "give one of them"),
+    ({"until": "ci=x"}, "is no precision"),
+    ({"max_runs": 5}, "it bounds the runs"),
+    ({"seed": -1}, "seed: is -1"),
+    ({"metrics": "contacts"}, "give a list"),
+    ({"metrics": ["kontacts"]}, "`kontacts` is no metric"),
+    ({"baseline": "nobody"}, "nobody"),
+    ({"set": {"seed": 3}}, "`seed` is set"),
+    ({"engine": 7}, "7 is no engine"),
+    ({"engine": int}, "a function that returned int"),
+    ({"engine": "ray", "record": True}, "recorded on this machine alone"),
+    ({"record": True}, "no folder"),
+    ({"workers": 0}, "workers: is 0"),
+]
+
+
+@pytest.mark.parametrize(("options", "words"), WRONG, ids=[words for _, words in WRONG])
+def test_what_cannot_be_swept_is_an_error_before_any_run(options, words, floor):
+    with pytest.raises(sidestep.InputError) as caught:
+        sidestep.sweep(floor, **options)
+    assert words in str(caught.value)
+
+
+def test_ctrl_c_stops_a_sweep_and_the_same_call_goes_on(floor, tmp_path):
+    out, options = tmp_path / "s", {"set": {"cycles": 20_000}, "replicate": 40}
+
+    def interrupt():
+        while not begun(out):
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    thread = threading.Thread(target=interrupt)
+    thread.start()
+    with pytest.raises(KeyboardInterrupt):
+        sidestep.sweep(floor, **options, out=out, workers=2)
+    thread.join()
+    assert 0 < len(sidestep.read(out)["results"]) < 40
+    swept = sidestep.sweep(floor, **options, out=out, workers=2)
+    assert 0 < swept.told["took"]["runs"] < 40
+    whole = sidestep.sweep(floor, **options, out=tmp_path / "whole", workers=2)
+    assert files(out) == files(tmp_path / "whole")
+
+
+DRIVER = """
+import sys
+from concurrent.futures import ThreadPoolExecutor
+import sidestep
+floor, out = sys.argv[1:]
+with ThreadPoolExecutor(2) as pool:
+    sidestep.sweep(floor, set={"cycles": 20_000}, replicate=40, out=out, engine=pool)
+"""
+
+
+def test_a_killed_driver_loses_nothing_that_is_in_the_journal(floor, tmp_path):
+    out = tmp_path / "s"
+    driver = subprocess.Popen([sys.executable, "-c", DRIVER, floor, out])
+    while not begun(out):
+        assert driver.poll() is None, "it has ended before"
+        time.sleep(0.01)
+    driver.kill()
+    driver.wait()
+    finished = len(sidestep.read(out)["results"])
+    assert 0 < finished < 40
+    options = {"set": {"cycles": 20_000}, "replicate": 40}
+    with ThreadPoolExecutor(2) as pool:
+        swept = sidestep.sweep(floor, **options, out=out, engine=pool)
+    assert swept.told["took"]["runs"] == 40 - finished
+    sidestep.sweep(floor, **options, out=tmp_path / "whole")
+    assert files(out) == files(tmp_path / "whole")
+
+
+def test_any_executor_gives_the_table_of_threads(floor, tmp_path):
+    options = {"vary": VARY, "replicate": 4, "seed": 3}
+    sidestep.sweep(floor, **options, out=tmp_path / "local")
+    with ProcessPoolExecutor(2, mp_context=SPAWN) as pool:
+        sidestep.sweep(floor, **options, out=tmp_path / "pool", engine=pool)
+        alone = sidestep.sweep(floor, **options, engine=pool)
+    assert files(tmp_path / "local") == files(tmp_path / "pool")
+    local = sidestep.read(tmp_path / "local")["results"]
+    assert alone.results["digest"].tolist() == local["digest"].tolist()
+
+
+def test_scenarios_travel_with_their_files(tmp_path):
+    (tmp_path / "map.txt").write_text("......\n......\n")
+    text = FLOOR.replace(FLOOR[FLOOR.index("map.ascii") : FLOOR.index("[robots]")], 'map.file = "map.txt"\n')
+    scenario = sidestep.Scenario(text=text, base=tmp_path)
+    local = sidestep.sweep(scenario, replicate=3)
+    with ProcessPoolExecutor(1, mp_context=SPAWN) as pool:
+        others = sidestep.sweep(scenario, replicate=3, engine=pool)
+    assert others.results["digest"].tolist() == local.results["digest"].tolist()
+
+
+class Killing(ProcessPoolExecutor):
+    """A pool of which the n-th task kills one worker, once."""
+
+    left = 5
+
+    def submit(self, fn, /, *args, **kwargs):
+        type(self).left -= 1
+        if type(self).left == 0:
+            os.kill(next(iter(self._processes)), signal.SIGKILL)
+        return super().submit(fn, *args, **kwargs)
+
+
+def test_a_killed_worker_loses_nothing(floor, tmp_path):
+    options = {"vary": VARY, "replicate": 6, "seed": 3}
+    sidestep.sweep(floor, **options, out=tmp_path / "local")
+    Killing.left, out = 5, tmp_path / "killed"
+    pool = Killing(2, mp_context=SPAWN)
+    with pytest.raises(sidestep.EngineError, match="lambda: ProcessPoolExecutor"):
+        sidestep.sweep(floor, **options, out=out, engine=pool)
+    finished = len(sidestep.read(out)["results"])
+    assert 0 < finished < 24
+    with ProcessPoolExecutor(2, mp_context=SPAWN) as pool:
+        swept = sidestep.sweep(floor, **options, out=out, engine=pool)
+    assert swept.told["took"]["runs"] == 24 - finished
+    assert files(out) == files(tmp_path / "local")
+
+    Killing.left, out = 5, tmp_path / "replaced"
+    sidestep.sweep(floor, **options, out=out, engine=lambda: Killing(2, mp_context=SPAWN))
+    assert files(out) == files(tmp_path / "local")
+
+
+class Broken(concurrent.futures.Executor):
+    """An executor of which no task comes to an end."""
+
+    def __init__(self, error):
+        self.error = error
+
+    def submit(self, fn, /, *args, **kwargs):
+        future = Future()
+        future.set_exception(self.error)
+        return future
+
+
+def test_an_executor_that_never_works_is_given_up(floor):
+    with pytest.raises(sidestep.EngineError, match="failed 3 times: no disk"):
+        sidestep.sweep(floor, engine=Broken(OSError("no disk")))
+
+
+class Slow(ThreadPoolExecutor):
+    """A pool whose first task waits until another task of the same cells is done."""
+
+    def __init__(self):
+        super().__init__(2)
+        self.sent, self.is_done = [], threading.Event()
+
+    def submit(self, fn, /, *args, **kwargs):
+        cells = args[2]
+        is_first, is_second = not self.sent, self.sent[:1] == [cells]
+        self.sent.append(cells)
+
+        def run():
+            if is_first:
+                self.is_done.wait()
+            outcomes = fn(*args, **kwargs)
+            if is_second:
+                self.is_done.set()
+            return outcomes
+
+        return super().submit(run)
+
+
+def test_a_slow_task_is_sent_again_and_whichever_comes_first_counts(floor, tmp_path, monkeypatch):
+    monkeypatch.setattr(_engines, "SLOW_S", 0.0)
+    options = {"vary": VARY, "replicate": 2}
+    sidestep.sweep(floor, **options, out=tmp_path / "local")
+    pool = Slow()
+    sidestep.sweep(floor, **options, out=tmp_path / "slow", engine=pool)
+    assert pool.is_done.is_set() and pool.sent.count(pool.sent[0]) == 2
+    assert files(tmp_path / "slow") == files(tmp_path / "local")
+
+
+def sent_tasks(floor):
+    """The arguments of the tasks of a small sweep."""
+    sent = []
+
+    class Noting(ThreadPoolExecutor):
+        def submit(self, fn, /, *args, **kwargs):
+            sent.append(args)
+            return super().submit(fn, *args, **kwargs)
+
+    with Noting(1) as pool:
+        sidestep.sweep(floor, replicate=2, engine=pool)
+    return sent
+
+
+def test_a_task_that_is_run_twice_gives_the_same_outcomes_to_the_bit(floor):
+    def outcomes(task):
+        return [{**json.loads(text), "costs": None} for text in run_task(*task)]
+
+    for task in sent_tasks(floor):
+        assert outcomes(task) == outcomes(task)
+
+
+def test_tasks_refuse_the_sweep_of_another_build(floor):
+    build, scenarios, cells = sent_tasks(floor)[0]
+    with pytest.raises(sidestep.InputError, match="install the same build"):
+        run_task(build + "x", scenarios, cells)
+
+
+def test_a_task_is_as_long_as_the_first_ones_took(floor):
+    crew = _engines.Crew(ThreadPoolExecutor(2), None)
+    waiting = _engines.deque((k, 0, k, k) for k in range(100))
+    assert len(crew._cut(waiting).cells) == 1
+    crew._learn(['{"costs": {"compile_wall_s": 0.02, "run_wall_s": 0.08}}'])
+    assert len(crew._cut(waiting).cells) == 10
+    crew._learn(['{"costs": {"compile_wall_s": 0.0, "run_wall_s": 9.0}}'])
+    assert len(crew._cut(waiting).cells) == 1
+
+
+def needs(name):
+    return pytest.importorskip(name, reason=f"{name} is not installed, so sweeps on it are not tested")
+
+
+def test_a_dask_cluster_that_loses_a_worker_gives_the_same_table(floor, tmp_path):
+    distributed = needs("distributed")
+    options = {"vary": VARY, "replicate": 6, "set": {"cycles": 2000}}
+    sidestep.sweep(floor, **options, out=tmp_path / "local")
+    cluster = distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
+    )
+    with cluster, distributed.Client(cluster) as client:
+        worker = next(iter(cluster.workers.values()))
+        done = threading.Event()
+
+        def kill():
+            while not done.is_set() and not begun(tmp_path / "dask"):
+                time.sleep(0.01)
+            os.kill(worker.pid, signal.SIGKILL)
+
+        thread = threading.Thread(target=kill)
+        thread.start()
+        sidestep.sweep(floor, **options, out=tmp_path / "dask", engine=client.get_executor())
+        done.set()
+        thread.join()
+    assert files(tmp_path / "dask") == files(tmp_path / "local")
+
+
+def test_a_ray_cluster_that_loses_a_node_gives_the_same_table(floor, tmp_path, monkeypatch):
+    ray = needs("ray")
+    from ray.cluster_utils import Cluster
+
+    monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+    options = {"vary": VARY, "replicate": 12, "set": {"cycles": 40_000}}
+    sidestep.sweep(floor, **options, out=tmp_path / "local")
+    node = {"num_cpus": 1, "object_store_memory": 120_000_000}
+    cluster = Cluster(
+        initialize_head=True,
+        head_node_args={**node, "node_ip_address": "127.0.0.2", "include_dashboard": False},
+    )
+    others = [cluster.add_node(**node, node_ip_address=f"127.0.0.{k}") for k in (3, 4)]
+    ray.init(address=cluster.address, log_to_driver=False)
+    try:
+        done, at_kill = threading.Event(), []
+
+        def kill():
+            while not done.is_set() and not begun(tmp_path / "ray"):
+                time.sleep(0.01)
+            cluster.remove_node(others[0], allow_graceful=False)
+            at_kill.append(begun(tmp_path / "ray"))
+
+        thread = threading.Thread(target=kill)
+        thread.start()
+        swept = sidestep.sweep(floor, **options, out=tmp_path / "ray", engine="ray")
+        done.set()
+        thread.join()
+        assert 0 < at_kill[0] < 48, "the node was there to the end"
+    finally:
+        ray.shutdown()
+        cluster.shutdown()
+    assert swept.told["took"]["at_once"] == 3
+    assert files(tmp_path / "ray") == files(tmp_path / "local")
