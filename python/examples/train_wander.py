@@ -108,6 +108,7 @@ def run(weights: NDArray[Any], seed: int, cycles: int) -> tuple[float, float]:
 
 
 def fitness(task: tuple[NDArray[Any], int, int]) -> float:
+    """Returns the way in m, less what contacts cost: what the strategy makes larger."""
     contacts, distance_m = run(*task)
     return distance_m - CONTACT_M * contacts
 
@@ -136,12 +137,13 @@ def train(steps: int, pairs: int, cycles: int, pool: ProcessPoolExecutor) -> tup
     return weights, curve
 
 
-def judge(weights: NDArray[Any], runs: int, first_seed: int, pool: ProcessPoolExecutor) -> dict[str, stats.Paired]:
+def judge(
+    weights: NDArray[Any], seeds: range, cycles: int, pool: ProcessPoolExecutor
+) -> dict[str, stats.Paired]:
     """Compares the policy with `wander` on the same seeds, none of which it was trained on."""
-    wander = sidestep.sweep(scenario("wander"), replicate=runs, seed=first_seed)
-    cycles = 300
-    seeds = range(first_seed, first_seed + runs)
-    own = np.array(list(pool.map(run, [weights] * runs, seeds, [cycles] * runs, chunksize=5)))
+    wander = sidestep.sweep(scenario("wander", cycles), replicate=len(seeds), seed=seeds[0])
+    tasks = [weights] * len(seeds), seeds, [cycles] * len(seeds)
+    own = np.array(list(pool.map(run, *tasks, chunksize=5)))
     return {
         "contacts": stats.paired(own[:, 0], wander.values("contacts")),
         "distance_m": stats.paired(own[:, 1], wander.values("distance_m")),
@@ -159,7 +161,8 @@ def main() -> None:
     with ProcessPoolExecutor(os.cpu_count()) as pool:
         weights, _ = train(args.steps, args.pairs, args.cycles, pool)
         np.save(args.out, weights)
-        for metric, found in judge(weights, args.runs, 5_000_000, pool).items():
+        fresh = range(5_000_000, 5_000_000 + args.runs)
+        for metric, found in judge(weights, fresh, args.cycles, pool).items():
             assert found.interval is not None
             low, high = found.interval
             print(

@@ -3,13 +3,10 @@
 //! The plan, the journal and the stopping rule stay with the process that drives the sweep. A crew gets cells and
 //! scenarios that need no other file, and gives outcomes back, in any order: no common file system is needed.
 
-use super::work::Work;
-use crate::identity::build;
-use crate::{Error, Watcher};
+use crate::Error;
 use sidestep::experiment::sweep::{Cell, Outcome};
 use sidestep::kernel::InputError;
 use sidestep::scenario::{Resolved, Source, Worlds};
-use std::path::Path;
 
 /// Takes an outcome; `Ok` once it is safe.
 pub type Taken<'a> = dyn FnMut(Outcome) -> Result<(), Error> + Send + 'a;
@@ -45,7 +42,9 @@ impl From<usize> for Engine<'_> {
 /// Cells that a crew is to run, with their scenarios.
 pub struct Deal<'a> {
     pub(super) cells: &'a [Cell],
-    pub(super) work: &'a Work<'a>,
+    pub(super) worlds: Worlds,
+    /// The scenario of a variant.
+    pub(super) source: &'a (dyn Fn(u32) -> Result<Source, InputError> + Sync),
 }
 
 impl Deal<'_> {
@@ -59,65 +58,7 @@ impl Deal<'_> {
     /// # Errors
     /// When a file can no longer be read, or was edited since the plan was made.
     pub fn scenario(&self, variant: u32) -> Result<Resolved, InputError> {
-        let source = (self.work.source)(variant)?;
-        self.work.worlds.compile(&source)?.resolve(&source)
+        let source = (self.source)(variant)?;
+        self.worlds.compile(&source)?.resolve(&source)
     }
-}
-
-/// Some cells of a sweep that another process drives.
-#[derive(Debug, Clone)]
-pub struct Task {
-    /// The build that drives the sweep.
-    pub build: String,
-    /// The scenarios of the cells, by variant.
-    pub scenarios: Vec<(u32, Resolved)>,
-    /// The cells, in the order in which they are run.
-    pub cells: Vec<Cell>,
-}
-
-impl Task {
-    /// Runs the cells, one after another, and returns their outcomes: those of all, unless the watcher asks to stop.
-    ///
-    /// # Errors
-    /// When another build drives the sweep, or files cannot be unpacked.
-    pub fn run(&self, worlds: Worlds, watcher: &dyn Watcher) -> Result<Vec<Outcome>, Error> {
-        if self.build != build() {
-            let cause = format!("the sweep is of sidestep {}, this is {}", self.build, build());
-            let remedy = "install the same build of sidestep wherever tasks run";
-            return Err(InputError::new("a task of a sweep", cause, remedy).into());
-        }
-        let place = tempfile::tempdir().map_err(|e| Error::write(&std::env::temp_dir(), &e))?;
-        let mut sources: Vec<(u32, Source)> = Vec::new();
-        for (variant, scenario) in &self.scenarios {
-            let folder = place.path().join(variant.to_string());
-            unpack(&folder, &scenario.files).map_err(|e| Error::write(&folder, &e))?;
-            let source = Source::new("scenario.toml", scenario.text.clone(), folder);
-            sources.push((*variant, source));
-        }
-        let source = |variant: u32| {
-            let found = sources.iter().find(|(k, _)| *k == variant).map(|(_, source)| source);
-            let cause = format!("the scenario of variant {variant} is missing");
-            let missing = || InputError::new("a task of a sweep", cause, "send it along");
-            found.cloned().ok_or_else(missing)
-        };
-        let engine = Engine::Workers(1);
-        let work = Work { worlds, agents: 0, source: &source, record: None, engine, watcher };
-        let mut outcomes = Vec::with_capacity(self.cells.len());
-        let span = (0, self.cells.len() as u64);
-        work.run(&self.cells, span, &mut |outcome| {
-            outcomes.push(outcome);
-            Ok(())
-        })?;
-        Ok(outcomes)
-    }
-}
-
-/// Writes the files of a scenario.
-fn unpack(folder: &Path, files: &[(String, Vec<u8>)]) -> std::io::Result<()> {
-    for (name, bytes) in files {
-        let path = folder.join(name);
-        std::fs::create_dir_all(path.parent().unwrap_or(folder))?;
-        std::fs::write(path, bytes)?;
-    }
-    Ok(())
 }

@@ -71,7 +71,8 @@ impl Work<'_> {
     /// Lets a crew run the cells. Whichever outcome of a cell comes first counts.
     fn dealt(&self, crew: &dyn Crew, cells: &[Cell], take: &mut Take<'_>) -> Result<(), Error> {
         let mut open: BTreeSet<u64> = cells.iter().map(|cell| cell.id).collect();
-        crew.run(&Deal { cells, work: self }, &mut |outcome| match open.remove(&outcome.cell) {
+        let Self { worlds, source, .. } = *self;
+        crew.run(&Deal { cells, worlds, source }, &mut |outcome| match open.remove(&outcome.cell) {
             true => take(outcome),
             false => Ok(()),
         })

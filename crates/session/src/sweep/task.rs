@@ -1,0 +1,68 @@
+//! Cells that another process sends: run here, without its files.
+
+use super::crew::Engine;
+use super::work::Work;
+use crate::identity::build;
+use crate::{Error, Watcher};
+use sidestep::experiment::sweep::{Cell, Outcome};
+use sidestep::kernel::InputError;
+use sidestep::scenario::{Resolved, Source, Worlds};
+use std::path::Path;
+
+/// Some cells of a sweep that another process drives.
+#[derive(Debug, Clone)]
+pub struct Task {
+    /// The build that drives the sweep.
+    pub build: String,
+    /// The scenarios of the cells, by variant.
+    pub scenarios: Vec<(u32, Resolved)>,
+    /// The cells, in the order in which they are run.
+    pub cells: Vec<Cell>,
+}
+
+impl Task {
+    /// Runs the cells, one after another, and returns their outcomes: those of all, unless the watcher asks to stop.
+    ///
+    /// # Errors
+    /// When another build drives the sweep, or files cannot be unpacked.
+    pub fn run(&self, worlds: Worlds, watcher: &dyn Watcher) -> Result<Vec<Outcome>, Error> {
+        if self.build != build() {
+            let cause = format!("the sweep is of sidestep {}, this is {}", self.build, build());
+            let remedy = "install the same build of sidestep wherever tasks run";
+            return Err(InputError::new("a task of a sweep", cause, remedy).into());
+        }
+        let place = tempfile::tempdir().map_err(|e| Error::write(&std::env::temp_dir(), &e))?;
+        let mut sources: Vec<(u32, Source)> = Vec::new();
+        for (variant, scenario) in &self.scenarios {
+            let folder = place.path().join(variant.to_string());
+            unpack(&folder, &scenario.files).map_err(|e| Error::write(&folder, &e))?;
+            let source = Source::new("scenario.toml", scenario.text.clone(), folder);
+            sources.push((*variant, source));
+        }
+        let source = |variant: u32| {
+            let found = sources.iter().find(|(k, _)| *k == variant).map(|(_, source)| source);
+            let cause = format!("the scenario of variant {variant} is missing");
+            let missing = || InputError::new("a task of a sweep", cause, "send it along");
+            found.cloned().ok_or_else(missing)
+        };
+        let engine = Engine::Workers(1);
+        let work = Work { worlds, agents: 0, source: &source, record: None, engine, watcher };
+        let mut outcomes = Vec::with_capacity(self.cells.len());
+        let span = (0, self.cells.len() as u64);
+        work.run(&self.cells, span, &mut |outcome| {
+            outcomes.push(outcome);
+            Ok(())
+        })?;
+        Ok(outcomes)
+    }
+}
+
+/// Writes the files of a scenario.
+fn unpack(folder: &Path, files: &[(String, Vec<u8>)]) -> std::io::Result<()> {
+    for (name, bytes) in files {
+        let path = folder.join(name);
+        std::fs::create_dir_all(path.parent().unwrap_or(folder))?;
+        std::fs::write(path, bytes)?;
+    }
+    Ok(())
+}
