@@ -5,6 +5,9 @@ use crate::ports::Table;
 use crate::units::{Cycle, EntityId};
 use std::ops::Range;
 
+/// Name of the table of orders.
+pub(super) const ORDERS: &str = "orders";
+
 /// One value of an order, as it is recorded.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OrderRow {
@@ -18,7 +21,7 @@ pub(crate) struct OrderRow {
 
 /// Returns the table of orders; `names` are the names of all of them.
 pub(crate) fn table(names: Vec<String>) -> Table<OrderRow> {
-    Table::new("orders")
+    Table::new(ORDERS)
         .u64("cycle", "cycle before which the order was given, counted from 0", |o: &OrderRow| {
             o.cycle
         })

@@ -12,11 +12,13 @@
 
 mod book;
 mod error;
+mod rows;
 mod space;
 mod team;
 
 pub use book::OrderBook;
 pub use error::OrderError;
+pub use rows::OrderReader;
 pub use space::{Bounds, CellsMut, Space};
 pub use team::{Order, Orders, Team, Teams};
 

@@ -72,11 +72,16 @@ impl MemoryRecorder {
         Self { schemas: schemas.to_vec(), tables, finished: false }
     }
 
+    /// Returns the schema and the columns of table `table`, if it exists.
+    pub fn table(&self, table: &str) -> Option<(&TableSchema, &[Values])> {
+        let t = self.schemas.iter().position(|s| s.name == table)?;
+        Some((&self.schemas[t], &self.tables[t]))
+    }
+
     /// Returns the column `name` of table `table`, if both exist.
     pub fn column(&self, table: &str, name: &str) -> Option<&Values> {
-        let t = self.schemas.iter().position(|s| s.name == table)?;
-        let c = self.schemas[t].columns.iter().position(|c| c.name == name)?;
-        Some(&self.tables[t][c])
+        let (schema, columns) = self.table(table)?;
+        columns.get(schema.columns.iter().position(|c| c.name == name)?)
     }
 
     /// Returns the number of rows of table `table`; 0 for one that does not exist.

@@ -127,27 +127,9 @@ fn decided(run: &mut AirspaceRun, cycles: u64) {
     }
 }
 
-/// All orders that were recorded.
+/// The book of all orders that were recorded.
 fn book(recorder: &MemoryRecorder) -> OrderBook {
-    let column = |name| recorder.column("orders", name).expect("orders are recorded");
-    let (Values::U64(cycles), Values::U32(agents)) = (column("cycle"), column("agent")) else {
-        panic!("other types")
-    };
-    let (Values::Label(orders), Values::F64(values), Values::U32(parts)) =
-        (column("order"), column("value"), column("part"))
-    else {
-        panic!("other types")
-    };
-    let names = [Wish::RANKING, Wish::TURN_RATE, Wish::VELOCITY];
-    let mut book = OrderBook::default();
-    let mut row = 0;
-    while row < recorder.rows("orders") {
-        let more = (row + 1..recorder.rows("orders")).take_while(|&k| parts[k] > 0).count();
-        let (agents, values) = (&agents[row..=row], &values[row..=row + more]);
-        book.note(cycles[row], &Orders { order: names[orders[row] as usize], agents, values });
-        row += 1 + more;
-    }
-    book
+    OrderBook::recorded(recorder).expect("orders are recorded")
 }
 
 fn recorded(

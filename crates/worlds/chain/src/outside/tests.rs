@@ -133,24 +133,8 @@ fn decided(run: &mut dyn Simulation, cycles: u64) {
 }
 
 /// The book of all orders that were recorded.
-fn book(run: &dyn Simulation, recorder: &MemoryRecorder) -> OrderBook {
-    let column = |name| recorder.column("orders", name).expect("orders are recorded");
-    let schema = run.schemas().into_iter().find(|schema| schema.name == "orders").expect("kept");
-    let names = schema.columns.iter().find(|column| column.name == "order").expect("a column");
-    let (Values::U64(cycles), Values::U32(agents), Values::U32(parts), Values::F64(values)) =
-        (column("cycle"), column("agent"), column("part"), column("value"))
-    else {
-        panic!("other types")
-    };
-    let mut book = OrderBook::default();
-    let starts: Vec<usize> = (0..values.len()).filter(|&row| parts[row] == 0).collect();
-    for (k, &start) in starts.iter().enumerate() {
-        let end = starts.get(k + 1).copied().unwrap_or(values.len());
-        let order = &names.text(column("order"), start)[..];
-        let orders = Orders { order, agents: &agents[start..=start], values: &values[start..end] };
-        book.note(cycles[start], &orders);
-    }
-    book
+fn book(recorder: &MemoryRecorder) -> OrderBook {
+    OrderBook::recorded(recorder).expect("orders are recorded")
 }
 
 fn recorded(
@@ -178,12 +162,12 @@ fn a_run_is_the_same_from_its_recorded_orders_whatever_the_workers_and_wherever_
     assert!(rows.rows("orders") > 600, "{}", rows.rows("orders"));
     for workers in [1, 2, 3, 8] {
         let mut again = plane(MIXED, workers);
-        again.follow(book(&first, &rows)).expect("they were obeyed once");
+        again.follow(book(&rows)).expect("they were obeyed once");
         let its = recorded(&mut again, 60, |run| {
             run.advance(60 - run.cycle());
         });
         assert_eq!(again.digest(), first.digest(), "{workers} workers");
-        assert_eq!(book(&again, &its), book(&first, &rows), "{workers} workers");
+        assert_eq!(book(&its), book(&rows), "{workers} workers");
     }
     for at in 0..60 {
         let mut before = plane(MIXED, 1);
@@ -208,7 +192,7 @@ fn going_back_gives_the_same_orders_again() {
     let mut first = plane(MIXED, 1);
     let rows = recorded(&mut first, 60, |run| decided(run, 60));
     let mut again = plane(MIXED, 1);
-    again.follow(book(&first, &rows)).expect("they were obeyed once");
+    again.follow(book(&rows)).expect("they were obeyed once");
     again.advance(20);
     let checkpoint = again.checkpoint();
     for _ in 0..3 {

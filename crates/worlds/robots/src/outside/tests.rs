@@ -87,22 +87,9 @@ fn decided(run: &mut RobotsRun, cycles: u64) {
     }
 }
 
-/// All rows of a table, and the book of its orders.
+/// The book of all orders that were recorded.
 fn book(recorder: &MemoryRecorder) -> OrderBook {
-    let column = |name| recorder.column("orders", name).expect("orders are recorded");
-    let (Values::U64(cycles), Values::U32(agents)) = (column("cycle"), column("agent")) else {
-        panic!("other types")
-    };
-    let (Values::Label(orders), Values::F64(values)) = (column("order"), column("value")) else {
-        panic!("other types")
-    };
-    let names = ["action", "trip", "broadcast"];
-    let mut book = OrderBook::default();
-    for k in 0..recorder.rows("orders") {
-        let (agents, values) = (&agents[k..=k], &values[k..=k]);
-        book.note(cycles[k], &Orders { order: names[orders[k] as usize], agents, values });
-    }
-    book
+    OrderBook::recorded(recorder).expect("orders are recorded")
 }
 
 fn recorded(run: &mut RobotsRun, until: Cycle, go_on: impl Fn(&mut RobotsRun)) -> MemoryRecorder {
