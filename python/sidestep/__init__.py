@@ -26,9 +26,21 @@ from ._errors import (
     ReplayError,
     SidestepError,
 )
-from ._native import Scenario, Simulation, Space, Table, Team, __version__, read, schema, worlds
+from ._native import (
+    Batch,
+    Scenario,
+    Simulation,
+    Space,
+    Table,
+    Team,
+    __version__,
+    read,
+    schema,
+    worlds,
+)
 
 __all__ = [
+    "Batch",
     "CheckpointError",
     "ClosedError",
     "InputError",
