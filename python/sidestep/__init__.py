@@ -29,12 +29,24 @@ from ._errors import (
     ReplayError,
     SidestepError,
 )
-from ._native import Arm, Scenario, Simulation, Space, Table, Team, __version__, read, schema, worlds
-
+from ._native import (
+    Arm,
+    Batch,
+    Scenario,
+    Simulation,
+    Space,
+    Table,
+    Team,
+    __version__,
+    read,
+    schema,
+    worlds,
+)
 from ._sweep import Sweep, compare, sweep
 
 __all__ = [
     "Arm",
+    "Batch",
     "CheckpointError",
     "ClosedError",
     "EngineError",

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 __version__: str
 __all__ = [
     "Arm",
+    "Batch",
     "Learned",
     "Scenario",
     "Simulation",
@@ -155,6 +156,42 @@ class Simulation:
         value: BaseException | None = ...,
         traceback: TracebackType | None = ...,
     ) -> None: ...
+
+@final
+class Batch:
+    def __new__(
+        cls,
+        scenario: Scenario | str | PathLike[str] | Mapping[str, Any],
+        worlds: int,
+        *,
+        workers: int = 1,
+        seeds: Sequence[int] | NDArray[np.integer[Any]] | None = None,
+    ) -> Batch: ...
+    @property
+    def scenario(self) -> Scenario: ...
+    @property
+    def workers(self) -> int: ...
+    @property
+    def teams(self) -> list[Team]: ...
+    @property
+    def seeds(self) -> NDArray[np.uint64]: ...
+    @property
+    def cycles(self) -> NDArray[np.uint64]: ...
+    @property
+    def is_over(self) -> NDArray[np.bool_]: ...
+    @property
+    def digests(self) -> list[str]: ...
+    def metrics(self) -> list[dict[str, Any]]: ...
+    def order(self, name: str, values: ArrayLike, *, team: int | str | None = None) -> None: ...
+    def step(self, cycles: int = 1, *, mask: NDArray[np.bool_] | None = None) -> None: ...
+    def observe(self, team: int | str | None = None, *, out: _Arrays | None = None) -> _Arrays: ...
+    def reset(
+        self,
+        seeds: Sequence[int] | NDArray[np.integer[Any]],
+        *,
+        mask: NDArray[np.bool_] | None = None,
+    ) -> None: ...
+    def __len__(self) -> int: ...
 
 @final
 class Table:

@@ -3,6 +3,7 @@
 //! ```text
 //! scenario.rs    a file, text or dict -> a compiled scenario
 //! simulation.rs  a run that Python advances, observes and orders
+//! batch.rs       many worlds that step together
 //! space.rs       what goes in and out       decide.rs  functions in Python that decide
 //! table.rs       rows -> Arrow, NumPy       arrays.rs  ids, values and columns of bodies
 //! sweep.rs       many runs, by threads or by others
@@ -16,6 +17,7 @@
 
 mod arm;
 mod arrays;
+mod batch;
 mod collectives;
 mod decide;
 mod error;
@@ -34,6 +36,8 @@ use pyo3::prelude::*;
 /// The native part of `sidestep`.
 #[pymodule(gil_used = false)]
 mod _native {
+    #[pymodule_export]
+    use super::batch::Batch;
     #[pymodule_export]
     use super::scenario::{Scenario, schema, unpack_scenario, worlds};
     #[pymodule_export]

@@ -79,6 +79,11 @@ impl Made {
         })
     }
 
+    /// Returns the same scenario with another seed, read and compiled anew.
+    pub(crate) fn compiled_with(&self, seed: u64) -> Result<Box<dyn Compiled>, InputError> {
+        WORLDS.compile(&self.source.clone().with(&[format!("seed={seed}")])?)
+    }
+
     /// Returns the same scenario with other values.
     pub(crate) fn with(&self, overrides: &[String]) -> PyResult<Self> {
         let source = self.source.clone().with(overrides).map_err(|e| told(&e, self.is_dict))?;

@@ -5,7 +5,7 @@ use crate::decide::{Deciding, Numbered, decided};
 use crate::error::{self, ClosedError, wrong};
 use crate::json::to_python;
 use crate::scenario::{Bundle, Made, made};
-use crate::space::{Room, Team};
+use crate::space::{Room, Team, named, numbered};
 use crate::table::Table;
 use crate::watch::Signals;
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
@@ -118,28 +118,7 @@ impl Simulation {
 
     /// Returns a team by number or name, with its number.
     fn named(&self, team: Option<&Bound<'_, PyAny>>) -> PyResult<Numbered> {
-        let Some(team) = team else { return self.numbered(0) };
-        if let Ok(number) = team.extract::<usize>() {
-            return self.numbered(number);
-        }
-        let name: String = team.extract()?;
-        let position = self.teams.iter().position(|team| team.name == name);
-        position.map(|k| (k, Arc::clone(&self.teams[k]))).ok_or_else(|| {
-            let names: Vec<_> = self.teams.iter().map(|team| team.name.as_str()).collect();
-            let names = names.join(", ");
-            error::OrderError::new_err(format!(
-                "there is no team `{name}`; the scenario has {names}"
-            ))
-        })
-    }
-
-    fn numbered(&self, number: usize) -> PyResult<Numbered> {
-        let team = self.teams.get(number).map(|team| (number, Arc::clone(team)));
-        team.ok_or_else(|| {
-            let teams = self.teams.len();
-            let words = format!("there is no team {number}; the scenario has {teams}, from 0");
-            error::OrderError::new_err(words)
-        })
+        named(&self.teams, team).map(|(number, team)| (number, Arc::clone(team)))
     }
 
     /// Returns the team of an agent; the first one for an agent that is in none, whose order will be refused.
@@ -147,7 +126,8 @@ impl Simulation {
         let has = |team: &Arc<control::Team>| {
             agent.is_some_and(|id| team.agents.binary_search(&id).is_ok())
         };
-        self.numbered(self.teams.iter().position(has).unwrap_or(0))
+        let number = self.teams.iter().position(has).unwrap_or(0);
+        numbered(&self.teams, number).map(|(number, team)| (number, Arc::clone(team)))
     }
 
     fn perceived<'py>(

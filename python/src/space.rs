@@ -1,7 +1,10 @@
 //! Teams of agents, and the spaces of the numbers that go in and out.
 
+use crate::error::{self, wrong};
 use crate::json::list;
-use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, ToPyArray};
+use numpy::{
+    PyArray1, PyArrayDyn, PyArrayMethods, PyReadwriteArrayDyn, PyUntypedArrayMethods, ToPyArray,
+};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
 use sidestep::kernel::control::{self, Bounds, CellsMut};
@@ -125,6 +128,35 @@ impl Team {
     }
 }
 
+/// Returns a team by number or name, the first one without either, with its number.
+pub(crate) fn named<'a>(
+    teams: &'a [Arc<control::Team>],
+    team: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(usize, &'a Arc<control::Team>)> {
+    let Some(team) = team else { return numbered(teams, 0) };
+    if let Ok(number) = team.extract::<usize>() {
+        return numbered(teams, number);
+    }
+    let name: String = team.extract()?;
+    let position = teams.iter().position(|team| team.name == name);
+    position.map(|k| (k, &teams[k])).ok_or_else(|| {
+        let names: Vec<_> = teams.iter().map(|team| team.name.as_str()).collect();
+        let names = names.join(", ");
+        error::OrderError::new_err(format!("there is no team `{name}`; the scenario has {names}"))
+    })
+}
+
+/// Returns a team by number.
+pub(crate) fn numbered(
+    teams: &[Arc<control::Team>],
+    number: usize,
+) -> PyResult<(usize, &Arc<control::Team>)> {
+    teams.get(number).map(|team| (number, team)).ok_or_else(|| {
+        let words = format!("there is no team {number}; the scenario has {}, from 0", teams.len());
+        error::OrderError::new_err(words)
+    })
+}
+
 /// Room for the observations of a team, one buffer for each of its spaces.
 pub(crate) struct Room(Vec<Buffer>);
 
@@ -182,4 +214,92 @@ fn shaped<T: numpy::Element>(
     shape: Vec<usize>,
 ) -> PyResult<Bound<'_, PyArrayDyn<T>>> {
     PyArray1::from_vec(py, values).reshape(shape)
+}
+
+/// Returns arrays for what a team observes in many worlds, by name.
+pub(crate) fn room<'py>(
+    py: Python<'py>,
+    team: &control::Team,
+    worlds: usize,
+) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    for space in &team.observed {
+        let shape = shape(space, team, worlds);
+        match space.is_whole() {
+            true => dict.set_item(&space.name, PyArrayDyn::<i64>::zeros(py, shape, false))?,
+            false => dict.set_item(&space.name, PyArrayDyn::<f64>::zeros(py, shape, false))?,
+        }
+    }
+    Ok(dict)
+}
+
+fn shape(space: &control::Space, team: &control::Team, worlds: usize) -> Vec<usize> {
+    [worlds, team.agents.len()].iter().chain(&space.shape).copied().collect()
+}
+
+/// Arrays of a caller, to write the observations of many worlds into.
+pub(crate) struct Lent<'py>(Vec<Array<'py>>);
+
+enum Array<'py> {
+    Whole(PyReadwriteArrayDyn<'py, i64>),
+    Real(PyReadwriteArrayDyn<'py, f64>),
+}
+
+impl<'py> Lent<'py> {
+    /// Returns the arrays of `out`, if they are those that a team needs.
+    pub(crate) fn of(
+        out: &Bound<'py, PyDict>,
+        team: &control::Team,
+        worlds: usize,
+    ) -> PyResult<Self> {
+        let one = |space: &control::Space| {
+            let shape = shape(space, team, worlds);
+            let array = out.get_item(&space.name)?;
+            let lent = array.and_then(|array| match space.is_whole() {
+                true => writable(&array, &shape).map(Array::Whole),
+                false => writable(&array, &shape).map(Array::Real),
+            });
+            lent.ok_or_else(|| {
+                let (name, dtype) =
+                    (&space.name, if space.is_whole() { "int64" } else { "float64" });
+                let cause = "it is missing, in use, or another array than an earlier call returned";
+                let remedy = format!(
+                    "give a writable array in C order of the shape {}, {dtype}",
+                    words(&shape)
+                );
+                wrong(&format!("out.{name}"), cause, remedy)
+            })
+        };
+        team.observed.iter().map(one).collect::<PyResult<_>>().map(Self)
+    }
+
+    /// Returns the room to write into.
+    pub(crate) fn cells(&mut self) -> PyResult<Vec<CellsMut<'_>>> {
+        self.0.iter_mut().map(Array::cells).collect()
+    }
+}
+
+impl Array<'_> {
+    fn cells(&mut self) -> PyResult<CellsMut<'_>> {
+        Ok(match self {
+            Self::Whole(array) => CellsMut::Whole(array.as_slice_mut()?),
+            Self::Real(array) => CellsMut::Real(array.as_slice_mut()?),
+        })
+    }
+}
+
+/// Returns an array that can be written from front to back.
+fn writable<'py, T: numpy::Element>(
+    array: &Bound<'py, PyAny>,
+    shape: &[usize],
+) -> Option<PyReadwriteArrayDyn<'py, T>> {
+    let array = array.cast::<PyArrayDyn<T>>().ok()?;
+    let fits = array.shape() == shape && array.is_c_contiguous();
+    fits.then(|| array.try_readwrite().ok())?
+}
+
+/// Returns a shape as Python writes it.
+fn words(shape: &[usize]) -> String {
+    let numbers: Vec<_> = shape.iter().map(ToString::to_string).collect();
+    format!("({})", numbers.join(", "))
 }

@@ -15,11 +15,13 @@
 //! - [`workers`], [`cycle`]: the same bits for every number of workers.
 //! - [`digest`], [`checkpoint`]: a state has one digest, and continues bit for bit.
 //! - [`control`]: what agents observe, and orders from outside, checked and recorded.
+//! - [`batch`]: many simulations of one scenario at once, the same bits for every number of workers.
 //! - [`interrupt`]: a cycle that takes long can be left half done.
 //! - [`view`]: the scenery and the frames of any world; looking at them changes nothing.
 //! - [`math`], [`distr`], [`geometry`]: numbers that are the same on every platform.
 //! - [`ports`]: recorder, transport and clock, each with an in-memory version.
 
+pub mod batch;
 pub mod checkpoint;
 pub mod column;
 pub mod conflict;
@@ -44,6 +46,7 @@ pub mod words;
 pub mod workers;
 pub mod world;
 
+pub use batch::Batch;
 pub use column::Column;
 pub use digest::Digest;
 pub use error::InputError;

@@ -165,41 +165,39 @@ impl<W: World> Run<W> {
         done
     }
 
-    /// Gives an order that was checked, or refuses it whole.
+    /// Gives an order, or refuses it whole.
     fn give(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
-        let checked = self.checked(orders)?;
-        for order in &checked {
-            self.world.order(&mut self.state, order);
-        }
+        self.examine(orders)?;
+        let Self { world, state, teams, .. } = self;
+        teams.each(orders, |order| {
+            world.order(state, order);
+            Ok(())
+        })?;
         if self.given.is_kept() {
             let names = self.teams.order_names();
             let name = names.iter().position(|name| name == orders.order).unwrap_or(0) as u32;
-            for order in &checked {
-                let (cycle, agent) = (self.cycle, order.agent);
-                let row = |(part, &value): (u32, &f64)| OrderRow {
-                    cycle,
-                    agent,
-                    order: name,
-                    part,
-                    value,
+            let (cycle, given) = (self.cycle, &mut self.given);
+            self.teams.each(orders, |order| {
+                let row = |(part, &value): (u32, &f64)| {
+                    let (agent, order) = (order.agent, name);
+                    OrderRow { cycle, agent, order, part, value }
                 };
-                self.given.extend((0..).zip(order.values).map(row));
-            }
+                given.extend((0..).zip(order.values).map(row));
+                Ok(())
+            })?;
         }
         Ok(())
     }
 
-    /// Returns the orders to single agents, all of them found right.
-    fn checked<'a>(&self, orders: &Orders<'a>) -> Result<Vec<control::Order<'a>>, OrderError> {
-        let checked = self.teams.checked(orders)?;
-        for order in &checked {
+    /// Refuses orders that cannot be obeyed.
+    fn examine(&self, orders: &Orders<'_>) -> Result<(), OrderError> {
+        self.teams.each(orders, |order| {
             self.world.check_order(order).map_err(|cause| {
                 let who = format!("{} {}", self.teams.noun(), order.agent);
                 let order = orders.order.into();
                 OrderError::Senseless { order, who, cause }
-            })?;
-        }
-        Ok(checked)
+            })
+        })
     }
 
     /// Gives the orders that are ahead for the present cycle.
@@ -383,12 +381,16 @@ impl<W: World> Simulation for Run<W> {
         Ok(())
     }
 
+    fn check(&self, orders: &Orders<'_>) -> Result<(), OrderError> {
+        self.examine(orders)
+    }
+
     fn order(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
         self.give(orders)
     }
 
     fn follow(&mut self, orders: OrderBook) -> Result<(), OrderError> {
-        orders.iter().try_for_each(|(_, orders)| self.checked(&orders).map(drop))?;
+        orders.iter().try_for_each(|(_, orders)| self.examine(&orders))?;
         (self.ahead, self.obeyed) = (orders, None);
         Ok(())
     }

@@ -102,13 +102,22 @@ pub trait Simulation: Any + Send {
         Err(OrderError::NoTeam { team, teams: 0 })
     }
 
+    /// Checks an order as [`Simulation::order`] does, and gives it to nobody. The answer is the same in every
+    /// cycle, and with every seed of a scenario.
+    ///
+    /// # Errors
+    /// When one of them cannot be obeyed.
+    fn check(&self, orders: &Orders<'_>) -> Result<(), OrderError> {
+        Teams::default().check(orders)
+    }
+
     /// Orders something of several agents for the cycle that comes next. An order stands until its
     /// agent has acted; a later one takes its place.
     ///
     /// # Errors
     /// When one of them cannot be obeyed; nobody is ordered anything then.
     fn order(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
-        Teams::default().checked(orders).map(drop)
+        Teams::default().check(orders)
     }
 
     /// Gives these orders, each before its cycle, whenever the run comes by there: also after
@@ -117,7 +126,7 @@ pub trait Simulation: Any + Send {
     /// # Errors
     /// When one of them cannot be obeyed; all remain as they were then.
     fn follow(&mut self, orders: OrderBook) -> Result<(), OrderError> {
-        orders.iter().try_for_each(|(_, orders)| Teams::default().checked(&orders).map(drop))
+        orders.iter().try_for_each(|(_, orders)| Teams::default().check(&orders))
     }
 
     /// The recorded tables and columns that hold the places of bodies.

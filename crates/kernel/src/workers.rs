@@ -1,10 +1,16 @@
-//! The only file that names threads: W workers, their pools of tasks, and the barrier.
+//! The only place that names threads: W workers, their pools of tasks, and the barrier.
 //!
 //! A pool holds the numbers `0..n`. Each worker has a share of it, takes chunks of its own share
 //! first (its caches still hold those bodies) and then helps with the others' shares, so the load
 //! balances itself and nobody waits for a lock. A single worker runs the very same code on the
 //! calling thread; it takes the pool from front to back, waits for nobody, and makes no system
 //! call.
+//!
+//! [`Waiting`] are workers that are kept between calls.
+
+mod waiting;
+
+pub use waiting::{Task, Waiting};
 
 use crate::interrupt::desert;
 use std::num::NonZeroUsize;

@@ -1,4 +1,5 @@
-"""Environments for reinforcement learning: PettingZoo's ``ParallelEnv`` from any scenario whose agents take orders.
+"""Environments for reinforcement learning from any scenario whose agents take orders: PettingZoo's ``ParallelEnv``, many worlds
+at once as arrays (``Batch``), and Gymnasium's ``VectorEnv``.
 
 Needs the extra ``rl``: ``pip install 'sidestep[rl]'``.
 
@@ -23,9 +24,10 @@ except ImportError as error:
         "environments need gymnasium and pettingzoo: pip install 'sidestep[rl]'"
     ) from error
 
+from ._batch import Batch, VectorEnv
 from ._parallel import ParallelEnv, parallel_env
 from ._rewards import DEFAULTS, TERMS, Reward
 
-__all__ = ["DEFAULTS", "TERMS", "ParallelEnv", "Reward", "parallel_env"]
+__all__ = ["DEFAULTS", "TERMS", "Batch", "ParallelEnv", "Reward", "VectorEnv", "parallel_env"]
 
 del _gymnasium, _pettingzoo

@@ -16,6 +16,8 @@ from .._native import Scenario, Simulation, Space, Team
 from ._rewards import DEFAULTS, Reward, earned, rewards
 
 MOST = np.iinfo(np.int64).max
+# Above the seeds of episodes.
+MOST_SEED = 2**62
 # The order that an action is where none is named: one in which every value within its bounds is right.
 ORDERS = {"robots": "action", "chain": "to_m", "airspace": "turn_rate_rad_s"}
 NOUNS = {"robots": "robot", "chain": "chain", "airspace": "airplane"}
@@ -82,7 +84,7 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         workers: int = 1,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
-            raise _wrong("render_mode", f"there is no `{render_mode}`", 'give "rgb_array" or None')
+            raise wrong("render_mode", f"there is no `{render_mode}`", 'give "rgb_array" or None')
         self.scenario = scenario if isinstance(scenario, Scenario) else Scenario(scenario)
         self.render_mode = render_mode
         self._width = width
@@ -96,19 +98,18 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
             "workers": workers,
         }
         if max_cycles is not None and max_cycles < 1:
-            raise _wrong("max_cycles", f"{max_cycles} cycles are no episode", "give 1 or more")
+            raise wrong("max_cycles", f"{max_cycles} cycles are no episode", "give 1 or more")
         self.max_cycles = self.scenario.cycles if max_cycles is None else max_cycles
         self.sim = Simulation(self.scenario, workers=workers)
         self._teams = [(k, t) for k, t in enumerate(self.sim.teams) if t.ordered]
         if not self._teams:
             remedy = "let its agents be decided from outside (`external`)"
-            raise _wrong("scenario", "no agent of this scenario takes orders", remedy)
+            raise wrong("scenario", "no agent of this scenario takes orders", remedy)
         world = self.scenario.world
         wanted = [ORDERS[world]] if orders is None else orders
         wanted = [wanted] if isinstance(wanted, str) else wanted
-        self._orders = [_chosen(team, wanted) for _, team in self._teams]
-        given = DEFAULTS[world] if rewards is None else rewards
-        self._rewards = [_rewards(team, given) for _, team in self._teams]
+        self._orders = [orders_of(team, wanted) for _, team in self._teams]
+        self._rewards = [rewards_of(team, world, rewards) for _, team in self._teams]
         self._names = [[f"{NOUNS[world]}_{agent}" for agent in team.agents] for _, team in self._teams]
         self.possible_agents = [name for names in self._names for name in names]
         self.agents: list[str] = []
@@ -116,7 +117,7 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         self.action_spaces: dict[str, spaces.Space[Any]] = {}
         for (_, team), names, chosen in zip(self._teams, self._names, self._orders, strict=True):
             observed = spaces.Dict({space.name: space_of(space) for space in team.observed})
-            acted = _action_space(chosen)
+            acted = action_space(chosen)
             for name in names:
                 self.observation_spaces[name] = observed
                 self.action_spaces[name] = acted
@@ -138,7 +139,7 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         if seed is not None:
             self._rng = np.random.default_rng(seed)
         # From the generator also with a seed, so that the next episode differs from this one.
-        drawn = int(self._rng.integers(2**62))
+        drawn = int(self._rng.integers(MOST_SEED))
         self.sim.close()
         self.sim = Simulation(self.scenario, seed=drawn, workers=self._workers)
         self.agents = list(self.possible_agents)
@@ -156,10 +157,10 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
     ]:
         """Orders an action of each agent, and simulates one cycle."""
         if not self.agents:
-            raise _wrong("step", "no episode goes on", "call reset first")
+            raise wrong("step", "no episode goes on", "call reset first")
         unknown = sorted(set(actions) - set(self.agents))
         if unknown:
-            raise _wrong("actions", f"there is no agent `{unknown[0]}`", "name those of `agents`")
+            raise wrong("actions", f"there is no agent `{unknown[0]}`", "name those of `agents`")
         for (k, team), names, chosen in zip(self._teams, self._names, self._orders, strict=True):
             self._order(k, team, names, chosen, actions)
         self.sim.step()
@@ -168,7 +169,7 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         for reward, names, old, new in zip(
             self._rewards, self._names, self._before, after, strict=True
         ):
-            gains.update(zip(names, earned(reward, old, new, len(names)), strict=True))
+            gains.update(zip(names, earned(reward, old, new, len(names)).tolist(), strict=True))
         self._before = after
         is_over = self.sim.is_over
         is_cut = not is_over and self.sim.cycle >= self.max_cycles
@@ -216,7 +217,7 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
     ) -> None:
         missing = [name for name in names if name not in actions]
         if missing:
-            raise _wrong("actions", f"`{missing[0]}` has none", "give one for each agent")
+            raise wrong("actions", f"`{missing[0]}` has none", "give one for each agent")
         for space in chosen:
             values = [
                 actions[name] if len(chosen) == 1 else actions[name][space.name] for name in names
@@ -247,26 +248,31 @@ def parallel_env(
     return ParallelEnv(scenario, **options)
 
 
-def _chosen(team: Team, orders: Sequence[str]) -> list[Space]:
+def orders_of(team: Team, orders: Sequence[str]) -> list[Space]:
+    """Returns the spaces of the named orders of a team."""
     known = {space.name: space for space in team.ordered}
     unknown = [order for order in orders if order not in known]
     if unknown or not orders:
         cause = f"team `{team.name}` takes no order {unknown}"
-        raise _wrong("orders", cause, f"some of {', '.join(known)}")
+        raise wrong("orders", cause, f"some of {', '.join(known)}")
     return [known[order] for order in orders]
 
 
-def _rewards(team: Team, given: Mapping[str, float] | Reward) -> Reward:
+def rewards_of(team: Team, world: str, given: Mapping[str, float] | Reward | None) -> Reward:
+    """Returns the reward of a team; by default that of its world."""
+    given = DEFAULTS[world] if given is None else given
     return rewards(given, {space.name for space in team.observed})
 
 
-def _action_space(chosen: list[Space]) -> spaces.Space[Any]:
+def action_space(chosen: list[Space]) -> spaces.Space[Any]:
+    """Returns the Gymnasium space of an action: of the order alone, or a dict of several."""
     if len(chosen) == 1:
         return within(chosen[0])
     return spaces.Dict({space.name: within(space) for space in chosen})
 
 
-def _wrong(place: str, cause: str, remedy: str) -> InputError:
+def wrong(place: str, cause: str, remedy: str) -> InputError:
+    """Returns the exception of wrong input."""
     told = f"{place}: {cause}\n  help: {remedy}"
     return InputError(told, place=place, key=place, cause=cause, remedy=remedy)
 

@@ -93,14 +93,15 @@ def rewards(terms: Mapping[str, float] | Reward, observed: set[str]) -> Reward:
     return total
 
 
-def earned(reward: Reward, before: Arrays, after: Arrays, agents: int) -> list[float]:
+def earned(
+    reward: Reward, before: Arrays, after: Arrays, agents: int
+) -> NDArray[np.float64]:
     """Returns what each agent of a team earned; a function of one's own may return the wrong thing."""
-    values = np.asarray(reward(before, after), dtype=float)
+    values = np.array(reward(before, after), dtype=float)
     if values.shape != (agents,):
         cause = f"the function returned an array of the shape {values.shape}"
         raise _wrong("function", cause, f"return a number for each agent: the shape ({agents},)")
-    told: list[float] = values.tolist()
-    return told
+    return values
 
 
 def _wrong(name: str, cause: str, remedy: str) -> InputError:

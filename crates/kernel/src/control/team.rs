@@ -96,18 +96,35 @@ impl Teams {
         &self.order_names
     }
 
-    /// Returns the orders to single agents, all of them found right.
-    pub(crate) fn checked<'a>(&self, orders: &Orders<'a>) -> Result<Vec<Order<'a>>, OrderError> {
+    /// Checks that orders have the shape and the bounds of their spaces.
+    pub(crate) fn check(&self, orders: &Orders<'_>) -> Result<(), OrderError> {
+        self.each(orders, |_| Ok(()))
+    }
+
+    /// Hands over the orders to single agents, one after the other, as far as they have the shape and the bounds
+    /// of their spaces; checked, they do not have to be kept.
+    ///
+    /// # Errors
+    /// The first one that is wrong, or that `take` returns.
+    pub(crate) fn each<'a>(
+        &self,
+        orders: &Orders<'a>,
+        mut take: impl FnMut(&Order<'a>) -> Result<(), OrderError>,
+    ) -> Result<(), OrderError> {
         let &Orders { order, agents, values } = orders;
-        let Some(&first) = agents.first() else { return self.nobody(orders) };
-        let width = self.space(order, first)?.2.width();
+        let Some(&first) = agents.first() else { return nobody(orders) };
+        // Mostly all are of one team, whose space is looked up once.
+        let mut of_team = self.space(order, first)?;
+        let width = of_team.2.width();
         if values.len() != agents.len() * width {
             let expected = format!("{} x {width}", agents.len());
             return Err(OrderError::Shape { order: order.into(), expected, found: values.len() });
         }
-        let mut checked = Vec::with_capacity(agents.len());
         for (k, &agent) in agents.iter().enumerate() {
-            let (team, number, space) = self.space(order, agent)?;
+            if self.team_of.get(agent as usize).is_none_or(|&team| team as usize != of_team.0) {
+                of_team = self.space(order, agent)?;
+            }
+            let (team, number, space) = of_team;
             if space.width() != width {
                 let expected = format!("{} values for {} {agent}", space.width(), self.noun);
                 return Err(OrderError::Shape { order: order.into(), expected, found: width });
@@ -118,20 +135,9 @@ impl Teams {
                 let (order, expected) = (order.into(), space.words());
                 return Err(OrderError::Value { order, who, value, expected });
             }
-            checked.push(Order { team, space: number, agent, values });
+            take(&Order { team, space: number, agent, values })?;
         }
-        Ok(checked)
-    }
-
-    /// An order to nobody is right if it has no values.
-    fn nobody<'a>(&self, orders: &Orders<'_>) -> Result<Vec<Order<'a>>, OrderError> {
-        match orders.values {
-            [] => Ok(Vec::new()),
-            values => {
-                let (order, expected) = (orders.order.into(), "0".into());
-                Err(OrderError::Shape { order, expected, found: values.len() })
-            }
-        }
+        Ok(())
     }
 
     /// Returns an agent's team, and the number of the space of this order in it, and the space.
@@ -170,6 +176,17 @@ impl Teams {
             format!("{} of {} x {} {sort} values", space.name, agents.len(), space.width())
         });
         Err(OrderError::Room { expected: expected.collect::<Vec<_>>().join(", ") })
+    }
+}
+
+/// An order to nobody is right if it has no values.
+fn nobody(orders: &Orders<'_>) -> Result<(), OrderError> {
+    match orders.values {
+        [] => Ok(()),
+        values => {
+            let (order, expected) = (orders.order.into(), "0".into());
+            Err(OrderError::Shape { order, expected, found: values.len() })
+        }
     }
 }
 

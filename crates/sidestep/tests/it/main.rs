@@ -2,6 +2,7 @@
 
 mod airspace;
 mod airspace_traffic;
+mod batch;
 mod chain;
 mod chain_distances;
 mod chain_input;

@@ -76,6 +76,10 @@ impl AnyCompiled for Compiled {
         bundle::resolve(source, self)
     }
 
+    fn reseeded(&self, seed: u64) -> Option<Result<Box<dyn AnyCompiled>, InputError>> {
+        Some(Compiled::reseeded(self, seed).map(|compiled| Box::new(compiled) as Box<_>))
+    }
+
     fn start(&self, source: &Source, workers: usize) -> Box<dyn Simulation> {
         Box::new(self.clone().start(source, workers))
     }

@@ -20,8 +20,11 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use settings::{LegsSection, ReactiveSection, Switch, Times};
 use sidestep_collectives::{Choice, Estimator, Order, Update, Utility};
-use sidestep_kernel::InputError;
-use sidestep_scenario::{FromTo, Number, Point, Rule, Sections, Seeds, Source, Spanned, schema};
+use sidestep_kernel::stream::Streams;
+use sidestep_kernel::{InputError, Seed};
+use sidestep_scenario::{
+    FromTo, Head, Number, Point, Rule, Sections, Seeds, Source, Spanned, schema,
+};
 use std::sync::Arc;
 use values::{
     Cooling, Decision, Fading, Gibibytes, HeadingNoise, Inflation, LevelGap, LookAhead, Rounds,
@@ -158,9 +161,19 @@ pub struct Compiled {
     /// The tables to keep.
     pub record: RecordSection,
     /// Sides of the first fallbacks.
-    pub fallbacks: Vec<Side>,
+    pub fallbacks: Arc<Vec<Side>>,
     /// Pairs whose first fallbacks are not apart: the shield promises nothing for them.
     pub too_close: Vec<(u32, u32)>,
+    /// What it was compiled from.
+    recipe: Arc<Recipe>,
+}
+
+/// The text of a scenario and its sections, so that another seed reads nothing again.
+#[derive(Debug)]
+struct Recipe {
+    source: Source,
+    head: Head,
+    file: AirspaceFile,
 }
 
 impl Compiled {
@@ -170,7 +183,22 @@ impl Compiled {
     /// With place, line, column, cause and remedy for anything that is wrong in it.
     pub fn new(source: &Source) -> Result<Self, InputError> {
         let (head, file) = source.parse_world::<AirspaceFile>()?;
-        Compiler { source, head, file: &file }.compile()
+        Compiler::new(&Arc::new(Recipe { source: source.clone(), head, file })).compile()
+    }
+
+    /// Returns the same scenario with another seed: what compiling it with that seed would give. Traffic that is
+    /// drawn, and what follows from positions with errors, is made anew; all else is shared.
+    ///
+    /// # Errors
+    /// When generated airplanes find no place with this seed, or come too near to be optimized together.
+    pub fn reseeded(&self, seed: u64) -> Result<Self, InputError> {
+        let streams = Streams::new(Seed(seed));
+        let is_drawn = self.recipe.file.airspace.generator.is_some();
+        if is_drawn || self.world.disturbance.position_m > 0.0 {
+            return Compiler::again(&self.recipe, seed, &self.world).compile();
+        }
+        let world = Arc::new(AirspaceWorld { streams, ..(*self.world).clone() });
+        Ok(Self { world, seed, ..self.clone() })
     }
 
     /// Returns the state at the start.
@@ -187,7 +215,7 @@ impl Compiled {
             orders: [0; 2],
             turn_rate_rad_s: 0.0,
         };
-        let airplanes = self.world.airplanes.iter().zip(&self.fallbacks).map(record).collect();
+        let airplanes = self.world.airplanes.iter().zip(&*self.fallbacks).map(record).collect();
         Snapshot {
             cycle: 0,
             airplanes,

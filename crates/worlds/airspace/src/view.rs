@@ -32,13 +32,13 @@ pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
         let pose = Pose::at([at[0], at[1], airplane.altitude_m]);
         Some(Body::new(Kind::Goal, id, pose, Shape::Sphere { radius_m }))
     };
-    let starts = (0..).zip(&world.airplanes).map(start);
+    let starts = (0..).zip(world.airplanes.iter()).map(start);
     Scenery {
         name: name.into(),
         dimensions: if is_level(world) { 2 } else { 3 },
         cycle_s: world.timing.dt_s,
         floor: None,
-        bodies: starts.chain((0..).zip(&world.airplanes).filter_map(goal)).collect(),
+        bodies: starts.chain((0..).zip(world.airplanes.iter()).filter_map(goal)).collect(),
         names: names(world),
     }
 }
@@ -47,7 +47,7 @@ pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
 fn names(world: &AirspaceWorld) -> Vec<(Kind, u32, String)> {
     let named =
         |(id, airplane): (u32, &Airplane)| Some((Kind::Airplane, id, airplane.callsign.clone()?));
-    (0..).zip(&world.airplanes).filter_map(named).collect()
+    (0..).zip(world.airplanes.iter()).filter_map(named).collect()
 }
 
 /// Returns how recorded poses give the places of airplanes.

@@ -67,7 +67,7 @@ pub struct Disturbance {
 #[derive(Debug, Clone)]
 pub struct AirspaceWorld {
     /// The airplanes by id.
-    pub airplanes: Vec<Airplane>,
+    pub airplanes: Arc<Vec<Airplane>>,
     /// The steps of time.
     pub timing: Timing,
     /// Rule by which way-points count as reached.
@@ -113,17 +113,17 @@ pub struct AirspaceWorld {
     pub bounds: Bounds,
     pub(crate) streams: Streams,
     /// Actions of each airplane.
-    pub(crate) actions: Vec<Vec<Action>>,
+    pub(crate) actions: Arc<Vec<Vec<Action>>>,
     /// The stage of each airplane's flight after each of its orders.
-    pub(crate) later: Vec<Vec<Later>>,
+    pub(crate) later: Arc<Vec<Vec<Later>>>,
     /// The turn rate of each airplane's orbits, in radians per second.
-    pub(crate) orbit_rad_s: Vec<f64>,
+    pub(crate) orbit_rad_s: Arc<Vec<f64>>,
     /// The greatest speed of each airplane, in meters per second.
-    pub(crate) top_m_s: Vec<f64>,
+    pub(crate) top_m_s: Arc<Vec<f64>>,
     /// Seconds that each airplane would need if it were alone.
-    pub(crate) alone_s: Vec<f64>,
+    pub(crate) alone_s: Arc<Vec<f64>>,
     /// Sides of the first fallbacks.
-    pub(crate) first_fallbacks: Vec<Side>,
+    pub(crate) first_fallbacks: Arc<Vec<Side>>,
     /// The airplanes that decide, by what may be ordered of them.
     pub(crate) teams: Arc<Teams>,
 }
@@ -147,17 +147,30 @@ impl AirspaceWorld {
         self.callsign(id).unwrap_or_else(|| id.to_string())
     }
 
-    /// Fills in the fields that follow from the others.
+    /// Fills in the fields that follow from the others. Those that follow from models and orders alone, which
+    /// no seed draws, are shared with the same world of another seed.
     #[must_use]
-    pub(crate) fn prepared(mut self) -> Self {
-        let of = |a: &Airplane| actions(&a.model, self.timing.dt_s, &self.holds_s, &self.legs);
-        self.actions = self.airplanes.iter().map(of).collect();
-        self.later = self.airplanes.iter().map(later).collect();
-        self.orbit_rad_s = self.orbits_rad_s();
-        self.top_m_s = (0..self.airplanes.len()).map(|i| self.top_m_s(i)).collect();
-        self.alone_s = (0..self.airplanes.len()).map(|i| self.alone_s(i)).collect();
-        self.teams = Arc::new(self.find_teams());
+    pub(crate) fn prepared(mut self, known: Option<&Self>) -> Self {
+        self.later = Arc::new(self.airplanes.iter().map(later).collect());
+        if let Some(known) = known {
+            self.actions = Arc::clone(&known.actions);
+            self.orbit_rad_s = Arc::clone(&known.orbit_rad_s);
+            self.top_m_s = Arc::clone(&known.top_m_s);
+            self.teams = Arc::clone(&known.teams);
+        } else {
+            let of = |a: &Airplane| actions(&a.model, self.timing.dt_s, &self.holds_s, &self.legs);
+            self.actions = Arc::new(self.airplanes.iter().map(of).collect());
+            self.orbit_rad_s = Arc::new(self.orbits_rad_s());
+            self.top_m_s = Arc::new(self.each(Self::top_m_s));
+            self.teams = Arc::new(self.find_teams());
+        }
+        self.alone_s = Arc::new(self.each(Self::alone_s));
         self
+    }
+
+    /// Returns a number of each airplane.
+    fn each(&self, of: impl Fn(&Self, usize) -> f64) -> Vec<f64> {
+        (0..self.airplanes.len()).map(|i| of(self, i)).collect()
     }
 
     /// Returns the turn rates at which airplanes orbit under the shield.

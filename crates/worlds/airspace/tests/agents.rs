@@ -79,7 +79,7 @@ fn group(world: &AirspaceWorld) -> Vec<Known> {
         orders: 0,
         altitude_m: airplane.altitude_m,
     };
-    (0..).zip(&world.airplanes).map(known).collect()
+    (0..).zip(world.airplanes.iter()).map(known).collect()
 }
 
 #[test]

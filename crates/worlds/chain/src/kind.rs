@@ -73,6 +73,11 @@ impl<const D: usize> AnyCompiled for Compiled<D> {
         bundle::resolve(source, self)
     }
 
+    fn reseeded(&self, seed: u64) -> Option<Result<Box<dyn AnyCompiled>, InputError>> {
+        let compiled = Compiled::reseeded(self, seed)?;
+        Some(compiled.map(|compiled| Box::new(compiled) as Box<_>))
+    }
+
     fn start(&self, source: &Source, workers: usize) -> Box<dyn Simulation> {
         Box::new(self.clone().start(source, workers))
     }

@@ -39,7 +39,7 @@ impl<const D: usize> ChainWorld<D> {
     pub(super) fn find_teams(&self) -> Teams {
         type Alike<'a, const D: usize> = (&'a ChainSpec<D>, Vec<EntityId>);
         let mut alike: Vec<Alike<'_, D>> = Vec::new();
-        for (id, spec) in (0..).zip(&self.chains) {
+        for (id, spec) in (0..).zip(self.chains.iter()) {
             let traits = |s: &ChainSpec<D>| (s.start.points().len(), s.is_external());
             let is_same = |(other, _): &&mut Alike<'_, D>| {
                 other.name == spec.name && traits(other) == traits(spec)

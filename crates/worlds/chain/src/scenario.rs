@@ -6,10 +6,11 @@ mod changes;
 mod mobility;
 mod navigators;
 mod obstacles;
+mod recipe;
 mod starts;
 mod tasks;
 
-use super::ground::Movers;
+use super::ground::{Movers, Site};
 use super::motion::escape::{Escape, Method};
 use super::motion::replan::Rungs;
 use super::rods::geometry::{Bounds, norm};
@@ -17,6 +18,7 @@ use super::rods::rules::{Rotation, Rules};
 use super::world::{ChainSpec, ChainWorld};
 use chains::ChainSection;
 use obstacles::{FieldSection, GroundSection, ObstacleSection, fitted};
+pub(crate) use recipe::Recipe;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -265,6 +267,8 @@ pub struct Compiled<const D: usize> {
     pub cycles: u64,
     /// The tables to keep.
     pub record: RecordSection,
+    /// What it was compiled from; none where no scenario was read.
+    pub(crate) recipe: Option<Arc<Recipe<D>>>,
 }
 
 /// A compiled scenario in two or three dimensions.
@@ -296,7 +300,7 @@ impl AnyCompiled {
 
 fn compiled<const D: usize>(source: &Source) -> Result<Compiled<D>, InputError> {
     let (head, file) = source.parse_world()?;
-    Compiler { source, head: &head, file: &file }.compile()
+    Recipe::new(source, head, file)?.compile()
 }
 
 impl<const D: usize> Compiled<D> {
@@ -319,6 +323,9 @@ struct Compiler<'a, const D: usize> {
     source: &'a Source,
     head: &'a Head,
     file: &'a ChainFile<D>,
+    site: Option<&'a Site>,
+    /// The same world with another seed, if there is one already.
+    known: Option<&'a ChainWorld<D>>,
 }
 
 impl<const D: usize> Compiler<'_, D> {
@@ -331,6 +338,7 @@ impl<const D: usize> Compiler<'_, D> {
             seed: self.head.seed,
             cycles,
             record: self.file.record,
+            recipe: None,
         };
         self.try_out(&compiled)?;
         Ok(compiled)
@@ -339,9 +347,11 @@ impl<const D: usize> Compiler<'_, D> {
     fn world(&self, cycles: u64) -> Result<ChainWorld<D>, InputError> {
         let section = &self.file.chain;
         let dt_s = section.dt_s.map_or(0.02, f64::from);
-        let site = self.site()?;
-        let chains = self.chains(dt_s, site.as_ref())?;
-        let ground = self.ground(site.as_ref(), &chains)?;
+        let chains = match self.known.filter(|_| !self.file.is_anywhere()) {
+            Some(known) => Arc::clone(&known.chains),
+            None => Arc::new(self.chains(dt_s, self.site)?),
+        };
+        let ground = self.ground(self.site, &chains)?;
         self.starts(&chains, &ground)?;
         let radius_m = chains.iter().flat_map(|spec| spec.start.connectors()).map(|c| c.radius_m);
         let look_m = 4.0 * radius_m.fold(0.05, f64::max);
@@ -352,15 +362,19 @@ impl<const D: usize> Compiler<'_, D> {
             cycles,
             escape,
             rungs: Rungs::default(),
-            obstacles: ground.obstacles,
-            movers: ground.movers,
+            obstacles: Arc::new(ground.obstacles),
+            movers: Arc::new(ground.movers),
             dt_s,
             rules: self.rules(escape.as_ref(), joint_speed_m_s * dt_s),
             look_m: section.look_m.map_or(look_m, f64::from),
             streams: Streams::new(Seed(self.head.seed)),
             teams: Arc::default(),
         };
-        Ok(ChainWorld { teams: Arc::new(world.find_teams()), ..world })
+        let teams = match self.known {
+            Some(known) => Arc::clone(&known.teams),
+            None => Arc::new(world.find_teams()),
+        };
+        Ok(ChainWorld { teams, ..world })
     }
 
     /// Runs the scripts once, so that they cannot fail during a run.

@@ -47,8 +47,8 @@ impl<const D: usize> Scratch<D> {
         Self {
             propagator: Propagator::new(world.rules),
             escaper: world.escape.map(Escaper::new),
-            obstacles: world.obstacles.clone(),
-            solid: world.obstacles.clone(),
+            obstacles: (*world.obstacles).clone(),
+            solid: (*world.obstacles).clone(),
             moment: None,
             guests: Vec::new(),
             has_others: false,

@@ -30,7 +30,7 @@ impl<const D: usize> ChainWorld<D> {
         // Walls of one room share their number.
         let still = (0..).zip(self.obstacles.still());
         let still = still.map(|(part, obstacle)| seen(obstacle).part(part));
-        let goals = (0..).zip(&self.chains).flat_map(|(id, spec)| goals(id, spec));
+        let goals = (0..).zip(self.chains.iter()).flat_map(|(id, spec)| goals(id, spec));
         Scenery {
             name: name.into(),
             dimensions: D as u8,
@@ -38,7 +38,7 @@ impl<const D: usize> ChainWorld<D> {
             floor: None,
             bodies: still.chain(goals).collect(),
             names: (0..)
-                .zip(&self.chains)
+                .zip(self.chains.iter())
                 .map(|(id, spec)| (Kind::Connector, id, spec.name.clone()))
                 .collect(),
         }
@@ -63,7 +63,7 @@ impl<const D: usize> ChainWorld<D> {
     /// Returns all chains by id, then the moving obstacles.
     pub(crate) fn visible_bodies(&self, state: &ChainState<D>, now: Cycle) -> Vec<Body> {
         let mut bodies = Vec::new();
-        for (id, spec) in (0..).zip(&self.chains) {
+        for (id, spec) in (0..).zip(self.chains.iter()) {
             push_chain(&mut bodies, id, spec, &state.body(id as usize));
         }
         bodies.extend(self.movers.at(self.starts_s(now)).map(|mover| seen(&mover)));

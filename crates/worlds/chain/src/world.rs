@@ -46,11 +46,11 @@ pub(crate) const OTHER_CHAIN: u32 = 1 << 31;
 #[derive(Debug, Clone)]
 pub struct ChainWorld<const D: usize> {
     /// The chains by id.
-    pub(crate) chains: Vec<ChainSpec<D>>,
+    pub(crate) chains: Arc<Vec<ChainSpec<D>>>,
     /// Obstacles that stand still.
-    pub obstacles: Obstacles<D>,
+    pub obstacles: Arc<Obstacles<D>>,
     /// Obstacles that move.
-    pub movers: Movers<D>,
+    pub movers: Arc<Movers<D>>,
     /// Duration of a cycle, s.
     pub(crate) dt_s: f64,
     /// Cycles of the run, by which the progress of an endless task is measured.

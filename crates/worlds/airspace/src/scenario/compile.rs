@@ -1,6 +1,6 @@
 //! From a scenario's sections to an immutable world.
 
-use super::{AirspaceFile, Compiled, Preset};
+use super::{AirspaceFile, Compiled, Preset, Recipe};
 use crate::baseline::Reactive;
 use crate::deploy::refuses;
 use crate::flight::Levels;
@@ -13,7 +13,7 @@ use crate::state::AirspaceState;
 use crate::world::{AirspaceWorld, Disturbance, Method};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
-use sidestep_scenario::{Head, Seeds, Source, Spanned};
+use sidestep_scenario::{Seeds, Source, Spanned};
 use std::sync::Arc;
 
 /// Meters by which levels that are far enough apart may seem nearer because they were rounded.
@@ -41,29 +41,46 @@ const USUAL_SIGMAS: f64 = 5.0;
 const GIB: f64 = (1_u64 << 30) as f64;
 
 pub(super) struct Compiler<'a> {
+    recipe: &'a Arc<Recipe>,
     pub(super) source: &'a Source,
-    pub(super) head: Head,
     pub(super) file: &'a AirspaceFile,
+    seed: u64,
+    /// The same world with another seed, if there is one already.
+    known: Option<&'a AirspaceWorld>,
 }
 
-impl Compiler<'_> {
+impl<'a> Compiler<'a> {
+    /// Returns the compiler of a scenario, with its own seed.
+    pub(super) fn new(recipe: &'a Arc<Recipe>) -> Self {
+        let Recipe { source, head, file } = &**recipe;
+        Self { recipe, source, file, seed: head.seed, known: None }
+    }
+
+    /// Returns the compiler of a scenario with another seed than that of a known world.
+    pub(super) fn again(recipe: &'a Arc<Recipe>, seed: u64, known: &'a AirspaceWorld) -> Self {
+        Self { seed, known: Some(known), ..Self::new(recipe) }
+    }
+
     pub(super) fn compile(&self) -> Result<Compiled, InputError> {
         let mut world = self.world()?;
         self.fits_deployment(&world)?;
         self.fits_a_pair(&world)?;
         self.fits_errors(&world)?;
         let (fallbacks, too_close) = first(&world);
-        world.first_fallbacks.clone_from(&fallbacks);
-        let cycles = self.head.cycles.unwrap_or_else(|| enough_cycles(&world));
+        let fallbacks = Arc::new(fallbacks);
+        world.first_fallbacks = Arc::clone(&fallbacks);
+        let head = &self.recipe.head;
+        let cycles = head.cycles.unwrap_or_else(|| enough_cycles(&world));
         let compiled = Compiled {
             seeds: self.seeds(&world),
             world: Arc::new(world),
-            name: self.head.name.clone(),
-            seed: self.head.seed,
+            name: head.name.clone(),
+            seed: self.seed,
             cycles,
             record: self.file.record,
             fallbacks,
             too_close,
+            recipe: Arc::clone(self.recipe),
         };
         self.fits_memory(&compiled)?;
         Ok(compiled)
@@ -86,7 +103,7 @@ impl Compiler<'_> {
 
     fn world(&self) -> Result<AirspaceWorld, InputError> {
         let section = &self.file.airspace;
-        let streams = Streams::new(Seed(self.head.seed));
+        let streams = Streams::new(Seed(self.seed));
         let timing = self.timing()?;
         let replay = self.replay(&timing);
         let airplanes = self.airplanes(&streams, replay)?;
@@ -96,7 +113,7 @@ impl Compiler<'_> {
         let network = self.network(&timing, &airplanes)?;
         let world = AirspaceWorld {
             wind_m_s: self.wind_m_s(&airplanes)?,
-            airplanes,
+            airplanes: Arc::new(airplanes),
             timing,
             network,
             passing: Passing { tolerance_m, passes: true },
@@ -117,15 +134,15 @@ impl Compiler<'_> {
             disturbance: self.disturbance(),
             bounds: self.bounds(),
             streams,
-            actions: Vec::new(),
-            later: Vec::new(),
-            orbit_rad_s: Vec::new(),
-            top_m_s: Vec::new(),
-            alone_s: Vec::new(),
-            first_fallbacks: Vec::new(),
+            actions: Arc::default(),
+            later: Arc::default(),
+            orbit_rad_s: Arc::default(),
+            top_m_s: Arc::default(),
+            alone_s: Arc::default(),
+            first_fallbacks: Arc::default(),
             teams: Arc::default(),
         };
-        Ok(world.prepared())
+        Ok(world.prepared(self.known))
     }
 
     fn disturbance(&self) -> Disturbance {

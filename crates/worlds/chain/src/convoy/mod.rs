@@ -11,7 +11,6 @@ pub use measures::Measures;
 
 use super::driver::{Driver, Task};
 use super::formation::Robots;
-use super::ground::Movers;
 use super::metrics::Tally;
 use super::motion::replan::Rungs;
 use super::navigate::{Goal, Navigator};
@@ -130,6 +129,7 @@ impl Convoy {
             seed: 0,
             cycles: u64::MAX,
             record: RecordSection::default(),
+            recipe: None,
         };
         let run = compiled.start(&Source::new("convoy", "", ""), 1);
         run.state().body_mut(0).driving.leader = Some(LeaderState::at(start));
@@ -259,9 +259,9 @@ impl Plan {
             robots: Some(Robots { follower: self.follower, lag_limit_m: self.lag_limit_m }),
         };
         ChainWorld {
-            chains: vec![spec],
-            obstacles: around.obstacles,
-            movers: Movers::default(),
+            chains: Arc::new(vec![spec]),
+            obstacles: Arc::new(around.obstacles),
+            movers: Arc::default(),
             dt_s: self.dt_s,
             cycles: u64::MAX,
             rules: self.rules,

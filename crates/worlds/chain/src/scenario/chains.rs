@@ -61,7 +61,7 @@ pub(super) struct ChainSection<const D: usize> {
     heading_deg: Option<f64>,
     points_m: Option<Vec<Place<D>>>,
     #[serde(default)]
-    anywhere: bool,
+    pub(super) anywhere: bool,
     within_m: Option<Spanned<Room<D>>>,
     arm: Option<Spanned<ArmSection>>,
     robots: Option<Spanned<RobotsSection>>,

@@ -1,0 +1,514 @@
+//! Many simulations of one scenario, stepped together: each on one worker, results by index.
+//!
+//! ```text
+//! order(team, values)      noted for all worlds, checked at once
+//! advance(cycles)          every world: its orders, then its cycles     ┐
+//! observe(team, room)      [worlds, agents, ...], a row for each world  ├ on W workers that wait between calls
+//! restart(seeds)           fresh starts of some                         ┘
+//! ```
+//!
+//! A world knows nothing of the others, so the number of workers changes no bit. One that breaks off is
+//! named; the others are whole.
+
+use crate::control::{CellsMut, OrderError, Orders, Team};
+use crate::digest::Digest;
+use crate::error::InputError;
+use crate::simulation::Simulation;
+use crate::units::Cycle;
+use crate::workers::Waiting;
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Makes a simulation at its start from a seed.
+pub type Start = dyn Fn(u64) -> Result<Box<dyn Simulation>, InputError> + Send + Sync;
+
+/// A reason why a batch could not do something.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BatchError {
+    /// A batch of no worlds.
+    #[error("a batch of no worlds; give at least one seed")]
+    Empty,
+    /// Too few or too many values, one for each world.
+    #[error("a batch of {worlds} worlds needs {worlds} {what}, not {found}")]
+    Worlds {
+        /// Number of worlds.
+        worlds: usize,
+        /// The noun for the values.
+        what: &'static str,
+        /// Number of values.
+        found: usize,
+    },
+    /// A world cannot start.
+    #[error("world {world} cannot start with seed {seed}: {error}")]
+    Start {
+        /// Its index.
+        world: usize,
+        /// Its seed.
+        seed: u64,
+        /// The reason.
+        error: InputError,
+    },
+    /// A world whose agents observe, or are ordered, otherwise than those of the first.
+    #[error("world {world} has other teams than world 0; a batch is of worlds of one shape")]
+    Shape {
+        /// Its index.
+        world: usize,
+    },
+    /// An order that cannot be obeyed; no world was ordered anything.
+    #[error("world {world}: {error}")]
+    Order {
+        /// Index of the world.
+        world: usize,
+        /// The reason.
+        error: OrderError,
+    },
+    /// A team that is not there, or room of another shape.
+    #[error(transparent)]
+    Room(#[from] OrderError),
+    /// A world that broke off: it has no state until it is restarted.
+    #[error(
+        "world {world} (seed {seed}) broke off after cycle {cycle}, which is a bug: {cause}; the other worlds \
+         are whole, restart this one"
+    )]
+    Broken {
+        /// Its index.
+        world: usize,
+        /// Its seed.
+        seed: u64,
+        /// Cycles that it had done before.
+        cycle: Cycle,
+        /// The message of the panic.
+        cause: String,
+    },
+}
+
+/// Many simulations of one scenario.
+pub struct Batch {
+    shared: Arc<Shared>,
+    crew: Waiting,
+    /// The teams of each world, which are equal.
+    teams: Arc<[Team]>,
+    /// Orders that wait for the next cycle.
+    orders: Vec<Noted>,
+}
+
+struct Shared {
+    start: Arc<Start>,
+    worlds: Vec<Mutex<World>>,
+}
+
+/// One of the worlds.
+struct World {
+    seed: u64,
+    /// `None` for one that broke off, or never started.
+    run: Option<Box<dyn Simulation>>,
+    /// What went wrong in it.
+    error: Option<BatchError>,
+    /// What its agents observe, for the caller to take.
+    room: Vec<Cells>,
+    has_observed: bool,
+}
+
+/// An order to all agents of a team in all worlds.
+#[derive(Debug, Clone)]
+struct Noted {
+    team: usize,
+    order: String,
+    values: Vec<f64>,
+}
+
+/// Values of one space.
+enum Cells {
+    Whole(Vec<i64>),
+    Real(Vec<f64>),
+}
+
+impl Batch {
+    /// Starts a world with each of the seeds, on `workers` workers (at least 1).
+    ///
+    /// # Errors
+    /// When there are no seeds, or a world cannot start.
+    pub fn new(start: Arc<Start>, seeds: &[u64], workers: usize) -> Result<Self, BatchError> {
+        if seeds.is_empty() {
+            return Err(BatchError::Empty);
+        }
+        let world = |&seed: &u64| {
+            let (run, error, room) = (None, None, Vec::new());
+            Mutex::new(World { seed, run, error, room, has_observed: false })
+        };
+        let shared = Arc::new(Shared { start, worlds: seeds.iter().map(world).collect() });
+        let (crew, orders) = (Waiting::new(workers), Vec::new());
+        let mut batch = Self { shared, crew, teams: Arc::default(), orders };
+        batch.each(|world, index, shared| world.restart(index, world.seed, shared, None));
+        batch.told()?;
+        let first = batch.world(0);
+        let teams: Arc<[Team]> = first.run.as_ref().map_or(&[][..], |run| run.teams()).into();
+        drop(first);
+        let differs = |world: &World| world.run.as_ref().is_some_and(|run| *run.teams() != *teams);
+        if let Some(world) = (1..batch.len()).find(|&k| differs(&batch.world(k))) {
+            return Err(BatchError::Shape { world });
+        }
+        batch.teams = teams;
+        Ok(batch)
+    }
+
+    /// Number of worlds; at least 1.
+    #[expect(clippy::len_without_is_empty, reason = "it is never empty")]
+    pub fn len(&self) -> usize {
+        self.shared.worlds.len()
+    }
+
+    /// Number of workers.
+    pub fn workers(&self) -> usize {
+        self.crew.workers()
+    }
+
+    /// The teams of each world.
+    pub fn teams(&self) -> &[Team] {
+        &self.teams
+    }
+
+    /// Orders something of all agents of a team in all worlds before the next cycle: the values of one world after
+    /// the other, in each those of one agent after the other.
+    ///
+    /// # Errors
+    /// When an order cannot be obeyed; nothing of it is noted then.
+    pub fn order(&mut self, team: usize, order: &str, values: Vec<f64>) -> Result<(), BatchError> {
+        let Some(its) = self.teams.get(team) else { return Err(self.no_team(team).into()) };
+        let width = values.len() / self.len();
+        let first = self.world(0);
+        // All worlds have these teams, and what can be ordered depends on no state: one may answer for all,
+        // also one that broke off for want of an answer.
+        let check = |(world, values)| {
+            let orders = Orders { order, agents: &its.agents, values };
+            let checked = first.run.as_ref().map_or(Ok(()), |run| run.check(&orders));
+            checked.map_err(|error| BatchError::Order { world, error })
+        };
+        if width * self.len() != values.len() {
+            let (worlds, what, found) = (self.len(), "rows of values", values.len());
+            return Err(BatchError::Worlds { worlds, what, found });
+        }
+        match width {
+            0 => check((0, &[][..]))?,
+            width => values.chunks(width).enumerate().try_for_each(check)?,
+        }
+        drop(first);
+        self.orders.push(Noted { team, order: order.into(), values });
+        Ok(())
+    }
+
+    /// Gives the orders that wait, and runs `cycles` cycles, of those worlds for which `mask` is true (all, without
+    /// one); orders to others are dropped. A world in which nothing can happen anymore stays as it is.
+    ///
+    /// # Errors
+    /// When a world had broken off before, and then nothing is done; or does so now, or cannot obey, and then
+    /// all others have done their cycles.
+    pub fn advance(&mut self, cycles: u64, mask: Option<&[bool]>) -> Result<(), BatchError> {
+        self.check_count(mask.map(<[bool]>::len), "truth values")?;
+        self.told()?;
+        let orders = std::mem::take(&mut self.orders);
+        let (n, teams) = (self.len(), Arc::clone(&self.teams));
+        let mask = mask.map(<[bool]>::to_vec);
+        self.each(move |world, index, _| {
+            if mask.as_ref().is_none_or(|mask| mask[index]) {
+                world.guarded(index, |run| {
+                    for Noted { team, order, values } in &orders {
+                        let width = values.len() / n;
+                        let values = &values[index * width..(index + 1) * width];
+                        let agents = &teams[*team].agents;
+                        run.order(&Orders { order, agents, values })?;
+                    }
+                    if cycles > 0 && !run.is_over() {
+                        run.advance(cycles);
+                    }
+                    Ok(())
+                });
+            }
+        });
+        self.told()
+    }
+
+    /// Writes what the agents of a team observe in all worlds: one room for each of its spaces, with the values
+    /// of one world after the other.
+    ///
+    /// # Errors
+    /// When there is no such team, or the room has another shape; or a world has broken off.
+    pub fn observe(&mut self, team: usize, room: &mut [CellsMut<'_>]) -> Result<(), BatchError> {
+        self.told()?;
+        let Some(its) = self.teams.get(team) else { return Err(self.no_team(team).into()) };
+        let lengths: Vec<usize> =
+            its.observed.iter().map(|space| its.agents.len() * space.width()).collect();
+        self.check_room(team, &lengths, room)?;
+        let n = self.len();
+        let shared = Arc::clone(&self.shared);
+        // The calling thread writes where the caller wants it; the others write beside it, for they may outlive
+        // what the caller has lent, as far as the compiler knows.
+        let own = |index: usize| {
+            let mut world = shared.world(index);
+            let parts = &mut part(room, &lengths, index);
+            world.guarded(index, |run| run.observe(team, parts));
+        };
+        let theirs = Arc::clone(&self.shared);
+        let spaces: Vec<(bool, usize)> =
+            its.observed.iter().map(|space| space.is_whole()).zip(lengths.clone()).collect();
+        self.crew.run(
+            n,
+            own,
+            Arc::new(move |index| theirs.world(index).look(index, team, &spaces)),
+        );
+        for index in 0..n {
+            self.world(index).hand_over(&mut part(room, &lengths, index));
+        }
+        self.told()
+    }
+
+    /// Starts worlds anew, those that have a seed here; orders that wait are dropped.
+    ///
+    /// # Errors
+    /// When a world cannot start with its seed: it stays as it was then, and all others have started.
+    pub fn restart(&mut self, seeds: &[Option<u64>]) -> Result<(), BatchError> {
+        self.check_count(Some(seeds.len()), "seeds")?;
+        self.orders.clear();
+        let (seeds, teams) = (seeds.to_vec(), Arc::clone(&self.teams));
+        self.each(move |world, index, shared| {
+            if let Some(seed) = seeds[index] {
+                world.restart(index, seed, shared, Some(&teams));
+            }
+        });
+        let refused = self.first_error(|error| !matches!(error, BatchError::Broken { .. }));
+        refused.map_or(Ok(()), Err)
+    }
+
+    /// Returns the seed of each world.
+    pub fn seeds(&self) -> Vec<u64> {
+        (0..self.len()).map(|k| self.world(k).seed).collect()
+    }
+
+    /// Returns the cycles that each world has done.
+    ///
+    /// # Errors
+    /// When a world has broken off.
+    pub fn cycles(&self) -> Result<Vec<Cycle>, BatchError> {
+        self.ask(|run| run.cycle())
+    }
+
+    /// Returns whether nothing can happen anymore, for each world.
+    ///
+    /// # Errors
+    /// When a world has broken off.
+    pub fn is_over(&self) -> Result<Vec<bool>, BatchError> {
+        self.ask(|run| run.is_over())
+    }
+
+    /// Returns the digest of each world; orders that wait are not in it.
+    ///
+    /// # Errors
+    /// When a world has broken off.
+    pub fn digests(&self) -> Result<Vec<Digest>, BatchError> {
+        self.ask(|run| run.digest())
+    }
+
+    /// Returns something of each world.
+    ///
+    /// # Errors
+    /// When a world has broken off.
+    pub fn ask<T>(&self, of: impl Fn(&dyn Simulation) -> T) -> Result<Vec<T>, BatchError> {
+        let answer = |k| {
+            let world = self.world(k);
+            world.run.as_deref().map(&of).ok_or_else(|| world.unfit(k))
+        };
+        (0..self.len()).map(answer).collect()
+    }
+
+    fn world(&self, index: usize) -> MutexGuard<'_, World> {
+        self.shared.world(index)
+    }
+
+    /// Does something in each world, on all workers.
+    fn each(&mut self, work: impl Fn(&mut World, usize, &Shared) + Send + Sync + 'static) {
+        let (n, shared) = (self.len(), Arc::clone(&self.shared));
+        let work = Arc::new(move |k: usize| work(&mut shared.world(k), k, &shared));
+        let theirs = Arc::clone(&work);
+        self.crew.run(n, |k| work(k), theirs);
+    }
+
+    /// Returns the error of the first world that has one. Those of broken worlds stay.
+    fn told(&self) -> Result<(), BatchError> {
+        self.first_error(|_| true).map_or(Ok(()), Err)
+    }
+
+    fn first_error(&self, counts: impl Fn(&BatchError) -> bool) -> Option<BatchError> {
+        let mut first = None;
+        for index in 0..self.len() {
+            let mut world = self.world(index);
+            let Some(error) = world.error.clone().filter(&counts) else { continue };
+            if world.run.is_some() {
+                world.error = None;
+            }
+            first = first.or(Some(error));
+        }
+        first
+    }
+
+    fn no_team(&self, team: usize) -> OrderError {
+        OrderError::NoTeam { team, teams: self.teams.len() }
+    }
+
+    fn check_count(&self, found: Option<usize>, what: &'static str) -> Result<(), BatchError> {
+        let worlds = self.len();
+        let wrong = found.filter(|&found| found != worlds);
+        wrong.map_or(Ok(()), |found| Err(BatchError::Worlds { worlds, what, found }))
+    }
+
+    /// Checks that there is room for exactly what a team observes in all worlds.
+    fn check_room(
+        &self,
+        team: usize,
+        lengths: &[usize],
+        room: &[CellsMut<'_>],
+    ) -> Result<(), OrderError> {
+        let (observed, n) = (&self.teams[team].observed, self.len());
+        let fits = room.len() == lengths.len()
+            && room.iter().zip(observed).zip(lengths).all(|((room, space), &length)| {
+                room.len() == n * length && space.is_whole() == matches!(room, CellsMut::Whole(_))
+            });
+        if fits {
+            return Ok(());
+        }
+        let expected = observed.iter().zip(lengths).map(|(space, length)| {
+            let sort = if space.is_whole() { "whole" } else { "real" };
+            format!("{} of {n} x {length} {sort} values", space.name)
+        });
+        Err(OrderError::Room { expected: expected.collect::<Vec<_>>().join(", ") })
+    }
+}
+
+impl std::fmt::Debug for Batch {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Batch({} worlds, {} workers)", self.len(), self.workers())
+    }
+}
+
+impl Shared {
+    /// A world that panicked has no run any more, so nothing that it left behind is read.
+    fn world(&self, index: usize) -> MutexGuard<'_, World> {
+        self.worlds[index].lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl World {
+    /// Returns the error of a world without a run.
+    fn unfit(&self, index: usize) -> BatchError {
+        self.error.clone().unwrap_or_else(|| BatchError::Broken {
+            world: index,
+            seed: self.seed,
+            cycle: 0,
+            cause: "it never started".into(),
+        })
+    }
+
+    /// Works with the run; keeps the error, and drops the run if it panics.
+    fn guarded(
+        &mut self,
+        index: usize,
+        work: impl FnOnce(&mut dyn Simulation) -> Result<(), OrderError>,
+    ) {
+        let Some(run) = self.run.as_deref_mut() else { return };
+        let cycle = run.cycle();
+        match catch_unwind(AssertUnwindSafe(|| work(run))) {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => self.error = Some(BatchError::Order { world: index, error }),
+            Err(payload) => {
+                self.run = None;
+                let (seed, cause) = (self.seed, message(&*payload));
+                self.error = Some(BatchError::Broken { world: index, seed, cycle, cause });
+            }
+        }
+    }
+
+    /// Starts the world anew; it stays as it is where that fails.
+    fn restart(&mut self, index: usize, seed: u64, shared: &Shared, teams: Option<&[Team]>) {
+        let started = catch_unwind(AssertUnwindSafe(|| (shared.start)(seed)));
+        let refused = match started {
+            Ok(Ok(run)) if teams.is_some_and(|teams| *run.teams() != *teams) => {
+                BatchError::Shape { world: index }
+            }
+            Ok(Ok(run)) => {
+                (self.run, self.seed, self.error) = (Some(run), seed, None);
+                return;
+            }
+            Ok(Err(error)) => BatchError::Start { world: index, seed, error },
+            Err(payload) => {
+                let (cycle, cause) = (0, message(&*payload));
+                self.run = None;
+                BatchError::Broken { world: index, seed, cycle, cause }
+            }
+        };
+        // Of one that is broken the older reason is what restarting it did not mend.
+        self.error = Some(refused);
+    }
+
+    /// Observes into its own room.
+    fn look(&mut self, index: usize, team: usize, spaces: &[(bool, usize)]) {
+        let mut room = std::mem::take(&mut self.room);
+        if room.len() != spaces.len() || !room.iter().zip(spaces).all(|(room, &s)| room.fits(s)) {
+            room = spaces.iter().map(|&space| Cells::new(space)).collect();
+        }
+        let mut cells: Vec<CellsMut<'_>> = room.iter_mut().map(Cells::cells).collect();
+        self.guarded(index, |run| run.observe(team, &mut cells));
+        (self.room, self.has_observed) = (room, true);
+    }
+
+    /// Copies what it has observed into its part of the caller's room.
+    fn hand_over(&mut self, parts: &mut [CellsMut<'_>]) {
+        if !std::mem::take(&mut self.has_observed) {
+            return;
+        }
+        for (from, to) in self.room.iter().zip(parts) {
+            match (from, to) {
+                (Cells::Whole(from), CellsMut::Whole(to)) => to.copy_from_slice(from),
+                (Cells::Real(from), CellsMut::Real(to)) => to.copy_from_slice(from),
+                _ => {}
+            }
+        }
+    }
+}
+
+impl Cells {
+    fn new((is_whole, length): (bool, usize)) -> Self {
+        if is_whole { Self::Whole(vec![0; length]) } else { Self::Real(vec![0.0; length]) }
+    }
+
+    fn fits(&self, (is_whole, length): (bool, usize)) -> bool {
+        match self {
+            Self::Whole(cells) => is_whole && cells.len() == length,
+            Self::Real(cells) => !is_whole && cells.len() == length,
+        }
+    }
+
+    fn cells(&mut self) -> CellsMut<'_> {
+        match self {
+            Self::Whole(cells) => CellsMut::Whole(cells),
+            Self::Real(cells) => CellsMut::Real(cells),
+        }
+    }
+}
+
+/// Returns one world's part of the room of all.
+fn part<'a>(room: &'a mut [CellsMut<'_>], lengths: &[usize], index: usize) -> Vec<CellsMut<'a>> {
+    let range = |length: usize| index * length..(index + 1) * length;
+    let one = |(room, &length): (&'a mut CellsMut<'_>, &usize)| match room {
+        CellsMut::Whole(room) => CellsMut::Whole(&mut room[range(length)]),
+        CellsMut::Real(room) => CellsMut::Real(&mut room[range(length)]),
+    };
+    room.iter_mut().zip(lengths).map(one).collect()
+}
+
+/// Returns the message of a panic.
+fn message(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<&str>().map(|text| (*text).to_string());
+    let text = text.or_else(|| payload.downcast_ref::<String>().cloned());
+    text.unwrap_or_else(|| "without a message".into())
+}

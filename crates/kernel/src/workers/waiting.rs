@@ -1,0 +1,263 @@
+//! Workers that wait between calls, for callers whose calls take less than starting threads.
+
+use super::Padded;
+use crate::interrupt::desert;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+/// Numbers in the largest chunk that a worker takes at once.
+const CHUNK: usize = 8;
+
+/// A task that any worker does for some numbers.
+pub type Task = Arc<dyn Fn(usize) + Send + Sync>;
+
+/// A caller and W - 1 threads, which are started at the first call and sleep between calls.
+#[derive(Debug)]
+pub struct Waiting {
+    workers: usize,
+    /// None before the first call.
+    crew: Option<Crew>,
+}
+
+/// Threads of one process: a child of it that was forked has none of them.
+#[derive(Debug)]
+struct Crew {
+    process: u32,
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug)]
+struct Shared {
+    call: Mutex<Call>,
+    called: Condvar,
+    done: Condvar,
+    /// The next number of each worker's share.
+    cursors: Vec<Padded>,
+    is_broken: AtomicBool,
+}
+
+/// The present call, or the last one.
+#[derive(Default)]
+struct Call {
+    number: u64,
+    n: usize,
+    task: Option<Task>,
+    /// Threads that have not ended their part.
+    working: usize,
+    is_last: bool,
+}
+
+impl std::fmt::Debug for Call {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { number, n, working, is_last, .. } = self;
+        write!(f, "Call({number}, {n} tasks, {working} working, last: {is_last})")
+    }
+}
+
+impl Waiting {
+    /// Returns `workers` workers (at least 1), of which one is the calling thread.
+    pub fn new(workers: usize) -> Self {
+        Self { workers: workers.max(1), crew: None }
+    }
+
+    /// Number of workers.
+    pub fn workers(&self) -> usize {
+        self.workers
+    }
+
+    /// Does every number of `0..n` once, and returns when all are done: `own` those that fall to the calling
+    /// thread, `task` the others. Each worker begins with a share of its own, the same in each call, and
+    /// then helps with the others' shares.
+    ///
+    /// # Panics
+    /// When `own` or `task` panicked (a bug), or the system cannot start a thread.
+    pub fn run(&mut self, n: usize, mut own: impl FnMut(usize), task: Task) {
+        if self.workers == 1 || n <= 1 {
+            return (0..n).for_each(own);
+        }
+        let shared = Arc::clone(&self.crew().shared);
+        shared.begin(n, task);
+        // Also awaited where `own` unwinds, for the threads work with what the caller has lent them.
+        let awaited = Awaited(&shared);
+        shared.work(0, n, &mut own);
+        drop(awaited);
+        if shared.is_broken.load(Ordering::Relaxed) {
+            self.crew = None;
+            desert();
+        }
+    }
+
+    fn crew(&mut self) -> &Crew {
+        let process = std::process::id();
+        let is_here = self.crew.as_ref().is_some_and(|crew| crew.process == process);
+        if !is_here && let Some(lost) = self.crew.take() {
+            // The threads belong to the parent: its locks may be held in this copy for ever.
+            std::mem::forget(lost);
+        }
+        let workers = self.workers;
+        self.crew.get_or_insert_with(|| Crew::new(workers, process))
+    }
+}
+
+impl Crew {
+    fn new(workers: usize, process: u32) -> Self {
+        let shared = Arc::new(Shared {
+            call: Mutex::default(),
+            called: Condvar::new(),
+            done: Condvar::new(),
+            cursors: (0..workers).map(|_| Padded::default()).collect(),
+            is_broken: AtomicBool::new(false),
+        });
+        for index in 1..workers {
+            let shared = Arc::clone(&shared);
+            std::thread::Builder::new()
+                .name(format!("worker {index}"))
+                .spawn(move || shared.wait_and_work(index))
+                .expect("the system can start a thread");
+        }
+        Self { process, shared }
+    }
+}
+
+impl Drop for Crew {
+    fn drop(&mut self) {
+        self.shared.call().is_last = true;
+        self.shared.called.notify_all();
+    }
+}
+
+impl Shared {
+    fn call(&self) -> MutexGuard<'_, Call> {
+        self.call.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Calls all threads.
+    fn begin(&self, n: usize, task: Task) {
+        self.cursors.iter().for_each(|cursor| cursor.0.store(0, Ordering::Relaxed));
+        let mut call = self.call();
+        call.number += 1;
+        (call.n, call.task, call.working) = (n, Some(task), self.cursors.len() - 1);
+        drop(call);
+        self.called.notify_all();
+    }
+
+    /// A thread's life: call after call.
+    fn wait_and_work(&self, index: usize) {
+        let mut seen = 0;
+        loop {
+            let mut call = self.call();
+            while call.number == seen && !call.is_last {
+                call = self.called.wait(call).unwrap_or_else(PoisonError::into_inner);
+            }
+            let (n, Some(task)) = (call.n, call.task.clone()) else { return };
+            if call.is_last {
+                return;
+            }
+            seen = call.number;
+            drop(call);
+            let _ended = Ended(self);
+            self.work(index, n, &mut |k| task(k));
+            // Before the end is told: nobody holds a caller's data after it.
+            drop(task);
+        }
+    }
+
+    /// Does one worker's share, and then what is left of the others'.
+    fn work(&self, index: usize, n: usize, task: &mut dyn FnMut(usize)) {
+        let size = self.cursors.len();
+        let chunk = (n / (size * 8)).clamp(1, CHUNK);
+        for k in 0..size {
+            let owner = (index + k) % size;
+            let (start, end) = (n * owner / size, n * (owner + 1) / size);
+            let cursor: &AtomicUsize = &self.cursors[owner].0;
+            loop {
+                let from = start + cursor.fetch_add(chunk, Ordering::Relaxed);
+                if from >= end {
+                    break;
+                }
+                (from..end.min(from + chunk)).for_each(&mut *task);
+            }
+        }
+    }
+}
+
+/// Tells that a thread has ended its part, also when it panicked.
+struct Ended<'a>(&'a Shared);
+
+impl Drop for Ended<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.0.is_broken.store(true, Ordering::Relaxed);
+        }
+        let mut call = self.0.call();
+        call.working -= 1;
+        if call.working == 0 {
+            self.0.done.notify_all();
+        }
+    }
+}
+
+/// Waits until all threads have ended their part.
+struct Awaited<'a>(&'a Shared);
+
+impl Drop for Awaited<'_> {
+    fn drop(&mut self) {
+        let mut call = self.0.call();
+        while call.working > 0 {
+            call = self.0.done.wait(call).unwrap_or_else(PoisonError::into_inner);
+        }
+        call.task = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+    use std::sync::atomic::AtomicU64;
+
+    #[test]
+    fn every_number_is_done_once_in_every_call() {
+        for workers in [1, 2, 3, 8] {
+            let mut waiting = Waiting::new(workers);
+            for n in [0, 1, 2, 7, 300, 7] {
+                let done: Arc<Vec<AtomicU64>> =
+                    Arc::new((0..n).map(|_| AtomicU64::new(0)).collect());
+                let count = |done: &[AtomicU64], k: usize| {
+                    done[k].fetch_add(1, Ordering::Relaxed);
+                };
+                let theirs = Arc::clone(&done);
+                waiting.run(n, |k| count(&done, k), Arc::new(move |k| count(&theirs, k)));
+                assert!(done.iter().all(|done| done.load(Ordering::Relaxed) == 1));
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_of_a_call_is_kept_when_it_returns() {
+        let mut waiting = Waiting::new(3);
+        let lent = Arc::new(());
+        for _ in 0..50 {
+            let theirs = Arc::clone(&lent);
+            waiting.run(20, |_| (), Arc::new(move |_| drop(Arc::clone(&theirs))));
+            assert_eq!(Arc::strong_count(&lent), 1);
+        }
+    }
+
+    #[test]
+    fn a_bug_reaches_the_caller_and_the_next_call_works() {
+        let mut waiting = Waiting::new(3);
+        let fails = |k: usize| assert!(k > 1000, "a bug");
+        for _ in 0..3 {
+            let run = || waiting.run(100, fails, Arc::new(fails));
+            assert!(catch_unwind(AssertUnwindSafe(run)).is_err());
+            let done = Arc::new(AtomicU64::new(0));
+            let count = |done: &AtomicU64| {
+                done.fetch_add(1, Ordering::Relaxed);
+            };
+            let theirs = Arc::clone(&done);
+            waiting.run(100, |_| count(&done), Arc::new(move |_| count(&theirs)));
+            assert_eq!(done.load(Ordering::Relaxed), 100);
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! What a scenario was compiled from, so that another seed reads no file again.
+
+use super::{ChainFile, Compiled, Compiler};
+use crate::ground::Site;
+use crate::world::ChainWorld;
+use sidestep_kernel::stream::Streams;
+use sidestep_kernel::{InputError, Seed};
+use sidestep_scenario::{Head, Source};
+use std::sync::Arc;
+
+/// The sections of a scenario, and the ground that they name.
+#[derive(Debug)]
+pub(crate) struct Recipe<const D: usize> {
+    source: Source,
+    head: Head,
+    file: ChainFile<D>,
+    site: Option<Site>,
+}
+
+impl<const D: usize> Recipe<D> {
+    /// Returns the recipe of a scenario that was read; loads its ground.
+    ///
+    /// # Errors
+    /// When the ground cannot be loaded.
+    pub(super) fn new(source: &Source, head: Head, file: ChainFile<D>) -> Result<Self, InputError> {
+        let site = Compiler { source, head: &head, file: &file, site: None, known: None }.site()?;
+        Ok(Self { source: source.clone(), head, file, site })
+    }
+
+    /// Compiles it.
+    pub(super) fn compile(self) -> Result<Compiled<D>, InputError> {
+        let compiled = self.compiled(&self.head, None)?;
+        Ok(Compiled { recipe: Some(Arc::new(self)), ..compiled })
+    }
+
+    fn compiled(
+        &self,
+        head: &Head,
+        known: Option<&ChainWorld<D>>,
+    ) -> Result<Compiled<D>, InputError> {
+        let Self { source, file, site, .. } = self;
+        Compiler { source, head, file, site: site.as_ref(), known }.compile()
+    }
+}
+
+impl<const D: usize> ChainFile<D> {
+    /// Whether the seed decides where a chain starts.
+    pub(super) fn is_anywhere(&self) -> bool {
+        self.chains.0.iter().any(|section| section.get_ref().anywhere)
+    }
+}
+
+impl<const D: usize> Compiled<D> {
+    /// Returns the same scenario with another seed: what compiling it with that seed would give. Only what the
+    /// seed draws is made anew, random obstacles and chains that start anywhere; all else is shared.
+    /// `None` where no scenario was read.
+    ///
+    /// # Errors
+    /// When random obstacles or a chain find no place with this seed.
+    pub fn reseeded(&self, seed: u64) -> Option<Result<Self, InputError>> {
+        let recipe = self.recipe.as_ref()?;
+        if recipe.file.fields.0.is_empty() && !recipe.file.is_anywhere() {
+            let streams = Streams::new(Seed(seed));
+            let world = Arc::new(ChainWorld { streams, ..(*self.world).clone() });
+            return Some(Ok(Self { world, seed, ..self.clone() }));
+        }
+        let mut head = recipe.head.clone();
+        head.seed = seed;
+        let compiled = recipe.compiled(&head, Some(&self.world));
+        Some(compiled.map(|compiled| Self { recipe: self.recipe.clone(), ..compiled }))
+    }
+}

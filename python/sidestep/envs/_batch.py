@@ -1,0 +1,297 @@
+"""Many worlds at once: arrays with a row for each world, and Gymnasium's vector environment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv as GymnasiumVectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from .._native import Batch as Worlds
+from .._native import Scenario
+from ._parallel import (
+    MOST_SEED,
+    NOUNS,
+    ORDERS,
+    action_space,
+    orders_of,
+    rewards_of,
+    space_of,
+    wrong,
+)
+from ._rewards import Reward, earned
+
+Observations = dict[str, NDArray[Any]]
+Actions = NDArray[Any] | Mapping[str, NDArray[Any]]
+
+
+class Batch:
+    """Many worlds of one scenario, whose agents are decided together: arrays of the shape (worlds, agents, ...).
+
+    Args:
+        scenario: a ``Scenario``, a path or a dict.
+        worlds: number of worlds.
+        team: name or number of the team that acts; by default the only one that takes orders.
+        rewards: weights of named terms (``sidestep.envs.TERMS``), or a function of what the agents observed before and
+            after a step. It gets all agents of all worlds at once, one world after the other, and returns a
+            number for each.
+        orders: names of the orders that an action gives. One of them makes the action that order alone; several make
+            it a dict.
+        max_cycles: cycles of an episode; the scenario's own by default.
+        autoreset_mode: when a world whose episode has ended starts anew: in the next step, in the same step, or
+            not at all (``AutoresetMode`` of Gymnasium, or its value); then ``reset`` does with a mask.
+        copy: whether what is returned is the caller's. Without it the arrays are written anew two steps later.
+        workers: workers; each world is stepped by one of them.
+
+    Every world draws the seeds of its episodes from a generator of its own: with ``reset(seed=s)``, world ``k`` has the
+    episodes of a ``parallel_env`` that was reset with ``s + k``.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario | str | PathLike[str] | Mapping[str, Any],
+        worlds: int,
+        *,
+        team: str | int | None = None,
+        rewards: Mapping[str, float] | Reward | None = None,
+        orders: Sequence[str] | None = None,
+        max_cycles: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        copy: bool = True,
+        workers: int = 1,
+    ) -> None:
+        self.scenario = scenario if isinstance(scenario, Scenario) else Scenario(scenario)
+        if max_cycles is not None and max_cycles < 1:
+            raise wrong("max_cycles", f"{max_cycles} cycles are no episode", "give 1 or more")
+        modes = [mode.value for mode in AutoresetMode]
+        if not isinstance(autoreset_mode, AutoresetMode) and autoreset_mode not in modes:
+            remedy = f"one of {', '.join(modes)}"
+            raise wrong("autoreset_mode", f"there is no `{autoreset_mode}`", remedy)
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.max_cycles = self.scenario.cycles if max_cycles is None else max_cycles
+        self.worlds = Worlds(self.scenario, worlds, workers=workers)
+        self._number = self._acting(team)
+        its = self.worlds.teams[self._number]
+        world = self.scenario.world
+        wanted = [ORDERS[world]] if orders is None else orders
+        self._orders = orders_of(its, [wanted] if isinstance(wanted, str) else wanted)
+        self._reward = rewards_of(its, world, rewards)
+        self.agents = [f"{NOUNS[world]}_{agent}" for agent in its.agents]
+        self.single_observation_space = spaces.Dict(
+            {space.name: space_of(space) for space in its.observed}
+        )
+        self.single_action_space = action_space(self._orders)
+        each = [batch_space(self.single_observation_space, len(its)), batch_space(self.single_action_space, len(its))]
+        self.observation_space, self.action_space = (batch_space(space, worlds) for space in each)
+        self._shape = (worlds, len(its))
+        self._copy = copy
+        self._reals = [space.name for space in its.observed if space.dtype == "float64"]
+        # What was observed before and after a step, in turns; and the same as it is returned.
+        self._raw = [self.worlds.observe(self._number) for _ in range(2)]
+        self._cast = [
+            {name: np.zeros(raw[name].shape, np.float32) for name in self._reals} for raw in self._raw
+        ]
+        self._now = 0
+        self._rngs: list[np.random.Generator] = []
+        self._ended = np.ones(worlds, bool)
+
+    @property
+    def num_worlds(self) -> int:
+        """Number of worlds."""
+        return len(self.worlds)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Starts an episode in every world, and returns what is observed.
+
+        ``seed`` is one for each world, or that of world 0, whose followers have those that follow. With
+        ``options={"reset_mask": mask}`` only the worlds for which the mask is true start anew.
+        """
+        mask = self._mask(options)
+        n = self.num_worlds
+        seeds = [None] * n if seed is None else seed
+        if isinstance(seeds, (int, np.integer)):
+            seeds = [int(seeds) + k for k in range(n)]
+        if len(seeds) != n:
+            raise wrong("seed", f"{len(seeds)} seeds for {n} worlds", "give one for each world")
+        if not self._rngs:
+            self._rngs = [np.random.default_rng() for _ in range(n)]
+        for k, one in enumerate(seeds):
+            if one is not None and mask[k]:
+                self._rngs[k] = np.random.default_rng(one)
+        self._restart(mask)
+        return self._observed(), {}
+
+    def step(
+        self, actions: Actions
+    ) -> tuple[Observations, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """Orders an action of each agent in each world, and simulates one cycle.
+
+        Returns what is observed, rewards (worlds, agents), whether each world is over, and whether it was cut at its
+        last cycle (worlds,), and infos. A world whose episode has ended starts anew as ``autoreset_mode`` says: in
+        the next step its action counts for nothing and its rewards are 0; in the same step
+        ``infos["final_obs"]`` has what was observed at the end, of those worlds for which ``infos["_final_obs"]`` is true.
+        """
+        if not self._rngs:
+            raise wrong("step", "no episode goes on", "call reset first")
+        begins = self._ended
+        if begins.any():
+            if self.autoreset_mode is not AutoresetMode.NEXT_STEP:
+                which = int(np.flatnonzero(begins)[0])
+                remedy = 'call reset, e.g. with options={"reset_mask": terminations | truncations}'
+                raise wrong("step", f"the episode of world {which} has ended", remedy)
+        goes_on = ~begins
+        self._order(actions)
+        self.worlds.step(mask=goes_on)
+        if begins.any():
+            self._restart(begins)
+        else:
+            self._look()
+        gains = self._gains()
+        gains[begins] = 0.0
+        terminations = self.worlds.is_over & goes_on
+        truncations = ~terminations & goes_on & (self.worlds.cycles >= self.max_cycles)
+        self._ended = terminations | truncations
+        infos: dict[str, Any] = {}
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
+            ended = self._ended
+            infos = {"final_obs": self._observed(copy=True), "_final_obs": ended.copy()}
+            self._restart(ended)
+        return self._observed(), gains, terminations, truncations, infos
+
+    def close(self) -> None:
+        """Does nothing: worlds hold no files."""
+
+    def _acting(self, team: str | int | None) -> int:
+        teams = self.worlds.teams
+        ordered = [k for k, its in enumerate(teams) if its.ordered]
+        if not ordered:
+            remedy = "let its agents be decided from outside (`external`)"
+            raise wrong("scenario", "no agent of this scenario takes orders", remedy)
+        known = ", ".join(teams[k].name for k in ordered)
+        if team is None:
+            if len(ordered) > 1:
+                cause = f"{len(ordered)} teams take orders"
+                raise wrong("team", cause, f"name one of {known}; the others get no orders")
+            return ordered[0]
+        found = [k for k in ordered if team in (k, teams[k].name)]
+        if not found:
+            raise wrong("team", f"no team `{team}` takes orders", f"one of {known}")
+        return found[0]
+
+    def _mask(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
+        unknown = sorted(set(options or {}) - {"reset_mask"})
+        if unknown:
+            raise wrong(f"options.{unknown[0]}", "there is no such option", "the only one is reset_mask")
+        mask = (options or {}).get("reset_mask")
+        if mask is None:
+            return np.ones(self.num_worlds, bool)
+        mask = np.asarray(mask)
+        if mask.shape != (self.num_worlds,) or mask.dtype != bool or not mask.any():
+            remedy = f"give {self.num_worlds} truth values, at least one of them true"
+            raise wrong("options.reset_mask", "it says not which worlds start anew", remedy)
+        return mask
+
+    def _restart(self, mask: NDArray[np.bool_]) -> None:
+        seeds = np.zeros(self.num_worlds, np.uint64)
+        for k in np.flatnonzero(mask):
+            seeds[k] = self._rngs[k].integers(MOST_SEED)
+        self.worlds.reset(seeds, mask=mask)
+        self._ended = self._ended & ~mask
+        self._look()
+
+    def _look(self) -> None:
+        self._now = 1 - self._now
+        self.worlds.observe(self._number, out=self._raw[self._now])
+
+    def _observed(self, copy: bool = False) -> Observations:
+        raw, cast = self._raw[self._now], self._cast[self._now]
+        for name in self._reals:
+            np.copyto(cast[name], raw[name], casting="same_kind")
+        found = {**raw, **cast}
+        return {name: array.copy() for name, array in found.items()} if copy or self._copy else found
+
+    def _order(self, actions: Actions) -> None:
+        if not isinstance(actions, Mapping):
+            if len(self._orders) > 1:
+                names = ", ".join(space.name for space in self._orders)
+                raise wrong("actions", "there are several orders", f"give a dict of {names}")
+            self.worlds.order(self._orders[0].name, np.asarray(actions), team=self._number)
+            return
+        known = {space.name for space in self._orders}
+        unknown, missing = sorted(set(actions) - known), sorted(known - set(actions))
+        if unknown or missing:
+            cause = f"there is no order `{unknown[0]}`" if unknown else f"`{missing[0]}` is missing"
+            raise wrong("actions", cause, f"give {', '.join(sorted(known))}")
+        for name, values in actions.items():
+            self.worlds.order(name, np.asarray(values), team=self._number)
+
+    def _gains(self) -> NDArray[np.float64]:
+        n = self._shape[0] * self._shape[1]
+        before, after = (
+            {name: array.reshape(n, *array.shape[2:]) for name, array in self._raw[k].items()}
+            for k in (1 - self._now, self._now)
+        )
+        return earned(self._reward, before, after, n).reshape(self._shape)
+
+
+class VectorEnv(GymnasiumVectorEnv[Any, Any, Any]):
+    """Gymnasium's vector environment of a scenario with one agent that takes orders.
+
+    It takes what :class:`Batch` takes, ``num_envs`` in place of ``worlds``; arrays have the shape (num_envs, ...).
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario | str | PathLike[str] | Mapping[str, Any],
+        num_envs: int,
+        **options: Any,
+    ) -> None:
+        self.batch = Batch(scenario, num_envs, **options)
+        if len(self.batch.agents) != 1:
+            cause = f"{len(self.batch.agents)} agents take orders"
+            raise wrong("scenario", cause, "use sidestep.envs.Batch for many, or leave one")
+        self.num_envs = num_envs
+        self.single_observation_space = self.batch.single_observation_space
+        self.single_action_space = self.batch.single_action_space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.metadata = {"autoreset_mode": self.batch.autoreset_mode, "render_modes": []}
+        self.render_mode = None
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Starts an episode in every environment; see :meth:`Batch.reset`."""
+        observed, infos = self.batch.reset(seed=seed, options=options)
+        return _of_one(observed), infos
+
+    def step(
+        self, actions: Actions
+    ) -> tuple[Observations, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """Orders an action in each environment, and simulates one cycle; see :meth:`Batch.step`."""
+        if isinstance(actions, Mapping):
+            given: Actions = {name: np.asarray(values)[:, None] for name, values in actions.items()}
+        else:
+            given = np.asarray(actions)[:, None]
+        observed, gains, terminations, truncations, ends = self.batch.step(given)
+        infos: dict[str, Any] = {}
+        if ends:
+            final = _of_one(ends["final_obs"])
+            for k in np.flatnonzero(ends["_final_obs"]):
+                last = {name: array[k] for name, array in final.items()}
+                infos = self._add_info(infos, {"final_obs": last, "final_info": {}}, int(k))
+        return _of_one(observed), gains[:, 0], terminations, truncations, infos
+
+
+def _of_one(observed: Observations) -> Observations:
+    return {name: array[:, 0] for name, array in observed.items()}

@@ -1,0 +1,305 @@
+//! Many worlds of one scenario, stepped together.
+
+use crate::arrays::numbers;
+use crate::error::{self, wrong};
+use crate::json::{list, to_python};
+use crate::scenario::{Made, Scenario, made};
+use crate::space::{Lent, Team, room};
+use numpy::{PyArray1, PyReadonlyArray1, PyUntypedArrayMethods, ToPyArray};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use sidestep::kernel::batch::{self, BatchError, Start};
+use sidestep::kernel::control;
+use sidestep::scenario::Source;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Time after which Python is asked for signals, between two cycles.
+const SLICE: Duration = Duration::from_millis(10);
+
+/// Many worlds of one scenario, each with a seed of its own, that step together.
+///
+/// Batch(scenario, worlds, *, workers=1, seeds=None): `scenario` is a Scenario, a path or a dict; `seeds` has one for each
+/// world, by default the scenario's and those that follow it. Arrays have a row for each world: (worlds, agents, ...).
+/// Each world has the bits of a `Simulation` with its seed, whatever the number of workers; nothing is recorded.
+///
+/// Python's lock is released while worlds advance, and Ctrl-C stops them between two cycles, all at the same one. A world that
+/// breaks off (which is a bug) is named, and the others go on once it has been reset.
+///
+/// >>> import sidestep
+/// >>> scenario = {"world": "robots", "map": {"ascii": "....."},
+/// ...             "robots": [{"count": 2, "behaviour": {"kind": "external"}}]}
+/// >>> batch = sidestep.Batch(scenario, 3, seeds=[5, 6, 7])
+/// >>> batch.order("action", [[0, 1], [1, 1], [0, 0]])
+/// >>> batch.step()
+/// >>> batch.observe()["at_boxes"].shape
+/// (3, 2, 2)
+#[pyclass(module = "sidestep", frozen)]
+pub(crate) struct Batch {
+    scenario: Arc<Made>,
+    /// Its teams, which never change.
+    teams: Vec<Arc<control::Team>>,
+    worlds: usize,
+    workers: usize,
+    batch: Mutex<batch::Batch>,
+}
+
+impl Batch {
+    /// Works with the worlds while other threads of Python go on.
+    fn with<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut batch::Batch) -> Result<T, BatchError> + Send,
+    ) -> PyResult<T> {
+        py.detach(|| {
+            let mut batch = self.batch.lock().unwrap_or_else(PoisonError::into_inner);
+            work(&mut batch).map_err(|e| told(&e))
+        })
+    }
+
+    fn named(&self, team: Option<&Bound<'_, PyAny>>) -> PyResult<(usize, &control::Team)> {
+        let (number, team) = crate::space::named(&self.teams, team)?;
+        Ok((number, &**team))
+    }
+
+    /// Returns a truth value for each world.
+    fn mask(&self, mask: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<bool>>> {
+        let Some(mask) = mask else { return Ok(None) };
+        let array: Option<PyReadonlyArray1<'_, bool>> = mask.extract().ok();
+        match array.filter(|array| array.len() == self.worlds) {
+            Some(array) => Ok(Some(array.as_array().to_vec())),
+            None => Err(self.wrong_rows("mask", "truth values", mask)),
+        }
+    }
+
+    /// Returns a seed for each world.
+    fn seeds_of(&self, seeds: &Bound<'_, PyAny>) -> PyResult<Vec<u64>> {
+        let given: Option<Vec<u64>> = whole(seeds);
+        given
+            .filter(|given| given.len() == self.worlds)
+            .ok_or_else(|| self.wrong_rows("seeds", "seeds", seeds))
+    }
+
+    fn wrong_rows(&self, key: &str, what: &str, given: &Bound<'_, PyAny>) -> PyErr {
+        let shape = given.getattr("shape").map(|shape| shape.to_string());
+        let found = shape.or_else(|_| given.len().map(|n| n.to_string()));
+        let found = found.unwrap_or_else(|_| given.to_string());
+        let cause = format!("there are {} worlds, and not {found} {what}", self.worlds);
+        wrong(key, cause, format!("give an array of {} {what}", self.worlds))
+    }
+}
+
+/// Returns whole numbers, of a list or an array.
+fn whole(values: &Bound<'_, PyAny>) -> Option<Vec<u64>> {
+    let values = match values.getattr("tolist") {
+        Ok(to_list) => to_list.call0().ok()?,
+        Err(_) => values.clone(),
+    };
+    values.extract().ok()
+}
+
+/// Returns the exception of a batch.
+fn told(error: &BatchError) -> PyErr {
+    match error {
+        BatchError::Start { world, seed, error } => {
+            let cause = format!("world {world} cannot start with seed {seed}: {}", error.cause());
+            wrong(error.place(), cause, error.remedy())
+        }
+        BatchError::Empty | BatchError::Shape { .. } => {
+            wrong("worlds", error.to_string(), "give worlds of one scenario, at least one")
+        }
+        BatchError::Broken { .. } => error::ReplayError::new_err(error.to_string()),
+        _ => error::OrderError::new_err(error.to_string()),
+    }
+}
+
+/// Returns the way to a world at its start: checkpoints are not made of it, so that all seeds share one text.
+fn start(scenario: &Arc<Made>) -> PyResult<Arc<Start>> {
+    let text = scenario.resolved()?.text.clone();
+    let source = Source { text, ..scenario.source.clone() };
+    let (own, scenario) = (scenario.compiled.plan().seed, Arc::clone(scenario));
+    Ok(Arc::new(move |seed| {
+        if seed == own {
+            return Ok(scenario.compiled.start(&source, 1));
+        }
+        let fresh = match scenario.compiled.reseeded(seed) {
+            Some(fresh) => fresh?,
+            None => scenario.compiled_with(seed)?,
+        };
+        Ok(fresh.start(&source, 1))
+    }))
+}
+
+#[pymethods]
+impl Batch {
+    #[new]
+    #[pyo3(signature = (scenario, worlds, *, workers=1, seeds=None))]
+    fn new(
+        py: Python<'_>,
+        scenario: &Bound<'_, PyAny>,
+        worlds: usize,
+        workers: usize,
+        seeds: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        if worlds == 0 {
+            return Err(wrong("worlds", "a batch of no worlds", "give 1 or more"));
+        }
+        if workers == 0 {
+            return Err(wrong("workers", "0 workers cannot simulate", "give 1 or more"));
+        }
+        let scenario = made(scenario)?;
+        let first = scenario.compiled.plan().seed;
+        let seeds = match seeds {
+            None => (0..worlds as u64).map(|k| first.wrapping_add(k)).collect(),
+            Some(seeds) => whole(seeds).filter(|seeds| seeds.len() == worlds).ok_or_else(|| {
+                let cause = format!("{worlds} worlds, and not as many seeds");
+                wrong("seeds", cause, format!("give {worlds} whole numbers of at least 0"))
+            })?,
+        };
+        let start = start(&scenario)?;
+        let made = py.detach(|| batch::Batch::new(start, &seeds, workers));
+        let batch = made.map_err(|e| told(&e))?;
+        let teams = batch.teams().iter().cloned().map(Arc::new).collect();
+        Ok(Self { scenario, teams, worlds, workers, batch: Mutex::new(batch) })
+    }
+
+    /// The scenario.
+    #[getter]
+    fn scenario(&self) -> Scenario {
+        Scenario(Arc::clone(&self.scenario))
+    }
+
+    /// Number of workers.
+    #[getter]
+    fn workers(&self) -> usize {
+        self.workers
+    }
+
+    /// The teams of each world: agents that observe, and are ordered, alike.
+    #[getter]
+    fn teams<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        list(py, self.teams.iter().cloned().map(Team))
+    }
+
+    /// The seed of each world (uint64).
+    #[getter]
+    fn seeds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u64>>> {
+        Ok(self.with(py, |batch| Ok(batch.seeds()))?.to_pyarray(py))
+    }
+
+    /// The cycles that each world has done (uint64).
+    #[getter]
+    fn cycles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u64>>> {
+        Ok(self.with(py, |batch| batch.cycles())?.to_pyarray(py))
+    }
+
+    /// Whether nothing can happen anymore, of each world (bool).
+    #[getter]
+    fn is_over<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        Ok(self.with(py, |batch| batch.is_over())?.to_pyarray(py))
+    }
+
+    /// Digest of the state of each world, in hexadecimal; orders that wait for the next step are not in it.
+    #[getter]
+    fn digests(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        self.with(py, |batch| batch.ask(|run| run.digest().to_string()))
+    }
+
+    /// Returns the measurements of each world so far, a list of dicts.
+    fn metrics(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let all = self.with(py, |batch| batch.ask(|run| run.metrics()))?;
+        to_python(py, &serde_json::Value::from(all))
+    }
+
+    /// Orders something of all agents of a team (by number or name) in all worlds for the next step: an array of the shape
+    /// (worlds, agents, ...), or one number for all.
+    ///
+    /// Raises OrderError; nobody is ordered anything then.
+    #[pyo3(signature = (name, values, *, team=None))]
+    fn order(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        values: &Bound<'_, PyAny>,
+        team: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let (number, team) = self.named(team)?;
+        let space = team.ordered.iter().find(|space| space.name == name);
+        let shape: Option<Vec<usize>> =
+            space.map(|space| [team.agents.len()].iter().chain(&space.shape).copied().collect());
+        let values = match &shape {
+            Some(shape) => numbers(py, name, values, self.worlds, Some(shape))?,
+            // Refused with the names of those that are known.
+            None => vec![0.0; self.worlds * team.agents.len()],
+        };
+        self.with(py, |batch| batch.order(number, name, values))
+    }
+
+    /// Advances all worlds by `cycles` cycles (one if not said), or those for which `mask` (bool, one for each
+    /// world) is true; orders to the others are dropped. A world that is over stays as it is.
+    ///
+    /// Raises ReplayError when a world breaks off; the others have advanced then.
+    #[pyo3(signature = (cycles=1, *, mask=None))]
+    fn step(&self, py: Python<'_>, cycles: u64, mask: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let mask = self.mask(mask)?;
+        let (mut left, mut at_once) = (cycles, 1);
+        loop {
+            let now = left.min(at_once);
+            let began = Instant::now();
+            self.with(py, |batch| batch.advance(now, mask.as_deref()))?;
+            left -= now;
+            if left == 0 {
+                return Ok(());
+            }
+            py.check_signals()?;
+            at_once = if began.elapsed() < SLICE / 2 { at_once * 2 } else { (at_once / 2).max(1) };
+        }
+    }
+
+    /// Returns what the agents of a team (by number or name) observe in all worlds before the next cycle: arrays by name, of the
+    /// shape (worlds, agents, ...). With `out`, arrays of an earlier call are written anew and returned.
+    #[pyo3(signature = (team=None, *, out=None))]
+    fn observe<'py>(
+        &self,
+        py: Python<'py>,
+        team: Option<&Bound<'py, PyAny>>,
+        out: Option<Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (number, team) = self.named(team)?;
+        let out = match out {
+            Some(out) => out,
+            None => room(py, team, self.worlds)?,
+        };
+        let mut lent = Lent::of(&out, team, self.worlds)?;
+        let cells = &mut lent.cells()?;
+        self.with(py, |batch| batch.observe(number, cells))?;
+        Ok(out)
+    }
+
+    /// Starts worlds anew with these seeds, one for each world; with `mask` (bool, one for each world) only those for which
+    /// it is true. Orders that wait are dropped.
+    ///
+    /// Raises InputError when a world cannot start with its seed; it stays as it was then.
+    #[pyo3(signature = (seeds, *, mask=None))]
+    fn reset(
+        &self,
+        py: Python<'_>,
+        seeds: &Bound<'_, PyAny>,
+        mask: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let (seeds, mask) = (self.seeds_of(seeds)?, self.mask(mask)?);
+        let wanted = |k: usize| mask.as_ref().is_none_or(|mask| mask[k]);
+        let seeds: Vec<Option<u64>> =
+            seeds.into_iter().enumerate().map(|(k, seed)| wanted(k).then_some(seed)).collect();
+        self.with(py, |batch| batch.restart(&seeds))
+    }
+
+    fn __len__(&self) -> usize {
+        self.worlds
+    }
+
+    fn __repr__(&self) -> String {
+        let name = self.scenario.compiled.plan().name;
+        format!("Batch({name}, {} worlds, {} workers)", self.worlds, self.workers)
+    }
+}
