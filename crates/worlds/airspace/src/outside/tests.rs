@@ -7,7 +7,7 @@ use crate::wish::Wish;
 use crate::{AirspaceRun, Scratch, airspace_run};
 use sidestep_kernel::control::{CellsMut, OrderBook, Orders, Team};
 use sidestep_kernel::math::cos;
-use sidestep_kernel::ports::{MemoryRecorder, Recorder, Values};
+use sidestep_kernel::ports::{MemoryRecorder, Recorder};
 use sidestep_kernel::{Cycle, Simulation, Slot};
 use sidestep_scenario::Source;
 use std::collections::BTreeMap;

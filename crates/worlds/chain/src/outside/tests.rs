@@ -2,7 +2,7 @@ use crate::ChainRun;
 use crate::rods::geometry::norm;
 use crate::scenario::AnyCompiled;
 use sidestep_kernel::control::{Bounds, CellsMut, OrderBook, Orders, Team};
-use sidestep_kernel::ports::{MemoryRecorder, Recorder, Values};
+use sidestep_kernel::ports::{MemoryRecorder, Recorder};
 use sidestep_kernel::view::{Kind, Value};
 use sidestep_kernel::{Cycle, Simulation};
 use sidestep_scenario::Source;

@@ -1,6 +1,6 @@
 use crate::{RobotsRun, robots_run};
 use sidestep_kernel::control::{CellsMut, OrderBook, Orders, Team};
-use sidestep_kernel::ports::{MemoryRecorder, Recorder, Values};
+use sidestep_kernel::ports::{MemoryRecorder, Recorder};
 use sidestep_kernel::{Cycle, EntityId, Simulation};
 use sidestep_scenario::Source;
 use std::collections::BTreeMap;
