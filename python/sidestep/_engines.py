@@ -152,8 +152,10 @@ class Crew:
             task.copies.remove(copy)
             try:
                 outcomes = copy.result()
-            except SidestepError:
-                raise
+            except SidestepError as error:
+                # Ray wraps what a task raises into its own traceback.
+                cause = getattr(error, "cause", None)
+                raise (cause if isinstance(cause, SidestepError) else error) from None
             except (Exception, BrokenExecutor) as error:
                 if task.copies:
                     continue
