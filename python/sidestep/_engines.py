@@ -253,6 +253,8 @@ class RayExecutor(Executor):
     def _stored(self, variant: int, bundle: Bundle) -> Any:
         known = self._scenarios.get(variant)
         if known is None or known[0] is not bundle:
+            if len(self._scenarios) >= KEPT_SCENARIOS:
+                self._scenarios.clear()
             known = (bundle, self._ray.put(bundle))
             self._scenarios[variant] = known
         return known[1]
