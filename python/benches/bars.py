@@ -2,19 +2,24 @@
 
     python python/benches/bars.py
 
-Needs polars for the table, and gymnasium and pettingzoo for the environments; leaves out what is not there.
+Needs polars for the table, and gymnasium and pettingzoo for the environments, and Ray for its tasks; leaves out what is not
+there.
 """
 
 from __future__ import annotations
 
+import importlib.util
+import multiprocessing
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 
 import sidestep
+from sidestep import _engines
 
 
 def robots(count: int, side: int, **keys: object) -> dict[str, object]:
@@ -144,6 +149,37 @@ def environments() -> None:
         told(f"PettingZoo, {count} agents: dicts per agent; agent-steps", figure, "1 us")
 
 
+def sweeps() -> None:
+    """Tasks of one cell each, on one process and on Ray; and longer ones on two processes against one."""
+    floor = {**robots(20, 40), "cycles": 3000}
+    floor["robots"] = [{"count": 20, "sensors": ["sonar-8"], "effector": "nomad"}]
+    spawn = multiprocessing.get_context("spawn")
+    usual, _engines.TASK_S = _engines.TASK_S, 0.0
+    with ProcessPoolExecutor(1, mp_context=spawn) as pool:
+        sidestep.sweep(floor, replicate=2, engine=pool)
+        took = sidestep.sweep(floor, replicate=60, engine=pool).told["took"]
+    told("a task of one run on a process, beside its simulation", overhead(took), "15 ms")
+    if importlib.util.find_spec("ray"):
+        ray = importlib.import_module("ray")
+        ray.init(num_cpus=1, include_dashboard=False, log_to_driver=False, object_store_memory=120_000_000)
+        sidestep.sweep(floor, replicate=2, engine="ray")
+        took = sidestep.sweep(floor, replicate=60, engine="ray").told["took"]
+        ray.shutdown()
+        told("a task of one run on Ray, beside its simulation", overhead(took), "15 ms")
+    _engines.TASK_S = usual
+    walls = []
+    for workers in (1, 2):
+        with ProcessPoolExecutor(workers, mp_context=spawn) as pool:
+            sidestep.sweep(floor, replicate=2 * workers, engine=pool)
+            swept = sidestep.sweep(floor, set={"cycles": 20_000}, replicate=40, engine=pool)
+        walls.append(swept.told["took"]["wall_s"])
+    told("a sweep on two processes against one", f"{walls[0] / walls[1]:.2f} times as fast", "1.8 times")
+
+
+def overhead(took: dict[str, float]) -> str:
+    return f"{took['overhead_ms_per_run']:.1f} ms (+ {took['simulation_s_per_run'] * 1e3:.0f} to run)"
+
+
 def loading() -> None:
     program = (
         "import time, numpy\n"
@@ -161,5 +197,5 @@ def loading() -> None:
 
 
 if __name__ == "__main__":
-    for part in (steps, behavior, resets, table, environments, loading):
+    for part in (steps, behavior, resets, table, environments, sweeps, loading):
         part()

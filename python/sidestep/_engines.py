@@ -152,8 +152,10 @@ class Crew:
             task.copies.remove(copy)
             try:
                 outcomes = copy.result()
-            except SidestepError:
-                raise
+            except SidestepError as error:
+                # Ray wraps what a task raises into its own traceback.
+                cause = getattr(error, "cause", None)
+                raise (cause if isinstance(cause, SidestepError) else error) from None
             except (Exception, BrokenExecutor) as error:
                 if task.copies:
                     continue
@@ -251,6 +253,8 @@ class RayExecutor(Executor):
     def _stored(self, variant: int, bundle: Bundle) -> Any:
         known = self._scenarios.get(variant)
         if known is None or known[0] is not bundle:
+            if len(self._scenarios) >= KEPT_SCENARIOS:
+                self._scenarios.clear()
             known = (bundle, self._ray.put(bundle))
             self._scenarios[variant] = known
         return known[1]

@@ -11,8 +11,8 @@ use sidestep::collectives::{
     optimize,
 };
 use sidestep::kernel::Seed;
+use sidestep::kernel::interrupt::{self, Interrupt};
 use sidestep::kernel::stream::{Purpose, Streams};
-use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Mutex, PoisonError};
 
@@ -101,6 +101,24 @@ impl Options {
     }
 }
 
+/// Does work that heeds an interrupt; `None` if that was raised.
+fn heeding<T>(interrupt: &Interrupt, work: impl FnOnce() -> T) -> Option<T> {
+    let heeded = || {
+        let _heeded = interrupt.heeded_here();
+        work()
+    };
+    match catch_unwind(AssertUnwindSafe(heeded)) {
+        Ok(done) => Some(done),
+        Err(payload) if interrupt.explains(payload.as_ref()) => None,
+        Err(payload) => resume_unwind(payload),
+    }
+}
+
+/// Returns the error of an optimization that was interrupted: whoever interrupted it has raised another one before.
+fn interrupted() -> PyErr {
+    wrong("minimize", "it was interrupted", "call it again")
+}
+
 /// Minimizes a sum over players and pairs: what `sidestep.collectives.minimize` stands on.
 #[pyfunction]
 pub(crate) fn minimize_pairs<'py>(
@@ -135,18 +153,9 @@ pub(crate) fn minimize_pairs<'py>(
     }
     let (settings, uniform) = (options.settings()?, options.uniform());
     let outcome = attended(py, |watcher| {
-        let interrupt = watcher.interrupt();
-        let run = || {
-            let _heeded = interrupt.heeded_here();
-            optimize(&game, &settings, uniform)
-        };
-        let ended = catch_unwind(AssertUnwindSafe(run));
-        ended.map(Some).unwrap_or_else(|payload: Box<dyn Any + Send>| {
-            if interrupt.explains(payload.as_ref()) { None } else { resume_unwind(payload) }
-        })
+        heeding(&watcher.interrupt(), || optimize(&game, &settings, uniform))
     })?;
-    // Nothing interrupts it but a signal, which is raised before.
-    let outcome = outcome.ok_or_else(|| wrong("minimize", "was interrupted", "call it again"))?;
+    let outcome = outcome.ok_or_else(interrupted)?;
     let cost = game.cost(&outcome.joint);
     told(py, &outcome, cost)
 }
@@ -156,6 +165,7 @@ struct Objective {
     strategies: Vec<usize>,
     cost: Py<PyAny>,
     raised: Mutex<Option<PyErr>>,
+    interrupt: Interrupt,
 }
 
 impl Objective {
@@ -177,14 +187,12 @@ impl Game for Objective {
     }
 
     fn cost(&self, joint: &[usize]) -> f64 {
-        let mut raised = self.raised.lock().unwrap_or_else(PoisonError::into_inner);
-        // The first exception is raised when the rounds are over, which take no time any more.
-        if raised.is_some() {
-            return 0.0;
-        }
         self.ask(joint).unwrap_or_else(|error| {
-            *raised = Some(error);
-            0.0
+            *self.raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+            // It unwinds: there is no cost to go on with.
+            self.interrupt.raise();
+            interrupt::look();
+            f64::NAN
         })
     }
 }
@@ -201,11 +209,17 @@ pub(crate) fn minimize_objective<'py>(
         let remedy = "give a number of strategies for each player, 1 or more";
         return Err(wrong("strategies", "a player has no strategy", remedy));
     }
-    let game = Objective { strategies, cost: objective, raised: Mutex::default() };
-    let outcome = optimize(&game, &options.settings()?, options.uniform());
-    let cost = game.cost(&outcome.joint);
+    let (raised, interrupt) = (Mutex::default(), Interrupt::default());
+    let game = Objective { strategies, cost: objective, raised, interrupt };
+    let (settings, uniform) = (options.settings()?, options.uniform());
+    let found = heeding(&game.interrupt, || {
+        let outcome = optimize(&game, &settings, uniform);
+        let cost = game.cost(&outcome.joint);
+        (outcome, cost)
+    });
     let raised = game.raised.into_inner().unwrap_or_else(PoisonError::into_inner);
     raised.map_or(Ok(()), Err)?;
+    let (outcome, cost) = found.ok_or_else(interrupted)?;
     told(py, &outcome, cost)
 }
 

@@ -6,6 +6,7 @@
 //! batch.rs       many worlds that step together
 //! space.rs       what goes in and out       decide.rs  functions in Python that decide
 //! table.rs       rows -> Arrow, NumPy       arrays.rs  ids, values and columns of bodies
+//! read.rs        folders -> tables
 //! sweep.rs       many runs, by threads or by others
 //! arm.rs         kinematics of arms         learn.rs   error models from tables
 //! stats.rs       intervals and pairs        collectives.rs  games of tables or of an objective
@@ -23,6 +24,7 @@ mod decide;
 mod error;
 mod json;
 mod learn;
+mod read;
 mod scenario;
 mod simulation;
 mod space;
@@ -52,6 +54,8 @@ mod _native {
     #[pymodule_export]
     use super::learn::{Learned, learn_effector, learn_sensor};
     #[pymodule_export]
+    use super::read::read;
+    #[pymodule_export]
     use super::stats::{
         stats_correlation, stats_holm, stats_mean, stats_next, stats_paired, stats_quantile,
         stats_share,
@@ -59,7 +63,7 @@ mod _native {
     #[pymodule_export]
     use super::sweep::{compare_methods, run_sweep, run_task};
     #[pymodule_export]
-    use super::table::{Table, read};
+    use super::table::Table;
     use pyo3::prelude::*;
 
     #[pymodule_init]

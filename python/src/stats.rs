@@ -62,7 +62,7 @@ pub(crate) fn stats_quantile(values: Values<'_>, q: f64) -> (Option<f64>, Ends, 
     (statistics::percentile(&sorted, q), interval.map(|found| ends(found.interval)), coverage)
 }
 
-/// What two treatments of the same cases come to.
+/// The outcome of two treatments of the same cases.
 type Compared = (
     (usize, usize, Option<f64>),
     (Ends, Ends),

@@ -7,7 +7,7 @@ use crate::table::Table;
 use crate::watch::{Signals, attended};
 use pyo3::exceptions::PyStopIteration;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyMapping};
+use pyo3::types::PyMapping;
 use serde_json::json;
 use sidestep::experiment::sweep::{
     Cell, Changes, Factor, Outcome, Plan, RunColumn, Setting, Sweep, Wanted,
@@ -23,7 +23,7 @@ use sidestep_session::sweep::{self, Crew, Deal, Ended, Engine, Folder, Taken, Ta
 use sidestep_session::{Error, Watcher, build};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The changes of a sweep, as `sidestep.sweep` hands them over.
@@ -125,7 +125,7 @@ fn of_any(of: &Bound<'_, PyAny>) -> PyResult<(Sweep, Option<Arc<Made>>)> {
     Ok((Sweep::of_source(made.source.clone()), Some(made)))
 }
 
-/// What a sweep has come to.
+/// The outcome of a sweep.
 struct Came {
     results: Vec<RunColumn>,
     timings: Vec<RunColumn>,
@@ -337,35 +337,5 @@ fn resume_unless<T>(
     match interrupt.explains(payload.as_ref()) {
         true => Ok(Vec::new()),
         false => resume_unwind(payload),
-    }
-}
-
-/// Returns the tables of a sweep's folder: of the runs that are finished.
-pub(crate) fn read_folder<'py>(
-    py: Python<'py>,
-    folder: &Path,
-    wanted: Option<&Vec<String>>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let finished = py.detach(|| {
-        let folder = Folder::open(folder)?;
-        let finished = sweep::finished(&folder)?;
-        Ok((finished.table, folder.plan().world.clone()))
-    });
-    let (table, world) = finished.map_err(|e: InputError| error::input(&e))?;
-    let dict = PyDict::new(py);
-    for (name, columns) in [("results", table.results()), ("timings", table.timings())] {
-        if wanted.is_none_or(|wanted| wanted.iter().any(|other| other == name)) {
-            let columns = columns.into_iter().cloned().collect();
-            dict.set_item(name, Table::of_runs(name, columns, &world)?)?;
-        }
-    }
-    let unknown =
-        wanted.into_iter().flatten().find(|name| !["results", "timings"].contains(&name.as_str()));
-    match unknown {
-        Some(name) => {
-            let cause = format!("there is no table `{name}`");
-            Err(wrong(&folder.display().to_string(), cause, "a sweep has results and timings"))
-        }
-        None => Ok(dict),
     }
 }

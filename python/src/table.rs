@@ -2,7 +2,6 @@
 
 use crate::error;
 use crate::json::list;
-use crate::sweep::read_folder;
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::types::UInt32Type;
 use arrow_array::{
@@ -21,10 +20,7 @@ use sidestep::experiment::sweep::{Role, RunColumn};
 use sidestep::kernel::ports::{ColumnSpec, ColumnType, TableSchema, Values};
 use sidestep::scenario::{Meaning, told};
 use sidestep::worlds::WORLDS;
-use sidestep_record::{read_table, tables};
-use sidestep_session::sweep::Folder;
 use std::collections::HashMap;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Rows of one table: what a run records.
@@ -273,33 +269,4 @@ where
     }
     let real: Vec<f64> = array.iter().map(|cell| cell.map_or(f64::NAN, &as_real)).collect();
     real.to_pyarray(py).into_bound_py_any(py)
-}
-
-/// Returns the tables of a run folder or a sweep's folder by name.
-///
-/// ``tables`` names those that are wanted; all of them otherwise. A table of a run that has not ended reaches to its last
-/// checkpoint. A sweep has ``results``, one row per finished run, and ``timings``.
-///
-/// Raises InputError when there is no such folder or table, or a file is damaged.
-#[pyfunction]
-#[pyo3(signature = (folder, tables=None))]
-pub(crate) fn read<'py>(
-    py: Python<'py>,
-    folder: PathBuf,
-    tables: Option<Vec<String>>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let wanted = tables;
-    if Folder::is_at(&folder) {
-        return read_folder(py, &folder, wanted.as_ref());
-    }
-    let read = || {
-        let names = wanted.map_or_else(|| self::tables(&folder), Ok)?;
-        names.into_iter().map(|name| read_table(&folder, &name, ..).map(|t| (name, t))).collect()
-    };
-    let read: Result<Vec<_>, sidestep::kernel::InputError> = py.detach(read);
-    let dict = PyDict::new(py);
-    for (name, table) in read.map_err(|e| error::input(&e))? {
-        dict.set_item(name, Table::new(table.schema, table.columns)?)?;
-    }
-    Ok(dict)
 }

@@ -5,10 +5,6 @@ use sidestep::kernel::Interrupt;
 use sidestep_session::{Error, Watcher};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
-
-/// Time that a cycle has to come to its end.
-const PATIENCE: Duration = Duration::from_secs(1);
 
 /// A watcher that stops a run between two cycles when Python has a signal to handle.
 #[derive(Debug, Default)]
@@ -51,16 +47,11 @@ struct Attended {
 }
 
 impl Attended {
-    /// Asks Python for signals; the first stops the work, at once where its cycles take long.
-    fn look(&self, stopped: &mut Option<Instant>) {
-        match stopped {
-            Some(since) if since.elapsed() > PATIENCE => self.interrupt.raise(),
-            Some(_) => {}
-            None if self.signals.go_on() => {}
-            None => {
-                self.is_over.store(true, Ordering::Relaxed);
-                *stopped = Some(Instant::now());
-            }
+    /// Asks Python for signals; the first stops the work at once, also within a cycle: what is half done is not kept.
+    fn look(&self) {
+        if !self.signals.go_on() {
+            self.is_over.store(true, Ordering::Relaxed);
+            self.interrupt.raise();
         }
     }
 }
@@ -88,9 +79,6 @@ pub(crate) fn attended<T: Send>(
     work: impl FnOnce(&dyn Watcher) -> T + Send,
 ) -> PyResult<T> {
     let watcher = Attended::default();
-    let done = py.detach(|| {
-        let mut stopped = None;
-        sidestep_session::attended(|| work(&watcher), || watcher.look(&mut stopped))
-    });
+    let done = py.detach(|| sidestep_session::attended(|| work(&watcher), || watcher.look()));
     watcher.signals.into_result().map(|()| done)
 }

@@ -326,6 +326,22 @@ def sent_tasks(floor):
     return sent
 
 
+class Wrapped(sidestep.InputError):
+    """What Ray makes of an error: of its type, with a traceback as its text."""
+
+    def __init__(self, error):
+        super().__init__("Traceback ...")
+        self.cause = error
+
+
+@pytest.mark.parametrize("wrap", [lambda error: error, Wrapped])
+def test_what_a_task_refuses_ends_the_sweep_with_its_own_words(wrap, floor):
+    refused = sidestep.InputError("s.toml: no start\n  help: make room")
+    with pytest.raises(sidestep.InputError, match="no start") as caught:
+        sidestep.sweep(floor, engine=Broken(wrap(refused)))
+    assert caught.value is refused
+
+
 def test_a_task_that_is_run_twice_gives_the_same_outcomes_to_the_bit(floor):
     def outcomes(task):
         return [{**json.loads(text), "costs": None} for text in run_task(*task)]
@@ -338,6 +354,9 @@ def test_tasks_refuse_the_sweep_of_another_build(floor):
     build, scenarios, cells = sent_tasks(floor)[0]
     with pytest.raises(sidestep.InputError, match="install the same build"):
         run_task(build + "x", scenarios, cells)
+    with ProcessPoolExecutor(1, mp_context=SPAWN) as pool:
+        refused = pool.submit(run_task, build + "x", scenarios, cells).exception()
+    assert isinstance(refused, sidestep.InputError) and refused.place == "a task of a sweep"
 
 
 def test_a_task_is_as_long_as_the_first_ones_took(floor):

@@ -1,4 +1,4 @@
-//! What a finished sweep tells programs.
+//! The results of a finished sweep, for programs.
 
 use super::effort::Effort;
 use super::journey::{Done, Folder};

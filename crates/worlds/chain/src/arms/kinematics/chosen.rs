@@ -28,7 +28,7 @@ pub struct ArmFiles {
 pub struct ChosenArm {
     /// The robot.
     pub model: Model,
-    /// What the SRDF file says.
+    /// The content of the SRDF file.
     pub semantics: Option<Semantics>,
     /// The joints from base to tip.
     pub chain: SerialChain,

@@ -1,0 +1,69 @@
+//! Tables of folders: of runs, and of sweeps.
+
+use crate::error::{self, wrong};
+use crate::table::Table;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use sidestep::kernel::InputError;
+use sidestep_record::{read_table, tables as tables_of};
+use sidestep_session::sweep::{self, Folder};
+use std::path::{Path, PathBuf};
+
+/// Returns the tables of a run folder or a sweep's folder by name.
+///
+/// ``tables`` names those that are wanted; all of them otherwise. A table of a run that has not ended reaches to its last
+/// checkpoint. A sweep has ``results``, one row per finished run, and ``timings``.
+///
+/// Raises InputError when there is no such folder or table, or a file is damaged.
+#[pyfunction]
+#[pyo3(signature = (folder, tables=None))]
+pub(crate) fn read<'py>(
+    py: Python<'py>,
+    folder: PathBuf,
+    tables: Option<Vec<String>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let wanted = tables;
+    if Folder::is_at(&folder) {
+        return read_folder(py, &folder, wanted.as_ref());
+    }
+    let read = || {
+        let names = wanted.map_or_else(|| tables_of(&folder), Ok)?;
+        names.into_iter().map(|name| read_table(&folder, &name, ..).map(|t| (name, t))).collect()
+    };
+    let read: Result<Vec<_>, sidestep::kernel::InputError> = py.detach(read);
+    let dict = PyDict::new(py);
+    for (name, table) in read.map_err(|e| error::input(&e))? {
+        dict.set_item(name, Table::new(table.schema, table.columns)?)?;
+    }
+    Ok(dict)
+}
+
+/// Returns the tables of a sweep's folder: of the runs that are finished.
+fn read_folder<'py>(
+    py: Python<'py>,
+    folder: &Path,
+    wanted: Option<&Vec<String>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let finished = py.detach(|| {
+        let folder = Folder::open(folder)?;
+        let finished = sweep::finished(&folder)?;
+        Ok((finished.table, folder.plan().world.clone()))
+    });
+    let (table, world) = finished.map_err(|e: InputError| error::input(&e))?;
+    let dict = PyDict::new(py);
+    for (name, columns) in [("results", table.results()), ("timings", table.timings())] {
+        if wanted.is_none_or(|wanted| wanted.iter().any(|other| other == name)) {
+            let columns = columns.into_iter().cloned().collect();
+            dict.set_item(name, Table::of_runs(name, columns, &world)?)?;
+        }
+    }
+    let unknown =
+        wanted.into_iter().flatten().find(|name| !["results", "timings"].contains(&name.as_str()));
+    match unknown {
+        Some(name) => {
+            let cause = format!("there is no table `{name}`");
+            Err(wrong(&folder.display().to_string(), cause, "a sweep has results and timings"))
+        }
+        None => Ok(dict),
+    }
+}
