@@ -10,79 +10,21 @@
 //! A world knows nothing of the others, so the number of workers changes no bit. One that breaks off is
 //! named; the others are whole.
 
+mod error;
+mod world;
+
 use crate::control::{CellsMut, OrderError, Orders, Team};
 use crate::digest::Digest;
 use crate::error::InputError;
 use crate::simulation::Simulation;
 use crate::units::Cycle;
 use crate::workers::Waiting;
-use std::any::Any;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+pub use error::BatchError;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use world::World;
 
 /// Makes a simulation at its start from a seed.
 pub type Start = dyn Fn(u64) -> Result<Box<dyn Simulation>, InputError> + Send + Sync;
-
-/// A reason why a batch could not do something.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum BatchError {
-    /// A batch of no worlds.
-    #[error("a batch of no worlds; give at least one seed")]
-    Empty,
-    /// Too few or too many values, one for each world.
-    #[error("a batch of {worlds} worlds needs {worlds} {what}, not {found}")]
-    Worlds {
-        /// Number of worlds.
-        worlds: usize,
-        /// The noun for the values.
-        what: &'static str,
-        /// Number of values.
-        found: usize,
-    },
-    /// A world cannot start.
-    #[error("world {world} cannot start with seed {seed}: {error}")]
-    Start {
-        /// Its index.
-        world: usize,
-        /// Its seed.
-        seed: u64,
-        /// The reason.
-        error: InputError,
-    },
-    /// A world whose agents observe, or are ordered, otherwise than those of the first.
-    #[error("world {world} has other teams than world 0; a batch is of worlds of one shape")]
-    Shape {
-        /// Its index.
-        world: usize,
-    },
-    /// An order that cannot be obeyed; no world was ordered anything.
-    #[error("world {world}: {error}")]
-    Order {
-        /// Index of the world.
-        world: usize,
-        /// The reason.
-        error: OrderError,
-    },
-    /// A team that is not there, or room of another shape.
-    #[error(transparent)]
-    Room(#[from] OrderError),
-    /// A world that broke off: it has no state until it is restarted.
-    #[error(
-        "world {world} (seed {seed}) broke off after cycle {cycle}, which is a bug: {cause}; the other worlds \
-         are whole, restart this one"
-    )]
-    Broken {
-        /// Its index.
-        world: usize,
-        /// Its seed.
-        seed: u64,
-        /// Cycles that it had done before.
-        cycle: Cycle,
-        /// The message of the panic.
-        cause: String,
-    },
-}
 
 /// Many simulations of one scenario.
 pub struct Batch {
@@ -99,30 +41,12 @@ struct Shared {
     worlds: Vec<Mutex<World>>,
 }
 
-/// One of the worlds.
-struct World {
-    seed: u64,
-    /// `None` for one that broke off, or never started.
-    run: Option<Box<dyn Simulation>>,
-    /// What went wrong in it.
-    error: Option<BatchError>,
-    /// What its agents observe, for the caller to take.
-    room: Vec<Cells>,
-    has_observed: bool,
-}
-
 /// An order to all agents of a team in all worlds.
 #[derive(Debug, Clone)]
 struct Noted {
     team: usize,
     order: String,
     values: Vec<f64>,
-}
-
-/// Values of one space.
-enum Cells {
-    Whole(Vec<i64>),
-    Real(Vec<f64>),
 }
 
 impl Batch {
@@ -134,14 +58,11 @@ impl Batch {
         if seeds.is_empty() {
             return Err(BatchError::Empty);
         }
-        let world = |&seed: &u64| {
-            let (run, error, room) = (None, None, Vec::new());
-            Mutex::new(World { seed, run, error, room, has_observed: false })
-        };
+        let world = |&seed: &u64| Mutex::new(World::new(seed));
         let shared = Arc::new(Shared { start, worlds: seeds.iter().map(world).collect() });
         let (crew, orders) = (Waiting::new(workers), Vec::new());
         let mut batch = Self { shared, crew, teams: Arc::default(), orders };
-        batch.each(|world, index, shared| world.restart(index, world.seed, shared, None));
+        batch.each(|world, index, shared| world.restart(index, world.seed, &*shared.start, None));
         batch.told()?;
         let first = batch.world(0);
         let teams: Arc<[Team]> = first.run.as_ref().map_or(&[][..], |run| run.teams()).into();
@@ -274,7 +195,7 @@ impl Batch {
         let (seeds, teams) = (seeds.to_vec(), Arc::clone(&self.teams));
         self.each(move |world, index, shared| {
             if let Some(seed) = seeds[index] {
-                world.restart(index, seed, shared, Some(&teams));
+                world.restart(index, seed, &*shared.start, Some(&teams));
             }
         });
         let refused = self.first_error(|error| !matches!(error, BatchError::Broken { .. }));
@@ -398,104 +319,6 @@ impl Shared {
     }
 }
 
-impl World {
-    /// Returns the error of a world without a run.
-    fn unfit(&self, index: usize) -> BatchError {
-        self.error.clone().unwrap_or_else(|| BatchError::Broken {
-            world: index,
-            seed: self.seed,
-            cycle: 0,
-            cause: "it never started".into(),
-        })
-    }
-
-    /// Works with the run; keeps the error, and drops the run if it panics.
-    fn guarded(
-        &mut self,
-        index: usize,
-        work: impl FnOnce(&mut dyn Simulation) -> Result<(), OrderError>,
-    ) {
-        let Some(run) = self.run.as_deref_mut() else { return };
-        let cycle = run.cycle();
-        match catch_unwind(AssertUnwindSafe(|| work(run))) {
-            Ok(Ok(())) => {}
-            Ok(Err(error)) => self.error = Some(BatchError::Order { world: index, error }),
-            Err(payload) => {
-                self.run = None;
-                let (seed, cause) = (self.seed, message(&*payload));
-                self.error = Some(BatchError::Broken { world: index, seed, cycle, cause });
-            }
-        }
-    }
-
-    /// Starts the world anew; it stays as it is where that fails.
-    fn restart(&mut self, index: usize, seed: u64, shared: &Shared, teams: Option<&[Team]>) {
-        let started = catch_unwind(AssertUnwindSafe(|| (shared.start)(seed)));
-        let refused = match started {
-            Ok(Ok(run)) if teams.is_some_and(|teams| *run.teams() != *teams) => {
-                BatchError::Shape { world: index }
-            }
-            Ok(Ok(run)) => {
-                (self.run, self.seed, self.error) = (Some(run), seed, None);
-                return;
-            }
-            Ok(Err(error)) => BatchError::Start { world: index, seed, error },
-            Err(payload) => {
-                let (cycle, cause) = (0, message(&*payload));
-                self.run = None;
-                BatchError::Broken { world: index, seed, cycle, cause }
-            }
-        };
-        // Of one that is broken the older reason is what restarting it did not mend.
-        self.error = Some(refused);
-    }
-
-    /// Observes into its own room.
-    fn look(&mut self, index: usize, team: usize, spaces: &[(bool, usize)]) {
-        let mut room = std::mem::take(&mut self.room);
-        if room.len() != spaces.len() || !room.iter().zip(spaces).all(|(room, &s)| room.fits(s)) {
-            room = spaces.iter().map(|&space| Cells::new(space)).collect();
-        }
-        let mut cells: Vec<CellsMut<'_>> = room.iter_mut().map(Cells::cells).collect();
-        self.guarded(index, |run| run.observe(team, &mut cells));
-        (self.room, self.has_observed) = (room, true);
-    }
-
-    /// Copies what it has observed into its part of the caller's room.
-    fn hand_over(&mut self, parts: &mut [CellsMut<'_>]) {
-        if !std::mem::take(&mut self.has_observed) {
-            return;
-        }
-        for (from, to) in self.room.iter().zip(parts) {
-            match (from, to) {
-                (Cells::Whole(from), CellsMut::Whole(to)) => to.copy_from_slice(from),
-                (Cells::Real(from), CellsMut::Real(to)) => to.copy_from_slice(from),
-                _ => {}
-            }
-        }
-    }
-}
-
-impl Cells {
-    fn new((is_whole, length): (bool, usize)) -> Self {
-        if is_whole { Self::Whole(vec![0; length]) } else { Self::Real(vec![0.0; length]) }
-    }
-
-    fn fits(&self, (is_whole, length): (bool, usize)) -> bool {
-        match self {
-            Self::Whole(cells) => is_whole && cells.len() == length,
-            Self::Real(cells) => !is_whole && cells.len() == length,
-        }
-    }
-
-    fn cells(&mut self) -> CellsMut<'_> {
-        match self {
-            Self::Whole(cells) => CellsMut::Whole(cells),
-            Self::Real(cells) => CellsMut::Real(cells),
-        }
-    }
-}
-
 /// Returns one world's part of the room of all.
 fn part<'a>(room: &'a mut [CellsMut<'_>], lengths: &[usize], index: usize) -> Vec<CellsMut<'a>> {
     let range = |length: usize| index * length..(index + 1) * length;
@@ -504,11 +327,4 @@ fn part<'a>(room: &'a mut [CellsMut<'_>], lengths: &[usize], index: usize) -> Ve
         CellsMut::Real(room) => CellsMut::Real(&mut room[range(length)]),
     };
     room.iter_mut().zip(lengths).map(one).collect()
-}
-
-/// Returns the message of a panic.
-fn message(payload: &(dyn Any + Send)) -> String {
-    let text = payload.downcast_ref::<&str>().map(|text| (*text).to_string());
-    let text = text.or_else(|| payload.downcast_ref::<String>().cloned());
-    text.unwrap_or_else(|| "without a message".into())
 }

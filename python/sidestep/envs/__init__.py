@@ -1,5 +1,6 @@
-"""Environments for reinforcement learning from any scenario whose agents take orders: PettingZoo's ``ParallelEnv``, many worlds
-at once as arrays (``Batch``), and Gymnasium's ``VectorEnv``.
+"""Environments for reinforcement learning from any scenario whose agents take orders.
+
+PettingZoo's ``ParallelEnv``, many worlds at once as arrays (``Batch``), and Gymnasium's ``VectorEnv`` of one agent.
 
 Needs the extra ``rl``: ``pip install 'sidestep[rl]'``.
 

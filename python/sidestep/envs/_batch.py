@@ -86,8 +86,10 @@ class Batch:
             {space.name: space_of(space) for space in its.observed}
         )
         self.single_action_space = action_space(self._orders)
-        each = [batch_space(self.single_observation_space, len(its)), batch_space(self.single_action_space, len(its))]
-        self.observation_space, self.action_space = (batch_space(space, worlds) for space in each)
+        singles = (self.single_observation_space, self.single_action_space)
+        self.observation_space, self.action_space = (
+            batch_space(batch_space(space, len(its)), worlds) for space in singles
+        )
         self._shape = (worlds, len(its))
         self._copy = copy
         self._reals = [space.name for space in its.observed if space.dtype == "float64"]

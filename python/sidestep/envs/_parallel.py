@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import repeat
 from os import PathLike
 from typing import Any, Literal
 
@@ -113,6 +114,8 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         self._names = [[f"{NOUNS[world]}_{agent}" for agent in team.agents] for _, team in self._teams]
         self.possible_agents = [name for names in self._names for name in names]
         self.agents: list[str] = []
+        # While an episode goes on, all of them act.
+        self._playing = frozenset(self.possible_agents)
         self.observation_spaces: dict[str, spaces.Space[Any]] = {}
         self.action_spaces: dict[str, spaces.Space[Any]] = {}
         for (_, team), names, chosen in zip(self._teams, self._names, self._orders, strict=True):
@@ -158,9 +161,12 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         """Orders an action of each agent, and simulates one cycle."""
         if not self.agents:
             raise wrong("step", "no episode goes on", "call reset first")
-        unknown = sorted(set(actions) - set(self.agents))
-        if unknown:
-            raise wrong("actions", f"there is no agent `{unknown[0]}`", "name those of `agents`")
+        if len(actions) != len(self.agents) or actions.keys() != self._playing:
+            unknown = sorted(set(actions) - self._playing)
+            if unknown:
+                raise wrong("actions", f"there is no agent `{unknown[0]}`", "name those of `agents`")
+            missing = next(agent for agent in self.agents if agent not in actions)
+            raise wrong("actions", f"`{missing}` has none", "give one for each agent")
         for (k, team), names, chosen in zip(self._teams, self._names, self._orders, strict=True):
             self._order(k, team, names, chosen, actions)
         self.sim.step()
@@ -215,13 +221,9 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         chosen: list[Space],
         actions: Mapping[str, Any],
     ) -> None:
-        missing = [name for name in names if name not in actions]
-        if missing:
-            raise wrong("actions", f"`{missing[0]}` has none", "give one for each agent")
+        given = list(map(actions.__getitem__, names))
         for space in chosen:
-            values = [
-                actions[name] if len(chosen) == 1 else actions[name][space.name] for name in names
-            ]
+            values = given if len(chosen) == 1 else [action[space.name] for action in given]
             self.sim.order(space.name, np.asarray(values), team=number)
 
     def _observed(self) -> list[dict[str, NDArray[Any]]]:
@@ -236,8 +238,9 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
                 else arrays[space.name].astype(np.float32)
                 for space in team.observed
             }
-            for row, name in enumerate(names):
-                agents[name] = {key: array[row] for key, array in cast.items()}
+            # Rows of all arrays at once, without a line of Python for each agent: that takes several times as long.
+            rows = map(zip, repeat(tuple(cast)), zip(*cast.values(), strict=True))
+            agents.update(zip(names, map(dict, rows), strict=True))
         return agents
 
 

@@ -1,0 +1,66 @@
+//! Reasons why a batch could not do something.
+
+use crate::control::OrderError;
+use crate::error::InputError;
+use crate::units::Cycle;
+
+/// A reason why a batch could not do something.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BatchError {
+    /// A batch of no worlds.
+    #[error("a batch of no worlds; give at least one seed")]
+    Empty,
+    /// Too few or too many values, one for each world.
+    #[error("a batch of {worlds} worlds needs {worlds} {what}, not {found}")]
+    Worlds {
+        /// Number of worlds.
+        worlds: usize,
+        /// The noun for the values.
+        what: &'static str,
+        /// Number of values.
+        found: usize,
+    },
+    /// A world cannot start.
+    #[error("world {world} cannot start with seed {seed}: {error}")]
+    Start {
+        /// Its index.
+        world: usize,
+        /// Its seed.
+        seed: u64,
+        /// The reason.
+        error: InputError,
+    },
+    /// A world whose agents observe, or are ordered, otherwise than those of the first.
+    #[error("world {world} has other teams than world 0; a batch is of worlds of one shape")]
+    Shape {
+        /// Its index.
+        world: usize,
+    },
+    /// An order that cannot be obeyed; no world was ordered anything.
+    #[error("world {world}: {error}")]
+    Order {
+        /// Index of the world.
+        world: usize,
+        /// The reason.
+        error: OrderError,
+    },
+    /// A team that is not there, or room of another shape.
+    #[error(transparent)]
+    Room(#[from] OrderError),
+    /// A world that broke off: it has no state until it is restarted.
+    #[error(
+        "world {world} (seed {seed}) broke off after cycle {cycle}, which is a bug: {cause}; the other worlds \
+         are whole, restart this one"
+    )]
+    Broken {
+        /// Its index.
+        world: usize,
+        /// Its seed.
+        seed: u64,
+        /// Cycles that it had done before.
+        cycle: Cycle,
+        /// The message of the panic.
+        cause: String,
+    },
+}

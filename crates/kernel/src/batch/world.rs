@@ -1,0 +1,141 @@
+//! One world of a batch: its run, what its agents observe, and what went wrong in it.
+
+use super::{BatchError, Start};
+use crate::control::{CellsMut, OrderError, Team};
+use crate::simulation::Simulation;
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// One of the worlds.
+pub(super) struct World {
+    pub(super) seed: u64,
+    /// `None` for one that broke off, or never started.
+    pub(super) run: Option<Box<dyn Simulation>>,
+    /// What went wrong in it.
+    pub(super) error: Option<BatchError>,
+    /// What its agents observe, for the caller to take.
+    room: Vec<Cells>,
+    has_observed: bool,
+}
+
+/// Values of one space.
+enum Cells {
+    Whole(Vec<i64>),
+    Real(Vec<f64>),
+}
+
+impl World {
+    /// Returns a world that has not started.
+    pub(super) fn new(seed: u64) -> Self {
+        Self { seed, run: None, error: None, room: Vec::new(), has_observed: false }
+    }
+
+    /// Returns the error of a world without a run.
+    pub(super) fn unfit(&self, index: usize) -> BatchError {
+        self.error.clone().unwrap_or_else(|| BatchError::Broken {
+            world: index,
+            seed: self.seed,
+            cycle: 0,
+            cause: "it never started".into(),
+        })
+    }
+
+    /// Works with the run; keeps the error, and drops the run if it panics.
+    pub(super) fn guarded(
+        &mut self,
+        index: usize,
+        work: impl FnOnce(&mut dyn Simulation) -> Result<(), OrderError>,
+    ) {
+        let Some(run) = self.run.as_deref_mut() else { return };
+        let cycle = run.cycle();
+        match catch_unwind(AssertUnwindSafe(|| work(run))) {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => self.error = Some(BatchError::Order { world: index, error }),
+            Err(payload) => {
+                self.run = None;
+                let (seed, cause) = (self.seed, message(&*payload));
+                self.error = Some(BatchError::Broken { world: index, seed, cycle, cause });
+            }
+        }
+    }
+
+    /// Starts the world anew; it stays as it is where that fails.
+    pub(super) fn restart(
+        &mut self,
+        index: usize,
+        seed: u64,
+        start: &Start,
+        teams: Option<&[Team]>,
+    ) {
+        let started = catch_unwind(AssertUnwindSafe(|| start(seed)));
+        let refused = match started {
+            Ok(Ok(run)) if teams.is_some_and(|teams| *run.teams() != *teams) => {
+                BatchError::Shape { world: index }
+            }
+            Ok(Ok(run)) => {
+                (self.run, self.seed, self.error) = (Some(run), seed, None);
+                return;
+            }
+            Ok(Err(error)) => BatchError::Start { world: index, seed, error },
+            Err(payload) => {
+                let (cycle, cause) = (0, message(&*payload));
+                self.run = None;
+                BatchError::Broken { world: index, seed, cycle, cause }
+            }
+        };
+        // Of one that is broken the older reason is what restarting it did not mend.
+        self.error = Some(refused);
+    }
+
+    /// Observes into its own room.
+    pub(super) fn look(&mut self, index: usize, team: usize, spaces: &[(bool, usize)]) {
+        let mut room = std::mem::take(&mut self.room);
+        if room.len() != spaces.len() || !room.iter().zip(spaces).all(|(room, &s)| room.fits(s)) {
+            room = spaces.iter().map(|&space| Cells::new(space)).collect();
+        }
+        let mut cells: Vec<CellsMut<'_>> = room.iter_mut().map(Cells::cells).collect();
+        self.guarded(index, |run| run.observe(team, &mut cells));
+        (self.room, self.has_observed) = (room, true);
+    }
+
+    /// Copies what it has observed into its part of the caller's room.
+    pub(super) fn hand_over(&mut self, parts: &mut [CellsMut<'_>]) {
+        if !std::mem::take(&mut self.has_observed) {
+            return;
+        }
+        for (from, to) in self.room.iter().zip(parts) {
+            match (from, to) {
+                (Cells::Whole(from), CellsMut::Whole(to)) => to.copy_from_slice(from),
+                (Cells::Real(from), CellsMut::Real(to)) => to.copy_from_slice(from),
+                _ => {}
+            }
+        }
+    }
+}
+
+impl Cells {
+    fn new((is_whole, length): (bool, usize)) -> Self {
+        if is_whole { Self::Whole(vec![0; length]) } else { Self::Real(vec![0.0; length]) }
+    }
+
+    fn fits(&self, (is_whole, length): (bool, usize)) -> bool {
+        match self {
+            Self::Whole(cells) => is_whole && cells.len() == length,
+            Self::Real(cells) => !is_whole && cells.len() == length,
+        }
+    }
+
+    fn cells(&mut self) -> CellsMut<'_> {
+        match self {
+            Self::Whole(cells) => CellsMut::Whole(cells),
+            Self::Real(cells) => CellsMut::Real(cells),
+        }
+    }
+}
+
+/// Returns the message of a panic.
+fn message(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<&str>().map(|text| (*text).to_string());
+    let text = text.or_else(|| payload.downcast_ref::<String>().cloned());
+    text.unwrap_or_else(|| "without a message".into())
+}
