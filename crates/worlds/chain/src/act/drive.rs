@@ -87,6 +87,9 @@ impl<const D: usize> Acting<'_, D> {
                 if self.has_arrived(task, navigator) {
                     return Wish::Done;
                 }
+                if let Some(to) = self.back_at_its_robot(task, step_m) {
+                    return Wish::Go(to);
+                }
                 self.steered(task, navigator).map_or(Wish::Rest, Wish::Steer)
             }
             Driver::Wander(rule) => self.wandering(rule, at, step_m),
