@@ -2,13 +2,14 @@
 //! followers and this world (slides E2, K5 to K7).
 
 use super::Acting;
+use super::wheels::SAME_RAD;
 use crate::events::EventKind;
 use crate::formation::{Robot, Robots};
 use crate::rods::geometry::{Point, distance, dot, in_dimensions, scaled, sub};
 use crate::swarm::drive::Pose;
 use crate::swarm::follower::{Follower, Goal};
 use crate::swarm::laser::Body as Seen;
-use sidestep_kernel::math::atan2;
+use sidestep_kernel::math::{atan2, wrap_angle};
 
 impl<const D: usize> Acting<'_, D> {
     /// Moves the robots of a swarm toward their connectors. All perceive each other as they were
@@ -51,9 +52,13 @@ impl<const D: usize> Acting<'_, D> {
 
     /// Puts the robot of a navigator where its wheels have taken it.
     fn carry(&mut self, k: usize) {
+        let Some(leader) = self.body.driving.leader else { return };
         let [x, y, _] = self.body.driving.ahead;
         let at = in_dimensions(self.body.chain.points()[k]);
-        self.body.robots[k].pose = Pose { at, heading_rad: atan2(y, x) };
+        let ahead_rad = atan2(y, x);
+        let turns = wrap_angle(ahead_rad - leader.pose.heading_rad).abs() > SAME_RAD;
+        let heading_rad = if turns { leader.pose.heading_rad } else { ahead_rad };
+        self.body.robots[k].pose = Pose { at, heading_rad };
     }
 
     fn follow_one(&mut self, follower: &Follower, k: usize, others: &[Seen]) {

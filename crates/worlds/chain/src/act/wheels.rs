@@ -8,7 +8,7 @@ use crate::navigate::{Goal, Navigator};
 use crate::rods::geometry::{Point, distance, in_dimensions, towards};
 use crate::swarm::drive::{Pose, Wheels};
 use crate::swarm::follower::pace;
-use sidestep_kernel::math::{cos, sin};
+use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
 
 /// Time for which a leader stands and waits for a robot that is late, s.
 const WAITS_S: f64 = 3.0;
@@ -17,6 +17,9 @@ const WAITS_S: f64 = 3.0;
 const GOES_ON: f64 = 0.25;
 /// Part of the gap to another robot that a leader leaves in a cycle: the other one may take a fifth of it.
 const LEFT_TO_OTHERS: f64 = 0.25;
+
+/// Angle between two headings that differ by rounding at most.
+pub(super) const SAME_RAD: f64 = 1e-9;
 
 impl<const D: usize> Acting<'_, D> {
     /// Whether a navigator has reached its goal.
@@ -56,6 +59,25 @@ impl<const D: usize> Acting<'_, D> {
         let (at, robot) = (self.body.chain.points()[k], in_dimensions(leader.pose.at));
         let has_fled = self.scratch.escaped.get(k) != self.scratch.before.get(k);
         (at != robot).then(|| if has_fled { at } else { towards(at, robot, step_m) })
+    }
+
+    /// Returns the heading to turn to in this cycle where a navigator's robot faces elsewhere than it did when
+    /// its own wheels led, because it followed its connector since.
+    pub(super) fn faces_elsewhere(&self, navigator: &Navigator) -> Option<f64> {
+        let leader = self.body.driving.leader.filter(|_| self.spec.robots.is_some())?;
+        let [x, y, _] = self.body.driving.ahead;
+        let off_rad = wrap_angle(atan2(y, x) - leader.pose.heading_rad);
+        let most = navigator.drive.max_wheel_m_s();
+        let most_rad = navigator.drive.turn_rad_s(Wheels::new(-most, most)) * self.world.dt_s;
+        let turn_rad = off_rad.clamp(-most_rad, most_rad);
+        (off_rad.abs() > SAME_RAD).then(|| wrap_angle(leader.pose.heading_rad + turn_rad))
+    }
+
+    /// Turns a navigator's robot on the spot.
+    pub(super) fn face(&mut self, heading_rad: f64) {
+        if let Some(leader) = &mut self.body.driving.leader {
+            leader.pose.heading_rad = heading_rad;
+        }
     }
 
     /// Moves an initiator on wheels; one whose way is blocked may turn on the spot.

@@ -36,26 +36,26 @@ impl<const D: usize> Compiler<'_, D> {
             };
             return Err(self.source.error(at, cause, remedy));
         }
+        self.targets_are_on_its_line(section, task, start)
+    }
+
+    /// Refuses targets where the connector that leads may never be.
+    fn targets_are_on_its_line(
+        &self,
+        section: &Spanned<TaskSection<D>>,
+        task: &Task<D>,
+        start: &Chain<D>,
+    ) -> Result<(), InputError> {
         let Driver::Targets(targets) = &task.driver else { return Ok(()) };
-        let off_m = |p| distance(connector.mobility.project(p, start.points()[k]), p);
-        let is_off = |p: &_| off_m(*p) > targets.tolerance_m;
-        match targets
-            .places
-            .iter()
-            .position(is_off)
-            .filter(|_| connector.mobility != Mobility::Free)
-        {
-            None => Ok(()),
-            Some(i) => {
-                let off_m = off_m(targets.places[i]);
-                let cause =
-                    format!("target {i} is {off_m:.4} m off the places where connector {k} may be");
-                let at = self.source.within(section.span(), &["targets_m"]);
-                let remedy =
-                    "give targets where its mobility allows it, or let another connector lead";
-                Err(self.source.error(at, cause, remedy))
-            }
-        }
+        let (k, mobility) = (task.agent, start.connectors()[task.agent].mobility);
+        let off_m = |p| distance(mobility.project(p, start.points()[k]), p);
+        let is_off = |p: &_| mobility != Mobility::Free && off_m(*p) > targets.tolerance_m;
+        let Some(i) = targets.places.iter().position(is_off) else { return Ok(()) };
+        let off_m = off_m(targets.places[i]);
+        let cause = format!("target {i} is {off_m:.4} m off the places where connector {k} may be");
+        let at = self.source.within(section.span(), &["targets_m"]);
+        let remedy = "give targets where its mobility allows it, or let another connector lead";
+        Err(self.source.error(at, cause, remedy))
     }
 }
 

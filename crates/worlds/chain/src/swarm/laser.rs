@@ -125,7 +125,6 @@ impl Laser {
         self.read_beams().for_each(|beam| scan.ranges_m[beam] = self.range_m);
         let turn = [cos(pose.heading_rad), sin(pose.heading_rad)];
         let near = around(pose.at, self.range_m);
-        let moves = |o: &Obstacle<2>| o.velocity_m_s != [0.0; 2];
         let mut some_move = false;
         obstacles.visit(&near, |o| match moves(o) {
             true => some_move = true,
@@ -134,17 +133,7 @@ impl Laser {
         for body in bodies.into_iter().filter(|body| body.bounds().meets(&near)) {
             self.look(pose, turn, &body.core, body.radius_m, scan);
         }
-        scan.meets_mover.clear();
-        if some_move {
-            scan.still_m.clone_from(&scan.ranges_m);
-            obstacles.visit(&near, |o| {
-                if moves(o) {
-                    self.look(pose, turn, &o.core, o.radius_m, scan);
-                }
-            });
-            let nearer = scan.ranges_m.iter().zip(&scan.still_m).map(|(with, still)| with < still);
-            scan.meets_mover.extend(nearer);
-        }
+        self.look_at_movers(pose, turn, obstacles, some_move, scan);
         if scan.keeps_truth {
             scan.true_m.clone_from(&scan.ranges_m);
         }
@@ -155,6 +144,29 @@ impl Laser {
                 *range_m = (*range_m + error_m).clamp(0.0, self.range_m);
             }
         }
+    }
+
+    /// Shortens the beams that meet something that moves, if anything does, and notes which they are.
+    fn look_at_movers(
+        &self,
+        pose: &Pose,
+        turn: Point<2>,
+        obstacles: &Obstacles<2>,
+        some_move: bool,
+        scan: &mut Scan,
+    ) {
+        scan.meets_mover.clear();
+        if !some_move {
+            return;
+        }
+        scan.still_m.clone_from(&scan.ranges_m);
+        obstacles.visit(&around(pose.at, self.range_m), |o| {
+            if moves(o) {
+                self.look(pose, turn, &o.core, o.radius_m, scan);
+            }
+        });
+        let nearer = scan.ranges_m.iter().zip(&scan.still_m).map(|(with, still)| with < still);
+        scan.meets_mover.extend(nearer);
     }
 
     /// Returns the beams it reads, from the rightmost to the leftmost.
@@ -266,6 +278,10 @@ impl Laser {
         let is_seen = sees_all || (-side <= first && last <= side);
         (first <= last && is_seen).then_some(first..=last)
     }
+}
+
+fn moves(o: &Obstacle<2>) -> bool {
+    o.velocity_m_s != [0.0; 2]
 }
 
 fn last_beam(angle_rad: f64, step_rad: f64) -> usize {
