@@ -13,6 +13,7 @@ mod shapes;
 pub mod srdf;
 #[cfg(test)]
 pub(crate) mod tests;
+mod tip;
 mod tree;
 
 pub use shapes::{Collision, Shape, Solid, Solids};

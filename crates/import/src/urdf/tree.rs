@@ -140,21 +140,4 @@ impl Model {
         }
         (0..self.links.len()).filter(|&link| !is_parent[link]).collect()
     }
-
-    /// Returns the leaf with the most moving joints on its path from the root; of several the first
-    /// in the file.
-    pub fn default_tip(&self) -> usize {
-        let moving = |tip: usize| {
-            let way = self.way(self.root, tip).expect("every link hangs on the root");
-            way.iter().filter(|&&joint| self.joints[joint].kind.has_one_value()).count()
-        };
-        let mut best = (self.root, 0);
-        for leaf in self.leaves() {
-            let count = moving(leaf);
-            if count > best.1 || best.0 == self.root {
-                best = (leaf, count);
-            }
-        }
-        best.0
-    }
 }

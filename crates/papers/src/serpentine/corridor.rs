@@ -57,6 +57,16 @@ pub(super) const CLEARANCE: Column =
     column("min_clearance_m", "clearance, mm", |r| Value::Maybe(r.least("min_clearance_m")))
         .shown(|c| c.mm("min_clearance_m"));
 
+/// Least distance between parts of a chain that are no neighbors; below 0 where they crossed.
+pub(super) const OWN_PARTS: Column =
+    column("min_own_gap_m", "own parts, mm", |r| Value::Maybe(r.least("min_own_gap_m")))
+        .shown(|c| c.mm("min_own_gap_m"));
+
+/// Greatest speed of any connector.
+pub(super) const FASTEST: Column =
+    column("max_speed_m_s", "fastest part, m/s", |r| Value::Number(r.most("max_speed_m_s")))
+        .shown(|c| format!("{:.2}", c.number("max_speed_m_s")));
+
 /// Greatest amount by which a rod was outside its limits.
 pub(super) const ROD_VIOLATION: Column =
     column("rod_violation_m", "", |r| Value::Number(r.most("max_rod_violation_m")));

@@ -1,7 +1,7 @@
 //! Discs run into a chain on open ground, slower and faster than it (slides P2, N6): without a
 //! reaction, with one when touched, and with one before.
 
-use super::corridor::ROD_VIOLATION;
+use super::corridor::{FASTEST, OWN_PARTS, ROD_VIOLATION};
 use super::{Plan, SPEED_M_S};
 use crate::cells::{Cell, Columns, Value, column, figure, series};
 use crate::study::{Progress, Study, number};
@@ -39,8 +39,8 @@ const COLUMNS: Columns = Columns {
         column("stuck_percent", "no way out, %", |r| {
             r.mean_of(|run| run.percent("escapes.vetoes"))
         }),
-        column("max_speed_m_s", "fastest part, m/s", |r| Value::Number(r.most("max_speed_m_s")))
-            .shown(|c| format!("{:.2}", c.number("max_speed_m_s"))),
+        FASTEST,
+        OWN_PARTS,
         ROD_VIOLATION,
     ],
 };

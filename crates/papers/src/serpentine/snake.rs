@@ -1,7 +1,7 @@
 //! A snake of 450 and more connectors creeps at random through space (slides E1, V6, F4): among
 //! balls that stand, and balls that fly.
 
-use super::corridor::{CLEARANCE, ROD_VIOLATION};
+use super::corridor::{CLEARANCE, FASTEST, OWN_PARTS, ROD_VIOLATION};
 use super::{DT_S, Plan};
 use crate::cells::{Cell, Columns, Value, column};
 use crate::study::{Progress, Study, number};
@@ -31,6 +31,8 @@ const COLUMNS: Columns = Columns {
         column("penetrations", "steps inside", |r| r.sum("penetrations")),
         column("steps", "steps", |r| r.sum("steps")),
         CLEARANCE,
+        OWN_PARTS,
+        FASTEST,
         column("way_percent", "way, %", |r| r.mean_of(|run| 100.0 * run.or_zero("progress"))),
         ROD_VIOLATION,
     ],

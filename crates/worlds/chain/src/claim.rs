@@ -38,7 +38,12 @@ fn reach<const D: usize>(
     let way_m = match &world.escape {
         Some(escape) => escape.speed_max_m_s * world.dt_s,
         // A rod that turns aside for an obstacle can swing as far as its length to either side.
-        None => 2.0 * longest_m.min(world.rules.slave_step_max_m) + fastest_m_s * world.dt_s,
+        None => {
+            let led_m = fastest_m_s * world.dt_s;
+            let step_m = world.rules.step_m.unwrap_or(chain.step_m());
+            let slave_m = (led_m / step_m).ceil().max(1.0) * world.rules.slave_step_max_m;
+            2.0 * longest_m.min(slave_m) + led_m
+        }
     };
     let thrown_m = spec.changes.iter().map(|change| change.throws_m(now)).fold(0.0, f64::max);
     let back_m = body.scattered.as_ref().map_or(0.0, |s| s.speed_m_s * world.dt_s);

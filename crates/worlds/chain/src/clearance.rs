@@ -1,8 +1,11 @@
-//! Distances of a chain's parts from the obstacles around them.
+//! Distances of a chain's parts from the obstacles around them, and from each other.
 
 use super::rods::chain::Chain;
-use super::rods::geometry::{Bounds, Point, scaled, sub};
+use super::rods::geometry::{
+    Bounds, Point, between_segments, distance, nearest_on_segment, scaled, sub,
+};
 use super::rods::obstacle::Obstacles;
+use super::rods::own_body::OwnBody;
 
 /// The surroundings of a connector and of the rod behind it, as far as somebody looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,11 +70,99 @@ pub(crate) fn least_clearance<const D: usize>(
     least
 }
 
+/// Returns the least gap between two parts of a chain that are no neighbors, up to `within_m`; negative
+/// where they overlap. Neighbors are connectors of one rod, rods of one connector, and a connector and the
+/// two rods to each of its sides. `tree` is a buffer.
+pub(crate) fn own_gap_m<const D: usize>(
+    chain: &Chain<D>,
+    tree: &mut OwnBody<D>,
+    within_m: f64,
+) -> f64 {
+    let (points, connectors, rods) = (chain.points(), chain.connectors(), chain.rods());
+    let ends = |rod: usize| [points[rod], points[rod + 1]];
+    let thick_m = |rod: usize| connectors[rod].radius_m.max(connectors[rod + 1].radius_m);
+    tree.refit((0..rods.len()).map(|rod| Bounds::of(&ends(rod)).grown(thick_m(rod))));
+    let mut least_m = within_m;
+    for rod in 0..rods.len() {
+        let near = Bounds::of(&ends(rod)).grown((thick_m(rod) + least_m).max(0.0));
+        tree.visit(&near, |other| {
+            if other >= rod + 2 {
+                let apart_m = between_segments(ends(rod), ends(other)).distance_m;
+                least_m = least_m.min(apart_m - rods[rod].radius_m - rods[other].radius_m);
+            }
+            let is_last = other + 1 == rods.len();
+            for k in other..other + 1 + usize::from(is_last) {
+                let (at, radius_m) = (points[k], connectors[k].radius_m);
+                if k + 1 < rod || k > rod + 2 {
+                    let [a, b] = ends(rod);
+                    let apart_m = distance(at, nearest_on_segment(at, a, b));
+                    least_m = least_m.min(apart_m - radius_m - rods[rod].radius_m);
+                }
+                if k >= rod + 2 {
+                    let apart_m = distance(at, points[rod]);
+                    least_m = least_m.min(apart_m - radius_m - connectors[rod].radius_m);
+                }
+            }
+        });
+    }
+    least_m
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::rods::chain::{Connector, Rod};
     use crate::rods::obstacle::Obstacle;
+    use proptest::prelude::*;
+
+    /// The same by looking at every pair.
+    fn every_pair_m(chain: &Chain<2>) -> f64 {
+        let (points, connectors, rods) = (chain.points(), chain.connectors(), chain.rods());
+        let ends = |rod: usize| [points[rod], points[rod + 1]];
+        let mut least_m = f64::INFINITY;
+        for i in 0..rods.len() {
+            for j in i + 2..rods.len() {
+                let apart_m = between_segments(ends(i), ends(j)).distance_m;
+                least_m = least_m.min(apart_m - rods[i].radius_m - rods[j].radius_m);
+            }
+            for k in (0..points.len()).filter(|k| k + 1 < i || *k > i + 2) {
+                let [a, b] = ends(i);
+                let apart_m = distance(points[k], nearest_on_segment(points[k], a, b));
+                least_m = least_m.min(apart_m - connectors[k].radius_m - rods[i].radius_m);
+            }
+        }
+        for i in 0..points.len() {
+            for j in i + 2..points.len() {
+                let apart_m = distance(points[i], points[j]);
+                least_m = least_m.min(apart_m - connectors[i].radius_m - connectors[j].radius_m);
+            }
+        }
+        least_m
+    }
+
+    #[test]
+    fn parts_that_cross_overlap_by_their_thickness() {
+        let rod = Rod { min_m: 0.5, max_m: 2.0, radius_m: 0.02 };
+        let points = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.5, -0.5]];
+        let chain = Chain::new(points, vec![Connector::free(0.05); 4], vec![rod; 3]).unwrap();
+        let gap_m = own_gap_m(&chain, &mut OwnBody::default(), 1.0);
+        assert!((gap_m + 0.04).abs() < 1e-12, "{gap_m}");
+    }
+
+    proptest! {
+        #[test]
+        fn the_least_gap_of_a_chain_is_that_of_its_nearest_pair(
+            points in prop::collection::vec(prop::array::uniform2(-2.0..2.0f64), 3..14),
+            radius_m in 0.01..0.3f64, within_m in 0.01..1.0f64,
+        ) {
+            let n = points.len();
+            let rod = Rod { min_m: 1e-9, max_m: 9.0, radius_m: 0.2 * radius_m };
+            let chain = Chain::new(points, vec![Connector::free(radius_m); n], vec![rod; n - 1]);
+            let Ok(chain) = chain else { return Ok(()) };
+            let gap_m = own_gap_m(&chain, &mut OwnBody::default(), within_m);
+            prop_assert!((gap_m - every_pair_m(&chain).min(within_m)).abs() < 1e-12);
+        }
+    }
 
     #[test]
     fn gaps_are_told_of_each_connector_and_each_rod_with_the_way_to_what_is_there() {

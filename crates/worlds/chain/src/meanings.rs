@@ -71,6 +71,13 @@ pub(super) const MEANINGS: &[Meaning] = &[
         unit: "",
         meaning: "greatest speed of any connector",
     },
+    Meaning {
+        name: "min_own_gap_m",
+        words: "least distance of own parts",
+        unit: "",
+        meaning: "least distance between parts of a chain that are no neighbors; below 0 where they overlapped; none if \
+                  none came near",
+    },
     Meaning { name: "done", words: "tasks done", unit: "", meaning: "tasks done, targets reached" },
     Meaning {
         name: "reformed",

@@ -10,6 +10,9 @@ use super::swarm::leader::{Decision, LeaderState, Percept, Surroundings};
 use super::world::{ChainWorld, purpose};
 use sidestep_kernel::{Cycle, Slot};
 
+/// Time for which a navigator stands for what moves ahead before it takes that for a wall, s.
+const STANDS_S: f64 = 10.0;
+
 /// A worker's read-only look at a state that nobody changes meanwhile.
 pub(crate) struct Looking<'a, const D: usize> {
     pub(crate) world: &'a ChainWorld<D>,
@@ -40,7 +43,7 @@ impl<'a, const D: usize> Looking<'a, D> {
         let body = state.leading(slot as usize);
         let task = world.chains[slot as usize].tasks.get(body.driving.task as usize)?;
         let Driver::Navigate(navigator) = &task.driver else { return None };
-        let leader = body.leader(task);
+        let (leader, rested) = (body.leader(task), body.driving.rested);
         drop(body);
         self.see_others(slot, task.agent, navigator, &leader);
         self.scratch.gather(world, state, now, std::iter::empty());
@@ -48,7 +51,8 @@ impl<'a, const D: usize> Looking<'a, D> {
         let Scratch { obstacles, scan, seen, .. } = &mut *self.scratch;
         let target = navigator.goal.as_ref().and_then(Goal::target);
         let around = Surroundings { obstacles: obstacles.in_plane()?, bodies: seen, target };
-        let percept = navigator.leader.perceive(&leader.pose, &around, noise, scan);
+        let is_patient = world.starts_s(u64::from(rested)) < STANDS_S;
+        let percept = navigator.leader.perceive(&leader.pose, &around, noise, scan, is_patient);
         Some(Sight { navigator, agent: task.agent, leader, percept })
     }
 

@@ -49,7 +49,7 @@ mod tests {
         std::fs::write(folder.path().join("arm.urdf"), planar(4)).expect("written");
         let text = "format = 1\nworld = \"chain\"\n[chain]\ndimensions = 3\n[[chains]]\n\
                     arm = { urdf = \"arm.urdf\" }\nradius_m = 0.02\n\
-                    [[chains.tasks]]\nkind = \"targets\"\ntargets_m = [[0.3, 0.0, 0.8]]\nspeed_m_s = 0.2\n";
+                    [[chains.tasks]]\nkind = \"targets\"\nconnector = 3\ntargets_m = [[0.3, 0.0, 0.8]]\nspeed_m_s = 0.2\n";
         let source = Source::new("s.toml", text, folder.path());
         let compiled = Compiled::<3>::new(&source).expect("valid");
         let [told] = &remarks(&compiled)[..] else { panic!("one remark") };

@@ -6,6 +6,7 @@ use super::motion::escape::Escaper;
 use super::notes::Notes;
 use super::rods::geometry::{Point, in_dimensions};
 use super::rods::obstacle::{Obstacle, Obstacles};
+use super::rods::own_body::OwnBody;
 use super::rods::propagate::Propagator;
 use super::state::ChainState;
 use super::swarm::laser::{Body as Seen, Scan};
@@ -29,6 +30,8 @@ pub struct Scratch<const D: usize> {
     /// Robots around a robot.
     pub(crate) seen: Vec<Seen>,
     pub(crate) scan: Scan,
+    /// Boxes around a chain's rods.
+    pub(crate) own: OwnBody<D>,
     /// Positions before a cycle.
     pub(crate) before: Vec<Point<D>>,
     /// Least gap around a robot in this cycle, meters.
@@ -54,6 +57,7 @@ impl<const D: usize> Scratch<D> {
             has_others: false,
             seen: Vec::new(),
             scan: Scan::default(),
+            own: OwnBody::default(),
             before: Vec::new(),
             robots_gap_m: f64::INFINITY,
             escaped: Vec::new(),

@@ -98,7 +98,7 @@ fn motion(m: &Metrics) -> Lines {
         n => format!("{} steps with a part in an obstacle", grouped(n)),
     };
     let (moved, turned) = (m.moved_per_step, grouped(m.rotations));
-    vec![
+    let mut lines = vec![
         line("progress", format!("{:.1} %", 100.0 * m.progress)),
         line("vetoes", vetoes(m)),
         line("penetrations", penetrations),
@@ -106,7 +106,18 @@ fn motion(m: &Metrics) -> Lines {
         line("rods", rods(m.max_rod_violation_m)),
         line("effort", format!("{moved:.1} connectors moved per step, {turned} rods turned")),
         line("greatest speed", format!("{:.3} m/s", m.max_speed_m_s)),
-    ]
+    ];
+    lines.extend(m.min_own_gap_m.map(|gap_m| line("own parts", own_parts(gap_m))));
+    lines
+}
+
+/// Returns how near the parts of a chain came to each other.
+fn own_parts(gap_m: f64) -> String {
+    match gap_m {
+        overlap_m if overlap_m < -TOUCH_M => format!("overlapped by up to {} m", fixed(-gap_m, 4)),
+        touch_m if touch_m < TOUCH_M => "touched each other".into(),
+        _ => format!("at least {} m apart", fixed(gap_m, 4)),
+    }
 }
 
 /// Returns how well the robots of swarms kept to their connectors.

@@ -67,3 +67,56 @@ fn arms_of_3_to_11_links_in_the_plane_and_to_25_in_space_reach_all_targets_withi
     assert_all_reached::<2>(&[3, 7, 11]);
     assert_all_reached::<3>(&[3, 7, 11, 25]);
 }
+
+/// Returns a chain of five rods, the first connector of which is held, and that goes to places which the held
+/// one's places reach.
+fn held(mobility: &str) -> String {
+    format!(
+        "[[chains]]
+connectors = 6
+at_m = [5.0, 0.0]
+rod_m = 1.0
+[[chains.limits]]
+connector = 0
+mobility = {mobility}
+[[chains.tasks]]
+kind = \"targets\"
+connector = 5
+targets_m = [[-2.0, 2.0], [4.0, 3.0], [8.0, -2.0], [3.0, -4.0]]
+"
+    )
+}
+
+#[test]
+fn bases_on_a_rail_a_line_and_in_a_box_reach_all_that_they_can_with_the_same_bits() {
+    for mobility in [
+        "{ on_segment = [[0.0, 0.0], [6.0, 0.0]] }",
+        "{ on_plane = { normal = [0, 1], offset_m = 0 } }",
+        "{ in_box = [[0, -1], [6, 1]] }",
+    ] {
+        let text = held(mobility);
+        let mut run = run::<2>(&source(1, &text), 1);
+        advance_to(&mut run, 8000);
+        let metrics = run.metrics();
+        assert!(metrics.given_up.is_empty(), "{mobility}: {:?}", metrics.given_up);
+        assert_eq!(metrics.progress, 1.0, "{mobility}");
+        assert!(metrics.max_speed_m_s <= 1.0 + 1e-9, "twice the tool: {}", metrics.max_speed_m_s);
+        assert_d1::<2>(&text, 600, &[0, 300, 599]);
+    }
+}
+
+/// Wanderers among each other and pillars, whose rods turn aside: no part is thrown about.
+#[test]
+fn no_part_is_thrown_about_where_a_rod_turns_aside() {
+    let fastest_m_s = |text: &str| {
+        let mut run = run::<2>(&source(1, text), 1);
+        run.advance(600);
+        (run.metrics().max_speed_m_s, run.metrics().progress)
+    };
+    let (usual_m_s, progress) = fastest_m_s(SEVERAL);
+    // Steps of 2 cm at most, of 5 cm in a cycle, each with slaves up to four times as far.
+    assert!(usual_m_s <= 3.0 * 0.08 / 0.05 + 1e-9, "{usual_m_s} m/s for leaders at 1 m/s");
+    assert!(progress > 0.9, "{progress}");
+    let text = SEVERAL.replace("dt_s = 0.05", "dt_s = 0.05\nslave_step_max_m = inf");
+    assert!(fastest_m_s(&text).0 > usual_m_s, "there is a limit to keep to");
+}

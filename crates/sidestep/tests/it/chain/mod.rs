@@ -15,6 +15,7 @@ mod arms;
 mod bits;
 mod recount;
 mod told;
+mod wheels;
 
 /// Four chains that wander among pillars in a room of 5 m, and often come near each other.
 pub(crate) const SEVERAL: &str = "

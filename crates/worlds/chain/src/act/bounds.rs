@@ -55,11 +55,16 @@ impl<const D: usize> Acting<'_, D> {
         self.vetoed(&Veto { by, from, reason: Reason::StepLimit, obstacle: None, reached });
     }
 
-    /// Keeps a leader on wheels at its connector, wherever that was moved to.
+    /// Keeps a leader on wheels at its connector, wherever that was moved to; if it is a robot, it follows
+    /// on its wheels, from where it is.
     fn take_leader_along(&mut self) {
         let agent = self.task().map(|task| task.agent);
-        if let (Some(leader), Some(agent)) = (&mut self.body.driving.leader, agent) {
-            leader.pose.at = in_dimensions(self.body.chain.points()[agent]);
+        let (Some(leader), Some(agent)) = (&mut self.body.driving.leader, agent) else { return };
+        let at = in_dimensions(self.body.chain.points()[agent]);
+        match self.body.robots.get(agent) {
+            None => leader.pose.at = at,
+            Some(robot) if leader.pose.at != at => leader.pose = robot.pose,
+            Some(_) => {}
         }
     }
 }

@@ -24,6 +24,10 @@ enum Wish<const D: usize> {
     Follow,
     /// A robot on wheels at another pose.
     Steer(Pose),
+    /// The connector of a robot on wheels back toward its robot.
+    Return(Point<D>),
+    /// A robot on wheels with another heading, where it is.
+    Face(f64),
     /// The order of a caller.
     Obey(Errand<D>),
     /// Its task is done.
@@ -41,7 +45,13 @@ impl<const D: usize> Acting<'_, D> {
         self.note(|notes| notes.wish = Some(wanted));
         match wish {
             Wish::Rest => {}
-            Wish::Go(_) | Wish::Steer(_) if self.gives_way => self.give_way(task),
+            Wish::Go(_) | Wish::Return(_) | Wish::Steer(_) if self.gives_way => self.give_way(task),
+            Wish::Return(to) => {
+                let ahead = self.body.driving.ahead;
+                self.go(task, to);
+                self.body.driving.ahead = ahead;
+            }
+            Wish::Face(heading_rad) => self.face(heading_rad),
             Wish::Go(to) => {
                 self.go(task, to);
             }
@@ -62,6 +72,8 @@ impl<const D: usize> Acting<'_, D> {
             Wish::Rest => ("rest", None),
             Wish::Go(to) if self.gives_way => (WAIT, Some(to)),
             Wish::Go(to) => ("go", Some(to)),
+            Wish::Return(to) => ("go back to its robot", Some(to)),
+            Wish::Face(_) => ("turn to where it faced", None),
             Wish::Obey(errand) => {
                 of = errand.first;
                 (if self.gives_way { WAIT } else { "go, as ordered" }, Some(errand.to[0]))
@@ -86,6 +98,12 @@ impl<const D: usize> Acting<'_, D> {
             Driver::Navigate(navigator) => {
                 if self.has_arrived(task, navigator) {
                     return Wish::Done;
+                }
+                if let Some(to) = self.back_at_its_robot(task, step_m) {
+                    return Wish::Return(to);
+                }
+                if let Some(heading_rad) = self.faces_elsewhere(navigator) {
+                    return Wish::Face(heading_rad);
                 }
                 self.steered(task, navigator).map_or(Wish::Rest, Wish::Steer)
             }

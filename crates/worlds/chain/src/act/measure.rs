@@ -1,10 +1,15 @@
 //! Measures of a chain at the end of each of its cycles.
 
 use super::Acting;
-use crate::clearance::least_clearance;
+use crate::clearance::{least_clearance, own_gap_m};
 use crate::events::EventKind;
 use crate::metrics::PENETRATION_M;
 use crate::rods::geometry::distance;
+
+/// Most rods of a chain whose own parts are measured in each cycle,
+const MOST_LOOKED_AT: usize = 32;
+/// and the cycles between two measurements of longer ones.
+const LOOKS_EVERY: u64 = 16;
 
 impl<const D: usize> Acting<'_, D> {
     /// Measures the chain after its cycle.
@@ -19,6 +24,13 @@ impl<const D: usize> Acting<'_, D> {
         let is_whole = self.body.scattered.is_none();
         if is_whole {
             tally.max_rod_violation_m = tally.max_rod_violation_m.max(chain.max_rod_violation_m());
+        }
+        // Parts that cross stay so for long, so a long chain need not look every time.
+        let looks = chain.rods().len() <= MOST_LOOKED_AT || self.now.is_multiple_of(LOOKS_EVERY);
+        if is_whole && looks && self.world.rules.self_collision {
+            let within_m = tally.min_own_gap_m.min(look_m);
+            let gap_m = own_gap_m(chain, &mut self.scratch.own, within_m);
+            tally.min_own_gap_m = if gap_m < within_m { gap_m } else { tally.min_own_gap_m };
         }
         let (least_m, part) = least_clearance(chain, &self.scratch.obstacles, look_m, is_whole);
         if least_m < look_m {

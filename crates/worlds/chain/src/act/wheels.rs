@@ -5,10 +5,21 @@ use super::go::Went;
 use crate::driver::{Driver, Task};
 use crate::formation::Robot;
 use crate::navigate::{Goal, Navigator};
-use crate::rods::geometry::{Point, distance, in_dimensions};
-use crate::swarm::drive::Pose;
+use crate::rods::geometry::{Point, distance, in_dimensions, towards};
+use crate::swarm::drive::{Pose, Wheels};
 use crate::swarm::follower::pace;
-use sidestep_kernel::math::{cos, sin};
+use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
+
+/// Time for which a leader stands and waits for a robot that is late, s.
+const WAITS_S: f64 = 3.0;
+/// Part of its speed at which it goes on after that, because a robot that is blocked by another one may get
+/// free only once their connectors are elsewhere.
+const GOES_ON: f64 = 0.25;
+/// Part of the gap to another robot that a leader leaves in a cycle: the other one may take a fifth of it.
+const LEFT_TO_OTHERS: f64 = 0.25;
+
+/// Angle between two headings that differ by rounding at most.
+pub(super) const SAME_RAD: f64 = 1e-9;
 
 impl<const D: usize> Acting<'_, D> {
     /// Whether a navigator has reached its goal.
@@ -21,21 +32,84 @@ impl<const D: usize> Acting<'_, D> {
     /// Returns the pose that a navigator's wheels would take it to.
     pub(super) fn steered(&mut self, task: &Task<D>, navigator: &Navigator) -> Option<Pose> {
         let decision = self.decision?;
+        let pace = self.pace();
+        let rested = &mut self.body.driving.rested;
+        *rested = match decision.wheels == Wheels::default() || pace == 0.0 {
+            true => rested.saturating_add(1),
+            // Whose patience has ended does not lose it again at once.
+            false if decision.is_mover_ahead => *rested,
+            false => 0,
+        };
         let mut leader = self.body.leader(task);
         leader.followed = decision.followed;
         self.body.driving.leader = Some(leader);
         self.body.tally.layers[decision.layer as usize - 1] += 1;
-        let wheels = decision.wheels.slowed(self.pace());
+        let waited_s = self.world.starts_s(u64::from(self.body.driving.rested));
+        let pace = if waited_s > WAITS_S { GOES_ON } else { pace };
+        let wheels = decision.wheels.slowed(pace);
         Some(navigator.drive.step(leader.pose, wheels, self.world.dt_s))
+    }
+
+    /// Returns where the connector of a navigator has to go to be at its robot again, from which escapes or
+    /// a pull by the other end have taken it; none while it is there. Where an escape has just moved it, it
+    /// stays.
+    pub(super) fn back_at_its_robot(&self, task: &Task<D>, step_m: f64) -> Option<Point<D>> {
+        let leader = self.body.driving.leader.filter(|_| self.spec.robots.is_some())?;
+        let k = task.agent;
+        let (at, robot) = (self.body.chain.points()[k], in_dimensions(leader.pose.at));
+        let has_fled = self.scratch.escaped.get(k) != self.scratch.before.get(k);
+        (at != robot).then(|| if has_fled { at } else { towards(at, robot, step_m) })
+    }
+
+    /// Returns the heading to turn to in this cycle where a navigator's robot faces elsewhere than it did when
+    /// its own wheels led, because it followed its connector since.
+    pub(super) fn faces_elsewhere(&self, navigator: &Navigator) -> Option<f64> {
+        let leader = self.body.driving.leader.filter(|_| self.spec.robots.is_some())?;
+        let [x, y, _] = self.body.driving.ahead;
+        let off_rad = wrap_angle(atan2(y, x) - leader.pose.heading_rad);
+        let most = navigator.drive.max_wheel_m_s();
+        let most_rad = navigator.drive.turn_rad_s(Wheels::new(-most, most)) * self.world.dt_s;
+        let turn_rad = off_rad.clamp(-most_rad, most_rad);
+        (off_rad.abs() > SAME_RAD).then(|| wrap_angle(leader.pose.heading_rad + turn_rad))
+    }
+
+    /// Turns a navigator's robot on the spot.
+    pub(super) fn face(&mut self, heading_rad: f64) {
+        if let Some(leader) = &mut self.body.driving.leader {
+            leader.pose.heading_rad = heading_rad;
+        }
     }
 
     /// Moves an initiator on wheels; one whose way is blocked may turn on the spot.
     pub(super) fn go_on_wheels(&mut self, task: &Task<D>, pose: Pose) {
         let Driver::Navigate(navigator) = &task.driver else { return };
+        if self.comes_too_near(task.agent, pose.at) {
+            self.give_way(task);
+            return self.turn_where_blocked(task, navigator);
+        }
+        let was = self.body.chain.points()[task.agent];
         match self.go(task, in_dimensions(pose.at)) {
             Went::Ahead => self.has_steered(task, navigator, pose.heading_rad),
+            // A robot whose connector was pulled away follows it on its wheels.
+            Went::Nowhere
+                if self.spec.robots.is_some() && self.body.chain.points()[task.agent] != was => {}
             Went::Nowhere => self.turn_where_blocked(task, navigator),
         }
+    }
+
+    /// Whether a leader's robot would come nearer to another one of its chain than that one, which keeps a
+    /// part of the gap for itself, allows for.
+    fn comes_too_near(&self, agent: usize, to: Point<2>) -> bool {
+        let robots = &self.body.robots;
+        let Some(robot) = robots.get(agent) else { return false };
+        let apart_m = 2.0 * self.body.robot_radius_m;
+        let others = robots.iter().enumerate().filter(|(k, _)| *k != agent);
+        let mut others = others.map(|(_, other)| other.pose.at);
+        others.any(|other| {
+            let was_m = distance(robot.pose.at, other) - apart_m;
+            let gap_m = distance(to, other) - apart_m;
+            gap_m < was_m && gap_m < LEFT_TO_OTHERS * was_m.max(0.0)
+        })
     }
 
     /// Updates a navigator that has moved, by a heading that the chain did not object to.

@@ -1,7 +1,7 @@
-//! One motion of a chain: by propagation, or by a reach if a fixed base objects.
+//! One motion of a chain: by propagation, or by a reach if a connector objects that is held.
 
 use crate::arms::ik::{Engine, Goal, Solver};
-use crate::rods::chain::Chain;
+use crate::rods::chain::{Chain, Connector, Mobility};
 use crate::rods::geometry::{Point, between, distance};
 use crate::rods::obstacle::Obstacles;
 use crate::rods::passage::passed;
@@ -11,7 +11,8 @@ use crate::rods::rules::Rules;
 use crate::rods::veto::{Motion, Moved, Outcome, Reason, Request, Veto};
 use sidestep_kernel::InputError;
 
-/// Moves a chain as requested; if a fixed base objects, by [`reach`].
+/// Moves a chain as requested; if a connector objects that must stay at its place, or on its line, its plane
+/// or in its box, by [`reach`].
 ///
 /// # Errors
 /// As [`Propagator::propagate`].
@@ -21,20 +22,66 @@ pub(crate) fn go<const D: usize>(
     obstacles: &Obstacles<D>,
     request: &Request<D>,
 ) -> Result<Outcome<D>, InputError> {
+    if let Motion::Connector { k, to } = request.motion
+        && let Some(base) = slider(chain, k)
+    {
+        return sliding(propagator, chain, obstacles, (k, to, base), request);
+    }
     let outcome = propagator.propagate(chain, obstacles, request)?;
     let (Outcome::Vetoed(veto), Motion::Connector { k, to }) = (&outcome, request.motion) else {
         return Ok(outcome);
     };
-    let is_base = matches!(veto.reason, Reason::Fixed | Reason::Failed) && veto.by != k;
-    if !is_base {
+    if !holds(veto.reason) || veto.by == k {
         return Ok(outcome);
     }
     let order = Reach { k, target: to, base: veto.by, tolerance_m: TOLERANCE_M };
     held(propagator, chain, obstacles, &order, veto)
 }
 
-/// Moves a chain whose base objects as far as the limit of its joints allows. Near a singular
-/// posture they go much farther than the initiator, which therefore goes less far.
+/// Whether an objection is that of a connector that is held.
+fn holds(reason: Reason) -> bool {
+    matches!(reason, Reason::Fixed | Reason::Failed | Reason::Mobility)
+}
+
+/// Returns the first connector, other than the one that moves, that belongs on a line, on a plane or in a
+/// box.
+fn slider<const D: usize>(chain: &Chain<D>, k: usize) -> Option<usize> {
+    let slides = |i: &usize| {
+        let connector = &chain.connectors()[*i];
+        let is_free = matches!(connector.mobility, Mobility::Free | Mobility::Fixed);
+        *i != k && !connector.failed && !is_free
+    };
+    if chain.is_plain() { None } else { (0..chain.connectors().len()).find(slides) }
+}
+
+/// Moves a chain one of whose connectors slides. Where that one could only come along by going much farther
+/// than the initiator, as the foot of a rod that stands across its line, or from one side of its master to
+/// the other, return passes find a place nearby.
+fn sliding<const D: usize>(
+    propagator: &mut Propagator<D>,
+    chain: &mut Chain<D>,
+    obstacles: &Obstacles<D>,
+    (k, to, base): (usize, Point<D>, usize),
+    request: &Request<D>,
+) -> Result<Outcome<D>, InputError> {
+    let joints_m = propagator.rules.joint_step_max_m;
+    slowed(chain, (k, to), joints_m, |chain, before, to| {
+        let request = Request { motion: Motion::Connector { k, to }, ..*request };
+        let veto = match propagator.propagate(chain, obstacles, &request)? {
+            Outcome::Vetoed(veto) if holds(veto.reason) && veto.by != k => veto,
+            Outcome::Moved(_) if longest(before, chain.points()).1 > joints_m => {
+                chain.points_mut().copy_from_slice(before);
+                let (reason, reached) = (Reason::Mobility, before[k]);
+                Veto { by: base, from: k, reason, obstacle: None, reached }
+            }
+            outcome => return Ok((outcome, f64::INFINITY)),
+        };
+        let order = Reach { k, target: to, base: veto.by, tolerance_m: TOLERANCE_M };
+        reached(propagator, (chain, before), obstacles, &order, &veto)
+    })
+}
+
+/// Moves a chain whose base objects as far as the limit of its joints allows.
 fn held<const D: usize>(
     propagator: &mut Propagator<D>,
     chain: &mut Chain<D>,
@@ -47,31 +94,53 @@ fn held<const D: usize>(
         Reason::Fixed => propagator.rules.joint_step_max_m,
         _ => f64::INFINITY,
     };
-    let before = chain.points().to_vec();
-    let from = before[order.k];
-    let (mut part, mut fastest) = (1.0, order.k);
-    for _ in 0..MOST_SLOWED {
-        let target = if part < 1.0 { between(from, order.target, part) } else { order.target };
+    slowed(chain, (order.k, order.target), joints_m, |chain, before, target| {
         let order = Reach { target, ..*order };
-        let (outcome, jump_m) =
-            reached(propagator, (chain, &before), obstacles, &order, objection)?;
+        reached(propagator, (chain, before), obstacles, &order, objection)
+    })
+}
+
+/// Tries a motion that goes as much less far as it takes for no connector to go farther than `joints_m`.
+/// Near a singular posture connectors go much farther than the initiator. An attempt also returns the
+/// longest way of a connector for which its outcome counts as a motion, meters.
+fn slowed<const D: usize>(
+    chain: &mut Chain<D>,
+    (k, to): (usize, Point<D>),
+    joints_m: f64,
+    mut attempt: impl FnMut(
+        &mut Chain<D>,
+        &[Point<D>],
+        Point<D>,
+    ) -> Result<(Outcome<D>, f64), InputError>,
+) -> Result<Outcome<D>, InputError> {
+    let before = chain.points().to_vec();
+    let from = before[k];
+    let slow = |by: usize, reached: Point<D>| Veto {
+        by,
+        from: k,
+        reason: Reason::StepLimit,
+        obstacle: None,
+        reached,
+    };
+    let (mut part, mut fastest) = (1.0, k);
+    for _ in 0..MOST_SLOWED {
+        let target = if part < 1.0 { between(from, to, part) } else { to };
+        let (outcome, jump_m) = attempt(chain, &before, target)?;
         let moved = match outcome {
             Outcome::Moved(moved) => moved,
             vetoed @ Outcome::Vetoed(_) => return Ok(vetoed),
         };
         let most_m = joints_m.min(jump_m);
         let (by, longest_m) = longest(&before, chain.points());
-        let slowed =
-            Veto { by, reason: Reason::StepLimit, reached: chain.points()[order.k], ..*objection };
         if longest_m <= most_m {
-            let cut_short = (part < 1.0).then_some(slowed);
+            let slowed = slow(by, chain.points()[k]);
+            let cut_short = if part < 1.0 { Some(slowed) } else { moved.cut_short };
             return Ok(Outcome::Moved(Moved { cut_short, ..moved }));
         }
         chain.points_mut().copy_from_slice(&before);
         (part, fastest) = (part * SLOWED * most_m / longest_m, by);
     }
-    let reason = Reason::StepLimit;
-    Ok(Outcome::Vetoed(Veto { by: fastest, reason, reached: from, ..*objection }))
+    Ok(Outcome::Vetoed(slow(fastest, from)))
 }
 
 /// Returns the connector that has moved farthest, and its way, meters.
@@ -122,15 +191,18 @@ fn by_posture<const D: usize>(
     objection: Veto<D>,
 ) -> Result<Outcome<D>, InputError> {
     let Reach { k, target, base, tolerance_m } = *order;
-    let [from, to] = [base.min(k), base.max(k)];
-    let reach_m: f64 = chain.rods()[from..to].iter().map(|rod| rod.max_m).sum();
-    let far_m = |p: Point<D>| distance(chain.points()[base], p);
-    if far_m(target) > reach_m + tolerance_m && objection.reason == Reason::Fixed {
-        return Ok(Outcome::Vetoed(Veto { reason: Reason::OutOfReach, ..objection }));
+    if let Some(by) = out_of_reach(chain, order) {
+        return Ok(Outcome::Vetoed(Veto { by, reason: Reason::OutOfReach, ..objection }));
     }
     let goal = Goal { engine: Engine::Dls, restarts: 0, tolerance_m, ..Goal::new(k, base, target) };
     let answer = Solver::new(rules).solve(chain, obstacles, &goal)?;
-    if !answer.reached {
+    // The solver knows of no other connector than the base that is held.
+    let is_held = |c: &Connector<D>, at: Point<D>, to: Point<D>| match c.is_still() {
+        true => at == to,
+        false => c.mobility.allows(to, at),
+    };
+    let mut held = chain.connectors().iter().zip(chain.points().iter().zip(&answer.points));
+    if !answer.reached || !held.all(|(c, (at, to))| is_held(c, *at, *to)) {
         return Ok(Outcome::Vetoed(objection));
     }
     chain.points_mut().copy_from_slice(&answer.points);
@@ -145,6 +217,20 @@ fn by_posture<const D: usize>(
         }));
     }
     Ok(Outcome::Moved(moved_since(before, chain, k)))
+}
+
+/// Returns the connector, if there is one, from whose places the rods do not reach the target.
+fn out_of_reach<const D: usize>(chain: &Chain<D>, order: &Reach<D>) -> Option<usize> {
+    let holds_too_far = |i: &usize| {
+        let (connector, at) = (&chain.connectors()[*i], chain.points()[*i]);
+        let [from, to] = [order.k.min(*i), order.k.max(*i)];
+        let reach_m: f64 = chain.rods()[from..to].iter().map(|rod| rod.max_m).sum();
+        // What has failed may be repaired, so it is told as such.
+        !connector.failed
+            && distance(connector.mobility.project(order.target, at), order.target)
+                > reach_m + order.tolerance_m
+    };
+    (0..chain.points().len()).filter(|i| *i != order.k).find(holds_too_far)
 }
 
 /// Longest move of a connector, as a part of the longest rod, for which a posture is accepted as a
@@ -170,7 +256,7 @@ fn moved_since<const D: usize>(before: &[Point<D>], chain: &Chain<D>, k: usize) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rods::chain::{Connector, Mobility, Rod};
+    use crate::rods::chain::Rod;
     use crate::rods::veto::{Mode, Source};
 
     /// An arm of two rods, bent a little; the base is fixed.
@@ -220,6 +306,83 @@ mod tests {
             let left_m = distance(arm.points()[n_rods], target);
             assert!(left_m < 1e-6, "{n_rods} rods: {left_m} m are left");
         }
+    }
+
+    /// Leads connector `k` of seven to places one after the other; returns what is left to the farthest
+    /// from its place, and the longest way of a connector in a request.
+    fn led(held: &[(usize, Mobility<2>)], k: usize, places: &[Point<2>]) -> (f64, f64) {
+        let points = vec![
+            [0.0, 0.0],
+            [0.6, 0.8],
+            [1.2, 1.6],
+            [2.2, 1.6],
+            [3.2, 1.6],
+            [3.8, 0.8],
+            [4.4, 0.0],
+        ];
+        let rods = vec![Rod::fixed(1.0, 0.02); 6];
+        let mut chain = Chain::new(points, vec![Connector::free(0.05); 7], rods).unwrap();
+        for (i, mobility) in held {
+            chain.set_mobility(*i, *mobility).unwrap();
+        }
+        let rules = Rules { joint_step_max_m: 0.02, ..Rules::default() };
+        let (mut left_m, mut most_m) = (0.0, 0.0);
+        for place in places {
+            for _ in 0..2000 {
+                let before = chain.points().to_vec();
+                let to = crate::rods::geometry::towards(before[k], *place, 0.01);
+                let request = Request::exact(k, to);
+                let came =
+                    go(&mut Propagator::new(rules), &mut chain, &Obstacles::default(), &request)
+                        .unwrap();
+                assert_eq!(came.veto(), None, "{held:?}, on the way to {place:?}");
+                most_m = f64::max(most_m, longest(&before, chain.points()).1);
+                assert!(chain.max_rod_violation_m() <= 1e-9);
+                assert!(held.iter().all(|(i, m)| m.allows(chain.points()[*i], before[*i])));
+            }
+            left_m = f64::max(left_m, distance(chain.points()[k], *place));
+        }
+        (left_m, most_m)
+    }
+
+    #[test]
+    fn who_is_led_gets_wherever_a_rail_a_plane_a_box_and_two_ends_let_it() {
+        let rail = Mobility::OnSegment([[0.0, 0.0], [6.0, 0.0]]);
+        let upper = Mobility::OnSegment([[0.0, 1.6], [6.0, 1.6]]);
+        let line = Mobility::OnPlane { normal: [0.0, 1.0], offset_m: 0.0 };
+        let room = Mobility::InBox { lo: [0.0, -1.0], hi: [6.0, 1.0] };
+        let anywhere = [[-2.0, 2.0], [4.0, 3.0], [8.0, -2.0], [3.0, -5.0], [3.0, 5.9]];
+        let between = [[2.2, 0.5], [2.0, -1.0], [2.0, 1.2], [2.9, -0.3]];
+        let two_rails = [(0, rail), (6, rail)];
+        for (held, k, places) in [
+            (&[(0, rail)][..], 6, &anywhere[..]),
+            (&[(0, line)], 6, &anywhere),
+            (&[(0, room)], 6, &anywhere),
+            (&[(6, rail)], 0, &anywhere),
+            (&[(3, upper)], 0, &[[-1.0, 2.0], [4.0, 3.5], [8.0, 0.0]]),
+            (&[(0, Mobility::Fixed), (6, Mobility::Fixed)], 3, &between),
+            (&[(0, Mobility::Fixed), (6, rail)], 3, &between),
+            (&two_rails, 3, &[[2.2, 0.5], [5.0, -2.0], [1.0, 2.0]]),
+        ] {
+            let (left_m, most_m) = led(held, k, places);
+            assert!(left_m < 1e-6, "{held:?}: {left_m} m are left");
+            assert!(most_m <= 0.02, "{held:?}: {most_m} m in a request");
+        }
+    }
+
+    #[test]
+    fn a_target_that_no_place_on_the_rail_reaches_is_told_as_such() {
+        let mut chain = arm();
+        chain.set_mobility(0, Mobility::OnSegment([[0.0, 0.0], [1.0, 0.0]])).unwrap();
+        let request = Request::exact(2, [1.5, 4.0]);
+        let came =
+            go(&mut Propagator::default(), &mut chain, &Obstacles::default(), &request).unwrap();
+        assert_eq!(came.veto().map(|veto| (veto.by, veto.reason)), Some((0, Reason::OutOfReach)));
+        assert_eq!(chain, {
+            let mut same = arm();
+            same.set_mobility(0, Mobility::OnSegment([[0.0, 0.0], [1.0, 0.0]])).unwrap();
+            same
+        });
     }
 
     #[test]

@@ -1,10 +1,12 @@
-//! An arm's reach: moving one connector of a chain whose base is fixed.
+//! An arm's reach: moving one connector of a chain that others hold: a fixed base, a base on a line, on a
+//! plane or in a box, two ends, or any of them in between.
 //!
-//! A fixed base vetoes every pull of rods of fixed length, so the base's objection is answered by a
-//! return pass: it moves tentatively, and is then led back to its place. Both passes and the check
-//! of the whole way are one transaction.
+//! A connector that is held vetoes a pull of rods of fixed length that would take it away, so its objection
+//! is answered by return passes: all that is held moves tentatively, and is then led back, to its place if it
+//! is fixed and to the nearest one that it may have if it is not. All passes and the check of the whole way
+//! are one transaction.
 
-use super::chain::{Chain, Mobility};
+use super::chain::{Chain, LENGTH_TOLERANCE_M, Mobility};
 use super::geometry::{Point, distance};
 use super::obstacle::Obstacles;
 use super::passage::passed;
@@ -12,11 +14,16 @@ use super::propagate::Propagator;
 use super::veto::{Mode, Motion, Outcome, Reason, Request, Source, Veto};
 use sidestep_kernel::InputError;
 
-/// Most double passes before the search is given up.
+/// Most double passes before the search is given up,
 const MAX_DOUBLE_PASSES: usize = 40;
+/// and where several connectors are held, whose return passes disturb each other.
+const MAX_MUTUAL_PASSES: usize = 400;
 /// Least relative gain of a double pass; one that brings the connector nearer by less ends the
 /// search.
 const LEAST_GAIN: f64 = 1e-4;
+/// Distance from their places within which several held connectors count as being back; each is put
+/// there exactly then, which takes up a tenth of what rods may be out of their lengths.
+const BACK_M: f64 = 0.1 * LENGTH_TOLERANCE_M;
 
 /// The target of a connector, and the base.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,7 +32,7 @@ pub(crate) struct Reach<const D: usize> {
     pub(crate) k: usize,
     /// Its target.
     pub(crate) target: Point<D>,
-    /// The fixed connector.
+    /// The connector that keeps its place even if it is free to move.
     pub(crate) base: usize,
     /// Distance at which the target counts as reached, meters.
     pub(crate) tolerance_m: f64,
@@ -50,7 +57,28 @@ pub(crate) enum Reached<const D: usize> {
     },
 }
 
-/// Moves a connector to a target while the base keeps its place, bit for bit.
+/// A connector that is held, its place before, and what it was.
+#[derive(Debug, Clone, Copy)]
+struct Held<const D: usize> {
+    k: usize,
+    home: Point<D>,
+    mobility: Mobility<D>,
+    failed: bool,
+}
+
+impl<const D: usize> Held<D> {
+    /// Returns the place to which the connector goes back from where it is.
+    fn place(&self, chain: &Chain<D>) -> Point<D> {
+        match self.mobility {
+            _ if self.failed => self.home,
+            Mobility::Free | Mobility::Fixed => self.home,
+            on => on.project(chain.points()[self.k], self.home),
+        }
+    }
+}
+
+/// Moves a connector to a target while the base keeps its place, bit for bit, and whoever else is held
+/// stays where it may be.
 ///
 /// # Errors
 /// As [`Propagator::propagate`]; also when the chain does not have the base.
@@ -68,12 +96,16 @@ pub(crate) fn reach<const D: usize>(
         ));
     }
     let before = chain.points().to_vec();
-    let was = (chain.connectors()[order.base].mobility, chain.connectors()[order.base].failed);
-    chain.set_mobility(order.base, Mobility::Free)?;
-    chain.set_failed(order.base, false);
-    let came = passes(propagator, chain, obstacles, order);
-    chain.set_mobility(order.base, was.0)?;
-    chain.set_failed(order.base, was.1);
+    let held = held(chain, order);
+    for h in &held {
+        chain.set_mobility(h.k, Mobility::Free)?;
+        chain.set_failed(h.k, false);
+    }
+    let came = passes(propagator, chain, obstacles, order, &held);
+    for h in &held {
+        chain.set_mobility(h.k, h.mobility)?;
+        chain.set_failed(h.k, h.failed);
+    }
     let came = came.map(|came| match came {
         Reached::There { .. } => {
             blocked_way(chain, obstacles, &before, order).map_or(came, |veto| Reached::Short {
@@ -89,35 +121,88 @@ pub(crate) fn reach<const D: usize>(
     came
 }
 
+/// Returns the connectors that may not go anywhere, and the base.
+fn held<const D: usize>(chain: &Chain<D>, order: &Reach<D>) -> Vec<Held<D>> {
+    let is_held = |k: usize| {
+        let connector = &chain.connectors()[k];
+        k != order.k
+            && (k == order.base || connector.failed || connector.mobility != Mobility::Free)
+    };
+    let held = (0..chain.points().len()).filter(|&k| is_held(k)).map(|k| {
+        let connector = &chain.connectors()[k];
+        let home = chain.points()[k];
+        Held { k, home, mobility: connector.mobility, failed: connector.failed }
+    });
+    held.collect()
+}
+
 fn passes<const D: usize>(
     propagator: &mut Propagator<D>,
     chain: &mut Chain<D>,
     obstacles: &Obstacles<D>,
     order: &Reach<D>,
+    held: &[Held<D>],
 ) -> Result<Reached<D>, InputError> {
-    let home = chain.points()[order.base];
+    let most = if held.len() > 1 { MAX_MUTUAL_PASSES } else { MAX_DOUBLE_PASSES };
     let mut nearest = chain.points()[order.k];
     let mut off_m = distance(nearest, order.target);
-    for double_passes in 0..=MAX_DOUBLE_PASSES {
-        if off_m <= order.tolerance_m {
+    for double_passes in 0..=most {
+        if off_m <= order.tolerance_m && settle(chain, held) {
             return Ok(Reached::There { off_m, double_passes });
         }
-        for (k, to) in [(order.k, order.target), (order.base, home)] {
-            let motion = Motion::Connector { k, to };
-            let request = Request { motion, source: Source::Planner, mode: Mode::Exact };
-            if let Outcome::Vetoed(veto) = propagator.propagate(chain, obstacles, &request)? {
-                return Ok(Reached::Short { nearest, veto: Some(veto) });
-            }
+        if let Some(veto) = double_pass(propagator, chain, obstacles, order, held)? {
+            return Ok(Reached::Short { nearest, veto: Some(veto) });
         }
-        // A last move shorter than the least counts as none, so the base is put exactly home.
-        chain.points_mut()[order.base] = home;
-        let now_m = distance(chain.points()[order.k], order.target);
+        let now_m = distance(chain.points()[order.k], order.target) + astray_m(chain, held);
         if now_m > off_m * (1.0 - LEAST_GAIN) && now_m > order.tolerance_m {
             return Ok(Reached::Short { nearest, veto: None });
         }
         (nearest, off_m) = (chain.points()[order.k], now_m);
     }
     Ok(Reached::Short { nearest, veto: None })
+}
+
+/// Leads the initiator to its target, and then all that is held back; returns the objection, if there is
+/// one.
+fn double_pass<const D: usize>(
+    propagator: &mut Propagator<D>,
+    chain: &mut Chain<D>,
+    obstacles: &Obstacles<D>,
+    order: &Reach<D>,
+    held: &[Held<D>],
+) -> Result<Option<Veto<D>>, InputError> {
+    for pass in 0..=held.len() {
+        let (k, to) = match pass.checked_sub(1) {
+            None => (order.k, order.target),
+            Some(i) => (held[i].k, held[i].place(chain)),
+        };
+        let motion = Motion::Connector { k, to };
+        let request = Request { motion, source: Source::Planner, mode: Mode::Exact };
+        if let Outcome::Vetoed(veto) = propagator.propagate(chain, obstacles, &request)? {
+            return Ok(Some(veto));
+        }
+        // A last move shorter than the least counts as none, so who is held is put exactly home.
+        if pass > 0 {
+            chain.points_mut()[k] = to;
+        }
+    }
+    Ok(None)
+}
+
+/// Returns how far the held connector that is farthest from its place is from it, meters.
+fn astray_m<const D: usize>(chain: &Chain<D>, held: &[Held<D>]) -> f64 {
+    let off_m = held.iter().map(|h| distance(chain.points()[h.k], h.place(chain)));
+    off_m.fold(0.0, f64::max)
+}
+
+/// Puts all that is held exactly where it belongs, if it is as good as there; returns whether it is.
+fn settle<const D: usize>(chain: &mut Chain<D>, held: &[Held<D>]) -> bool {
+    let is_back = astray_m(chain, held) <= BACK_M;
+    for h in held.iter().filter(|_| is_back) {
+        let place = h.place(chain);
+        chain.points_mut()[h.k] = place;
+    }
+    is_back
 }
 
 /// Returns what is in the way from the old state to the new one, because no pass has checked that

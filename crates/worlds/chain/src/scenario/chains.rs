@@ -63,7 +63,7 @@ pub(super) struct ChainSection<const D: usize> {
     #[serde(default)]
     pub(super) anywhere: bool,
     within_m: Option<Spanned<Room<D>>>,
-    arm: Option<Spanned<ArmSection>>,
+    pub(super) arm: Option<Spanned<ArmSection>>,
     robots: Option<Spanned<RobotsSection>>,
     rod_m: Option<Limits>,
     radius_m: Option<f64>,
@@ -74,7 +74,7 @@ pub(super) struct ChainSection<const D: usize> {
     #[serde(default)]
     tasks: Sections<TaskSection<D>>,
     #[serde(default)]
-    changes: Sections<ChangeSection<D>>,
+    pub(super) changes: Sections<ChangeSection<D>>,
 }
 
 fn one_chain() -> usize {
@@ -199,6 +199,9 @@ impl<const D: usize> Compiler<'_, D> {
     ) -> Result<Vec<Task<D>>, InputError> {
         let tasks =
             s.tasks.0.iter().map(|task| self.task(task, start)).collect::<Result<Vec<_>, _>>()?;
+        for (section, task) in s.tasks.0.iter().zip(&tasks) {
+            self.can_lead(s, section, task, start)?;
+        }
         let is_endless = |task: &Task<D>| {
             let has_an_end = match &task.driver {
                 Driver::Rest | Driver::Wander(_) | Driver::External => false,
@@ -262,7 +265,7 @@ impl<const D: usize> Compiler<'_, D> {
         way_m: f64,
         at: Range<usize>,
     ) -> Result<(), InputError> {
-        let step_m = self.rules(None, f64::INFINITY).step_m.unwrap_or(chain.step_m());
+        let step_m = self.file.chain.step_m.map(f64::from).unwrap_or(chain.step_m());
         if way_m <= MAX_STEPS * step_m {
             return Ok(());
         }

@@ -49,6 +49,11 @@ impl<const D: usize> ChangeSection<D> {
         self.scatter.is_some().then(|| self.at_s.get())
     }
 
+    /// Whether it may let a connector go that is held or has failed.
+    pub(super) fn lets_go(&self, connector: usize) -> bool {
+        self.connector == Some(connector) && (self.failed == Some(false) || self.mobility.is_some())
+    }
+
     /// Returns the time at which it joins the chain again, if it does.
     pub(super) fn joins_at_s(&self) -> Option<f64> {
         (self.reform == Some(true)).then(|| self.at_s.get())

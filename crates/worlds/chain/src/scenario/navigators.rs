@@ -58,6 +58,16 @@ enum TurningWord {
     OnTheSpotWhereBlocked,
 }
 
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+enum MoversWord {
+    /// It stands until that is gone, for 10 s at most.
+    #[default]
+    GiveWay,
+    /// It takes them for walls, as the slides do.
+    Walls,
+}
+
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct NavigatorSection {
@@ -75,6 +85,8 @@ pub(super) struct NavigatorSection {
     leave_rule: Option<bool>,
     /// Way to turn.
     turning: TurningWord,
+    /// What is done about something that moves ahead.
+    movers: MoversWord,
     /// Number of beams of the laser.
     beams: Option<usize>,
     /// Length of the beams.
@@ -123,10 +135,25 @@ impl<const D: usize> Compiler<'_, D> {
             Some(section) => self.source.error_of(section.span(), &error),
             None => error,
         };
+        if let Some(section) = section {
+            self.seeks_a_target(section)?;
+        }
         let leader = s.leader(speed_m_s).map_err(told)?;
         let wheelbase_m = s.wheelbase_m.map_or(WHEELBASE_M, f64::from);
         let drive = Drive::new(wheelbase_m, speed_m_s).map_err(told)?;
         Ok(Navigator { leader, drive, goal: self.goal(s)? })
+    }
+
+    /// Refuses keys about a target where there is none.
+    fn seeks_a_target(&self, section: &Spanned<NavigatorSection>) -> Result<(), InputError> {
+        let s = section.get_ref();
+        let seeks = s.target_m.is_some();
+        let keys = [
+            ("tolerance_m", s.tolerance_m.is_some(), seeks),
+            ("detects_from_m", s.detects_from_m.is_some(), seeks),
+            ("needs_line_of_sight", s.needs_line_of_sight, seeks),
+        ];
+        self.has_no_idle_key(&keys, "without target_m", section.span())
     }
 
     /// Returns the target, or the end of the scenario's corridor.
@@ -180,6 +207,7 @@ impl NavigatorSection {
                 TurningWord::AboutAWheel => Turning::AboutAWheel,
                 TurningWord::OnTheSpotWhereBlocked => Turning::OnTheSpotWhereBlocked,
             },
+            gives_way: self.movers == MoversWord::GiveWay,
         };
         leader.check()?;
         Ok(leader)

@@ -220,8 +220,8 @@ impl<const D: usize> Compiler<'_, D> {
         let keys = keys.map(|(key, is_given, kind)| (key, is_given, kind == s.kind));
         let of = format!("in a task of kind {:?}", s.kind).to_lowercase();
         self.has_no_idle_key(&keys, &of, at.clone())?;
-        // A caller sees each veto, and decides itself when to give up.
-        let is_patient = s.kind != Kind::External;
+        // A caller sees each veto, and decides itself when to give up; who rests wants nothing.
+        let is_patient = !matches!(s.kind, Kind::External | Kind::Rest);
         let keys = [("patience_s", s.patience_s.is_some(), is_patient)];
         self.has_no_idle_key(&keys, &of, at.clone())?;
         let keys = [("plans_after_s", s.plans_after_s.is_some(), plans)];

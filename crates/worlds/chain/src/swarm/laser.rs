@@ -3,7 +3,7 @@
 use super::drive::Pose;
 use super::ray;
 use crate::rods::geometry::{Bounds, Core, Point};
-use crate::rods::obstacle::{Obstacles, around};
+use crate::rods::obstacle::{Obstacle, Obstacles, around};
 use sidestep_kernel::InputError;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::math::{cos, sin, wrap_angle};
@@ -54,6 +54,10 @@ pub struct Scan {
     ranges_m: Vec<f64>,
     /// The same without errors, where that is wanted.
     true_m: Vec<f64>,
+    /// The same without errors and without what moves; empty if nothing does.
+    still_m: Vec<f64>,
+    /// Whether what every beam meets moves; empty if nothing does.
+    meets_mover: Vec<bool>,
     /// Whether ranges without errors are kept.
     pub keeps_truth: bool,
 }
@@ -121,10 +125,15 @@ impl Laser {
         self.read_beams().for_each(|beam| scan.ranges_m[beam] = self.range_m);
         let turn = [cos(pose.heading_rad), sin(pose.heading_rad)];
         let near = around(pose.at, self.range_m);
-        obstacles.visit(&near, |o| self.look(pose, turn, &o.core, o.radius_m, scan));
+        let mut some_move = false;
+        obstacles.visit(&near, |o| match moves(o) {
+            true => some_move = true,
+            false => self.look(pose, turn, &o.core, o.radius_m, scan),
+        });
         for body in bodies.into_iter().filter(|body| body.bounds().meets(&near)) {
             self.look(pose, turn, &body.core, body.radius_m, scan);
         }
+        self.look_at_movers(pose, turn, obstacles, some_move, scan);
         if scan.keeps_truth {
             scan.true_m.clone_from(&scan.ranges_m);
         }
@@ -135,6 +144,29 @@ impl Laser {
                 *range_m = (*range_m + error_m).clamp(0.0, self.range_m);
             }
         }
+    }
+
+    /// Shortens the beams that meet something that moves, if anything does, and notes which they are.
+    fn look_at_movers(
+        &self,
+        pose: &Pose,
+        turn: Point<2>,
+        obstacles: &Obstacles<2>,
+        some_move: bool,
+        scan: &mut Scan,
+    ) {
+        scan.meets_mover.clear();
+        if !some_move {
+            return;
+        }
+        scan.still_m.clone_from(&scan.ranges_m);
+        obstacles.visit(&around(pose.at, self.range_m), |o| {
+            if moves(o) {
+                self.look(pose, turn, &o.core, o.radius_m, scan);
+            }
+        });
+        let nearer = scan.ranges_m.iter().zip(&scan.still_m).map(|(with, still)| with < still);
+        scan.meets_mover.extend(nearer);
     }
 
     /// Returns the beams it reads, from the rightmost to the leftmost.
@@ -221,6 +253,15 @@ impl Laser {
         Some(beams.map(range_m).fold(self.range_m, f64::min))
     }
 
+    /// Returns the least range of the beams of a sector that meet something that moves, or of the others, as
+    /// [`Self::least_m`].
+    pub fn least_of_m(&self, scan: &Scan, sector_rad: [f64; 2], moves: bool) -> Option<f64> {
+        let n = self.directions.len() as isize;
+        let counts = |k: &usize| scan.meets_mover.get(*k).copied().unwrap_or(false) == moves;
+        let beams = self.sector(sector_rad)?.map(|k| k.rem_euclid(n) as usize);
+        Some(beams.filter(counts).map(|k| scan.ranges_m[k]).fold(self.range_m, f64::min))
+    }
+
     /// Whether a sector lies completely in the field and has a beam.
     pub fn sees(&self, sector_rad: [f64; 2]) -> bool {
         self.sector(sector_rad).is_some()
@@ -237,6 +278,10 @@ impl Laser {
         let is_seen = sees_all || (-side <= first && last <= side);
         (first <= last && is_seen).then_some(first..=last)
     }
+}
+
+fn moves(o: &Obstacle<2>) -> bool {
+    o.velocity_m_s != [0.0; 2]
 }
 
 fn last_beam(angle_rad: f64, step_rad: f64) -> usize {

@@ -139,7 +139,13 @@ pub struct Leader {
     pub target_sense: TargetSense,
     /// Way in which it turns.
     pub turning: Turning,
+    /// Whether it takes what moves for no wall, and stands while that is ahead and close. Otherwise a wall is
+    /// whatever its laser meets, as in the slides, and who crosses its way turns it round.
+    pub gives_way: bool,
 }
+
+/// Angle to each side of straight ahead within which a leader stands for what moves, about 60 degrees.
+const AHEAD_RAD: f64 = 1.05;
 
 impl Leader {
     /// Returns the leader of the slides: 0.7 to 0.9 m from walls, a laser of 3.2 m all around whose
@@ -159,6 +165,7 @@ impl Leader {
             leave_rule: Some(LeaveRule::default()),
             target_sense: TargetSense::default(),
             turning: Turning::default(),
+            gives_way: true,
         };
         leader.check()?;
         Ok(leader)
@@ -233,6 +240,10 @@ pub struct Percept {
     pub walls_m: Sides<f64>,
     /// The target, if it is detected.
     pub target: Option<Sighting>,
+    /// Whether something that moves is close ahead,
+    pub is_mover_ahead: bool,
+    /// and whether the leader still has the patience to stand for it.
+    pub stands_for_it: bool,
 }
 
 /// A detected target.
@@ -253,24 +264,35 @@ pub struct Decision {
     pub layer: Layer,
     /// The walls that it follows from now on.
     pub followed: Sides<bool>,
+    /// Whether it stands or goes on while something that moves is close ahead.
+    pub is_mover_ahead: bool,
 }
 
 impl Leader {
     /// Reads the laser and the target's detector. `scan` is a buffer; its old contents are
-    /// forgotten.
+    /// forgotten. A leader that `is_patient` takes what moves for no wall.
     pub fn perceive(
         &self,
         pose: &Pose,
         around: &Surroundings<'_>,
         noise: &mut Draws,
         scan: &mut Scan,
+        is_patient: bool,
     ) -> Percept {
         self.laser.scan(pose, around.obstacles, around.bodies.iter().copied(), noise, scan);
         let [from, to] = self.sector_rad;
-        let least_m = |sector| self.laser.least_m(scan, sector).unwrap_or(self.laser.range_m());
+        let stands_for_it = self.gives_way && is_patient;
+        let least_m = |sector| match stands_for_it {
+            true => self.laser.least_of_m(scan, sector, false),
+            false => self.laser.least_m(scan, sector),
+        };
+        let least_m = |sector| least_m(sector).unwrap_or(self.laser.range_m());
         let walls_m = Sides { left: least_m([from, to]), right: least_m([-to, -from]) };
         let target = around.target.filter(|&target| self.detects(pose, around, target));
-        Percept { walls_m, target: target.map(|target| self.sighting(pose, target, scan)) }
+        let mover_m = self.laser.least_of_m(scan, [-AHEAD_RAD, AHEAD_RAD], true);
+        let is_mover_ahead = self.gives_way && mover_m.is_some_and(|mover_m| mover_m < self.near_m);
+        let target = target.map(|target| self.sighting(pose, target, scan));
+        Percept { walls_m, target, is_mover_ahead, stands_for_it }
     }
 
     fn detects(&self, pose: &Pose, around: &Surroundings<'_>, target: Point<2>) -> bool {
@@ -315,7 +337,13 @@ impl Leader {
             (Layer::KeepMoving, Wheels::new(s, s))
         };
         let followed = Sides { left: left.is_followed, right: right.is_followed };
-        Decision { wheels, layer, followed }
+        let is_mover_ahead = percept.is_mover_ahead;
+        let stands = is_mover_ahead && percept.stands_for_it;
+        let (layer, wheels) = match stands {
+            true => (Layer::KeepMoving, Wheels::default()),
+            false => (layer, wheels),
+        };
+        Decision { wheels, layer, followed, is_mover_ahead }
     }
 
     fn wall(&self, was_followed: bool, wall_m: f64, leaves_walls: bool) -> Wall {
@@ -358,7 +386,8 @@ mod tests {
     }
 
     fn percept(left: f64, right: f64) -> Percept {
-        Percept { walls_m: Sides { left, right }, target: None }
+        let walls_m = Sides { left, right };
+        Percept { walls_m, target: None, is_mover_ahead: false, stands_for_it: true }
     }
 
     fn layer(leader: &Leader, followed: (bool, bool), percept: &Percept) -> Layer {
@@ -447,11 +476,35 @@ mod tests {
         let mut sees = |needs_line_of_sight, range_m| {
             let target_sense = TargetSense { range_m, needs_line_of_sight };
             let leader = Leader { target_sense, ..leader(Leaving::Latched) };
-            leader.perceive(&pose, &around, &mut noise, &mut Scan::default()).target.is_some()
+            let scan = &mut Scan::default();
+            leader.perceive(&pose, &around, &mut noise, scan, true).target.is_some()
         };
         assert!(sees(false, f64::INFINITY));
         assert!(!sees(true, f64::INFINITY));
         assert!(!sees(false, 3.9));
+    }
+
+    #[test]
+    fn what_moves_is_waited_for_and_is_no_wall_until_patience_ends() {
+        use crate::rods::obstacle::Obstacle;
+        use sidestep_kernel::{Seed, stream::Streams};
+        let leader = leader(Leaving::Latched);
+        let sees = |at, velocity_m_s, is_patient| {
+            let disc = Obstacle { velocity_m_s, ..Obstacle::ball(0, at, 0.2) };
+            let obstacles = Obstacles::new(vec![disc], 1.0).unwrap();
+            let around = Surroundings { obstacles: &obstacles, bodies: &[], target: None };
+            let pose = Pose { at: [0.0, 0.0], heading_rad: 0.0 };
+            let mut noise = Streams::new(Seed(1)).draws(0, 0, super::super::laser::LASER_NOISE);
+            let scan = &mut Scan::default();
+            let percept = leader.perceive(&pose, &around, &mut noise, scan, is_patient);
+            leader.decide(Sides::default(), &percept)
+        };
+        let (ahead, aside, moves, stands) = ([0.8, 0.1], [0.0, 0.8], [0.0, -0.4], [0.0, 0.0]);
+        assert_eq!(sees(ahead, moves, true).wheels, Wheels::default(), "it waits");
+        assert_ne!(sees(ahead, moves, false).wheels, Wheels::default(), "not for ever");
+        assert_eq!(sees(ahead, moves, false).layer, sees(ahead, stands, true).layer);
+        assert_eq!(sees(aside, moves, true).layer, Layer::KeepMoving, "it is no wall");
+        assert_eq!(sees(aside, stands, true).layer, Layer::CloseLeft);
     }
 
     proptest! {

@@ -1,0 +1,144 @@
+//! The tip of an arm whose file does not say which link it is.
+
+use super::Model;
+
+impl Model {
+    /// Returns the link that is the tip unless one is named: the leaf with the most moving joints on its
+    /// path from the root, of several the first in the file. Where that leaf is a finger, it is the hand
+    /// that carries the fingers, or the one frame that is fixed to the hand and carries nothing.
+    pub fn default_tip(&self) -> usize {
+        let leaf = self.farthest_leaf();
+        let way = self.way_to(leaf);
+        let hand = (0..way.len()).find_map(|k| self.hand(&way, k));
+        hand.map_or(leaf, |hand| self.tool_frame(hand))
+    }
+
+    fn farthest_leaf(&self) -> usize {
+        let mut best = (self.root, 0);
+        for leaf in self.leaves() {
+            let count = self.moving(&self.way_to(leaf));
+            if count > best.1 || best.0 == self.root {
+                best = (leaf, count);
+            }
+        }
+        best.0
+    }
+
+    fn way_to(&self, link: usize) -> Vec<usize> {
+        self.way(self.root, link).expect("every link hangs on the root")
+    }
+
+    fn moves(&self, joint: usize) -> bool {
+        self.joints[joint].kind.has_one_value()
+    }
+
+    fn moving(&self, way: &[usize]) -> usize {
+        way.iter().filter(|&&joint| self.moves(joint)).count()
+    }
+
+    /// Returns the link from which joint `way[k]` goes out, if that is a finger's: it moves, other joints
+    /// move on the same body, and none of these branches has as many joints as there are before.
+    fn hand(&self, way: &[usize], k: usize) -> Option<usize> {
+        let before = self.moving(&way[..k]);
+        let hand = self.joints[way[k]].parent;
+        let body = self.body(hand);
+        let goes_out = |joint: &usize| self.moves(*joint) && body[self.joints[*joint].parent];
+        let fingers = (0..self.joints.len()).filter(goes_out).count();
+        let beyond = |leaf: usize| {
+            let way = self.way_to(leaf);
+            way.iter().position(|&joint| goes_out(&joint)).map_or(0, |at| self.moving(&way[at..]))
+        };
+        let longest = self.leaves().into_iter().map(beyond).max().unwrap_or(0);
+        (goes_out(&way[k]) && fingers > 1 && longest < before).then_some(hand)
+    }
+
+    /// Returns for each link whether it is rigid to `link`.
+    fn body(&self, link: usize) -> Vec<bool> {
+        let mut is_rigid = vec![false; self.links.len()];
+        is_rigid[link] = true;
+        let mut open = vec![link];
+        while let Some(link) = open.pop() {
+            for joint in (0..self.joints.len()).filter(|&joint| !self.moves(joint)) {
+                let ends = [self.joints[joint].parent, self.joints[joint].child];
+                for (from, to) in [(ends[0], ends[1]), (ends[1], ends[0])] {
+                    if from == link && !is_rigid[to] {
+                        is_rigid[to] = true;
+                        open.push(to);
+                    }
+                }
+            }
+        }
+        is_rigid
+    }
+
+    /// Returns the one frame that is fixed to a hand and carries nothing, or the hand if there is none or
+    /// more than one.
+    fn tool_frame(&self, hand: usize) -> usize {
+        let body = self.body(hand);
+        let frames: Vec<usize> = self.leaves().into_iter().filter(|&leaf| body[leaf]).collect();
+        match frames[..] {
+            [frame] => frame,
+            _ => hand,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A model of joints, each `parent child type`; links are the letters that occur.
+    fn model(joints: &str) -> Model {
+        let mut links: Vec<&str> = Vec::new();
+        let mut text = String::new();
+        for (k, joint) in joints.split(", ").enumerate() {
+            let [parent, child, kind] = joint.split(' ').collect::<Vec<_>>()[..] else {
+                panic!("{joint}")
+            };
+            links.extend([parent, child]);
+            text += &format!(
+                "<joint name=\"j{k}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/>\
+                 <limit lower=\"-1\" upper=\"1\"/></joint>"
+            );
+        }
+        links.sort_unstable();
+        links.dedup();
+        let links: String = links.iter().map(|link| format!("<link name=\"{link}\"/>")).collect();
+        Model::parse("m.urdf", &format!("<robot name=\"m\">{links}{text}</robot>"))
+            .expect("a model")
+    }
+
+    fn tip(joints: &str) -> String {
+        let model = model(joints);
+        model.links[model.default_tip()].clone()
+    }
+
+    #[test]
+    fn a_hand_or_its_tool_frame_is_the_tip_and_no_finger() {
+        let arm = "a b revolute, b c revolute, c hand fixed";
+        let fingers = "hand left prismatic, hand right prismatic";
+        assert_eq!(tip(arm), "hand");
+        assert_eq!(tip(&format!("{arm}, {fingers}")), "hand");
+        assert_eq!(tip(&format!("{arm}, hand tcp fixed, {fingers}")), "tcp");
+        // Of two frames none is chosen.
+        assert_eq!(tip(&format!("{arm}, hand tcp fixed, hand eye fixed, {fingers}")), "hand");
+        // Fingers on parts of their own of the hand.
+        let apart = "hand palm fixed, palm left prismatic, hand right prismatic";
+        assert_eq!(tip(&format!("{arm}, {apart}")), "palm");
+    }
+
+    #[test]
+    fn arms_that_branch_off_a_torso_are_no_fingers() {
+        let torso = "a torso revolute";
+        let arms =
+            "torso l1 revolute, l1 l2 revolute, l2 l3 revolute, torso r1 revolute, r1 r2 revolute";
+        assert_eq!(tip(&format!("{torso}, {arms}")), "l3");
+        let hand = "l3 f revolute, l3 g revolute";
+        assert_eq!(tip(&format!("{torso}, {arms}, {hand}")), "l3");
+    }
+
+    #[test]
+    fn a_gripper_of_one_jaw_is_told_from_no_other_joint() {
+        assert_eq!(tip("a b revolute, b c revolute, c jaw prismatic"), "jaw");
+    }
+}

@@ -1,0 +1,108 @@
+//! Refusals of tasks whose connector can never do them.
+
+use super::super::driver::{Driver, Task};
+use super::super::rods::chain::{Chain, Mobility};
+use super::super::rods::geometry::distance;
+use super::Compiler;
+use super::chains::ChainSection;
+use super::tasks::TaskSection;
+use sidestep_kernel::InputError;
+use sidestep_scenario::Spanned;
+
+impl<const D: usize> Compiler<'_, D> {
+    /// Refuses a task that moves a connector which is fixed or has failed, and targets off the line, the
+    /// plane or the box on which it belongs, unless a change may let it go.
+    pub(super) fn can_lead(
+        &self,
+        s: &ChainSection<D>,
+        section: &Spanned<TaskSection<D>>,
+        task: &Task<D>,
+        start: &Chain<D>,
+    ) -> Result<(), InputError> {
+        let k = task.agent;
+        let moves = !matches!(task.driver, Driver::Rest | Driver::External);
+        if !moves || s.changes.0.iter().any(|change| change.get_ref().lets_go(k)) {
+            return Ok(());
+        }
+        let connector = &start.connectors()[k];
+        if connector.is_still() {
+            let why = if connector.failed { "has failed" } else { "is fixed" };
+            let cause = format!("connector {k} leads, and it {why}: it can never move");
+            let at = self.source.within(section.span(), &["connector", "kind"]);
+            let last = start.points().len() - 1;
+            let remedy = match s.arm {
+                Some(_) => format!("give connector = {last}, the tool"),
+                None => format!("give another connector, 0 to {last}, or kind = \"rest\""),
+            };
+            return Err(self.source.error(at, cause, remedy));
+        }
+        self.targets_are_on_its_line(section, task, start)
+    }
+
+    /// Refuses targets where the connector that leads may never be.
+    fn targets_are_on_its_line(
+        &self,
+        section: &Spanned<TaskSection<D>>,
+        task: &Task<D>,
+        start: &Chain<D>,
+    ) -> Result<(), InputError> {
+        let Driver::Targets(targets) = &task.driver else { return Ok(()) };
+        let (k, mobility) = (task.agent, start.connectors()[task.agent].mobility);
+        let off_m = |p| distance(mobility.project(p, start.points()[k]), p);
+        let is_off = |p: &_| mobility != Mobility::Free && off_m(*p) > targets.tolerance_m;
+        let Some(i) = targets.places.iter().position(is_off) else { return Ok(()) };
+        let off_m = off_m(targets.places[i]);
+        let cause = format!("target {i} is {off_m:.4} m off the places where connector {k} may be");
+        let at = self.source.within(section.span(), &["targets_m"]);
+        let remedy = "give targets where its mobility allows it, or let another connector lead";
+        Err(self.source.error(at, cause, remedy))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scenario::Compiled;
+    use sidestep_scenario::Source;
+
+    /// Compiles a chain of four whose first connector is limited, with a task.
+    fn told(limit: &str, task: &str, change: &str) -> Option<String> {
+        let text = format!(
+            "format = 1\nworld = \"chain\"\n[[chains]]\nconnectors = 4\nrod_m = 0.5\n\
+             [[chains.limits]]\nconnector = 0\n{limit}\n[[chains.tasks]]\n{task}\n{change}"
+        );
+        let source = Source::new("s.toml", text, "");
+        Compiled::<2>::new(&source).err().map(|error| error.cause().to_string())
+    }
+
+    #[test]
+    fn who_can_never_move_does_not_lead() {
+        let goes = "kind = \"targets\"\ntargets_m = [[1.0, 0.0]]";
+        let fixed = "mobility = \"fixed\"";
+        let cause = "connector 0 leads, and it is fixed: it can never move";
+        assert_eq!(told(fixed, goes, "").as_deref(), Some(cause));
+        assert_eq!(told(fixed, "kind = \"wander\"", "").as_deref(), Some(cause));
+        assert!(told("failed = true", goes, "").is_some_and(|said| said.contains("has failed")));
+        for (limit, task, change) in [
+            (fixed, "kind = \"targets\"\ntargets_m = [[1.0, 0.0]]\nconnector = 3", ""),
+            (fixed, "kind = \"rest\"", ""),
+            (fixed, "kind = \"external\"", ""),
+            (fixed, goes, "[[chains.changes]]\nat_s = 1.0\nconnector = 0\nmobility = \"free\""),
+            (
+                "failed = true",
+                goes,
+                "[[chains.changes]]\nat_s = 1.0\nconnector = 0\nfailed = false",
+            ),
+        ] {
+            assert_eq!(told(limit, task, change), None, "{limit}, {task}, {change}");
+        }
+    }
+
+    #[test]
+    fn targets_lie_where_the_leader_may_be() {
+        let rail = "mobility = { on_segment = [[0.0, 0.0], [2.0, 0.0]] }";
+        let goes = |to: &str| format!("kind = \"targets\"\ntargets_m = [[1.0, 0.0], {to}]");
+        assert_eq!(told(rail, &goes("[2.0, 0.0]"), ""), None);
+        let cause = told(rail, &goes("[2.0, 0.3]"), "").expect("refused");
+        assert!(cause.starts_with("target 1 is 0.3000 m off"), "{cause}");
+    }
+}
