@@ -219,6 +219,19 @@ impl Source {
         }
     }
 
+    /// Returns what came of reading a file that a key of the section at a span names; errors get the way to that key.
+    ///
+    /// # Errors
+    /// Those of reading it.
+    pub fn named<T>(
+        &self,
+        section: Range<usize>,
+        key: &str,
+        read: Result<T, InputError>,
+    ) -> Result<T, InputError> {
+        read.map_err(|error| self.naming(self.within(section, &[key]), error))
+    }
+
     /// Returns an error as one of this text, for those who see nothing else: that of a file which the text names becomes
     /// one of the key that names it.
     pub fn told(&self, error: &InputError) -> InputError {

@@ -36,7 +36,8 @@ impl<const D: usize> Compiler<'_, D> {
         at_m: [f64; 3],
     ) -> Result<Arm, InputError> {
         let (s, at) = (section.get_ref(), section.span());
-        let model = Model::load(&self.source.path(s.urdf.as_ref()))?;
+        let model = Model::load(&self.source.path(s.urdf.as_ref()));
+        let model = self.source.named(at.clone(), "urdf", model)?;
         let link = |name: &Option<String>, key: &str, preset: usize| match name {
             Some(name) => {
                 let at = || self.source.within(at.clone(), &[key]);
@@ -74,7 +75,8 @@ impl<const D: usize> Compiler<'_, D> {
                 Ok(values.clone())
             }
             (None, Some(name), Some(srdf)) => {
-                let semantics = Semantics::load(&self.source.path(srdf.as_ref()), model)?;
+                let semantics = Semantics::load(&self.source.path(srdf.as_ref()), model);
+                let semantics = self.source.named(at.clone(), "srdf", semantics)?;
                 let posture = semantics.posture("posture", name).map_err(told)?;
                 Ok(serial.with_posture(model, &posture))
             }

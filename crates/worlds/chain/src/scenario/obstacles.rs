@@ -186,12 +186,12 @@ impl<const D: usize> Compiler<'_, D> {
         };
         Ok(match (&s.map, &s.stage) {
             (Some(map), _) => {
-                let map = rosmap::load(&self.source.path(map.as_ref()))?;
-                Some(Site::of_map(&map, unknown))
+                let map = rosmap::load(&self.source.path(map.as_ref()));
+                Some(Site::of_map(&self.source.named(at, "map", map)?, unknown))
             }
             (_, Some(world)) => {
-                let world = stage::load(&self.source.path(world.as_ref()))?;
-                Some(Site::of_stage(&world))
+                let world = stage::load(&self.source.path(world.as_ref()));
+                Some(Site::of_stage(&self.source.named(at, "stage", world)?))
             }
             _ => None,
         })

@@ -159,8 +159,10 @@ impl<const D: usize> Compiler<'_, D> {
             (None, Some(file)) => {
                 let path = self.source.path(file.as_ref());
                 let text =
-                    sidestep_scenario::file::read_text(&path, crate::script::MAX_BYTES as u64)?;
-                Script::parse(&path.display().to_string(), &text)
+                    sidestep_scenario::file::read_text(&path, crate::script::MAX_BYTES as u64);
+                let script =
+                    text.and_then(|text| Script::parse(&path.display().to_string(), &text));
+                self.source.named(at, "script_file", script)
             }
             _ => {
                 let remedy = "give script = \"\"\"...\"\"\" or script_file = \"...\"";
