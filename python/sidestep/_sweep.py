@@ -103,9 +103,14 @@ def sweep(
     """
     if replicate is not None and until is not None:
         raise wrong("replicate", "`until` says how often to run, too", "give one of them; max_runs bounds until")
+    if until is not None and not isinstance(until, str):
+        raise wrong("until", f"{until!r} is no text", 'write "ci=0.05" (of the mean) or "abs=2.5" (in units)')
+    if isinstance(baseline, str) and "=" in baseline:
+        remedy = 'give values as a dict, {"robots.count": 2}, or the name of a variant of the sweep file'
+        raise wrong("baseline", f"{baseline!r} is no name", remedy)
     options = {
-        "vary": vary,
-        "set": {**(set or {}), **({} if cycles is None else {"cycles": cycles})},
+        "vary": _mapping("vary", vary),
+        "set": {**_mapping("set", set), **({} if cycles is None else {"cycles": cycles})},
         "replicate": _count("replicate", replicate, MOST_RUNS),
         "until": until,
         "max_runs": _count("max_runs", max_runs, MOST_RUNS),
@@ -158,6 +163,12 @@ def compare(
         scenario, _names("methods", methods), count, _seed(seed), workers
     )
     return told
+
+
+def _mapping(name: str, values: Mapping[str, Any] | None) -> Mapping[str, Any]:
+    if values is not None and not isinstance(values, Mapping):
+        raise wrong(name, f"{values!r} is no dict", "give a dict by keys of the scenario")
+    return values or {}
 
 
 def _count(name: str, value: int | None, most: int) -> int | None:
