@@ -20,6 +20,7 @@ use crate::simulation::Simulation;
 use crate::units::Cycle;
 use crate::workers::Waiting;
 pub use error::BatchError;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use world::World;
 
@@ -39,6 +40,8 @@ pub struct Batch {
 struct Shared {
     start: Arc<Start>,
     worlds: Vec<Mutex<World>>,
+    /// Whether a world may have an error, so that mostly none has to be asked.
+    is_wrong: AtomicBool,
 }
 
 /// An order to all agents of a team in all worlds.
@@ -59,7 +62,8 @@ impl Batch {
             return Err(BatchError::Empty);
         }
         let world = |&seed: &u64| Mutex::new(World::new(seed));
-        let shared = Arc::new(Shared { start, worlds: seeds.iter().map(world).collect() });
+        let worlds = seeds.iter().map(world).collect();
+        let shared = Arc::new(Shared { start, worlds, is_wrong: AtomicBool::new(false) });
         let (crew, orders) = (Waiting::new(workers), Vec::new());
         let mut batch = Self { shared, crew, teams: Arc::default(), orders };
         batch.each(|world, index, shared| world.restart(index, world.seed, &*shared.start, None));
@@ -170,6 +174,7 @@ impl Batch {
             let mut world = shared.world(index);
             let parts = &mut part(room, &lengths, index);
             world.guarded(index, |run| run.observe(team, parts));
+            shared.note(&world);
         };
         let theirs = Arc::clone(&self.shared);
         let spaces: Vec<(bool, usize)> =
@@ -250,26 +255,36 @@ impl Batch {
     /// Does something in each world, on all workers.
     fn each(&mut self, work: impl Fn(&mut World, usize, &Shared) + Send + Sync + 'static) {
         let (n, shared) = (self.len(), Arc::clone(&self.shared));
-        let work = Arc::new(move |k: usize| work(&mut shared.world(k), k, &shared));
+        let work = Arc::new(move |k: usize| {
+            let mut world = shared.world(k);
+            work(&mut world, k, &shared);
+            shared.note(&world);
+        });
         let theirs = Arc::clone(&work);
         self.crew.run(n, |k| work(k), theirs);
     }
 
     /// Returns the error of the first world that has one. Those of broken worlds stay.
     fn told(&self) -> Result<(), BatchError> {
-        self.first_error(|_| true).map_or(Ok(()), Err)
+        match self.shared.is_wrong.load(Ordering::Relaxed) {
+            true => self.first_error(|_| true).map_or(Ok(()), Err),
+            false => Ok(()),
+        }
     }
 
     fn first_error(&self, counts: impl Fn(&BatchError) -> bool) -> Option<BatchError> {
-        let mut first = None;
+        let (mut first, mut is_wrong) = (None, false);
         for index in 0..self.len() {
             let mut world = self.world(index);
-            let Some(error) = world.error.clone().filter(&counts) else { continue };
-            if world.run.is_some() {
-                world.error = None;
+            if let Some(error) = world.error.clone().filter(&counts) {
+                if world.run.is_some() {
+                    world.error = None;
+                }
+                first = first.or(Some(error));
             }
-            first = first.or(Some(error));
+            is_wrong |= world.error.is_some();
         }
+        self.shared.is_wrong.store(is_wrong, Ordering::Relaxed);
         first
     }
 
@@ -316,6 +331,13 @@ impl Shared {
     /// A world that panicked has no run any more, so nothing that it left behind is read.
     fn world(&self, index: usize) -> MutexGuard<'_, World> {
         self.worlds[index].lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Notes whether a world has an error; the end of a call is a barrier.
+    fn note(&self, world: &World) {
+        if world.error.is_some() {
+            self.is_wrong.store(true, Ordering::Relaxed);
+        }
     }
 }
 

@@ -1,4 +1,4 @@
-//! One world of a batch: its run, what its agents observe, and what went wrong in it.
+//! One world of a batch: its run, the observations of its agents, and its error.
 
 use super::{BatchError, Start};
 use crate::control::{CellsMut, OrderError, Team};
@@ -11,9 +11,9 @@ pub(super) struct World {
     pub(super) seed: u64,
     /// `None` for one that broke off, or never started.
     pub(super) run: Option<Box<dyn Simulation>>,
-    /// What went wrong in it.
+    /// Its error, until the caller is told.
     pub(super) error: Option<BatchError>,
-    /// What its agents observe, for the caller to take.
+    /// Observations of its agents, for the caller to take.
     room: Vec<Cells>,
     has_observed: bool,
 }

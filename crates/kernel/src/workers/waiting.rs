@@ -41,8 +41,9 @@ struct Shared {
 struct Call {
     number: u64,
     n: usize,
+    /// `None` when it is over; who comes later goes back to sleep.
     task: Option<Task>,
-    /// Threads that have not ended their part.
+    /// Threads that have begun and not ended their part.
     working: usize,
     is_last: bool,
 }
@@ -136,7 +137,7 @@ impl Shared {
         self.cursors.iter().for_each(|cursor| cursor.0.store(0, Ordering::Relaxed));
         let mut call = self.call();
         call.number += 1;
-        (call.n, call.task, call.working) = (n, Some(task), self.cursors.len() - 1);
+        (call.n, call.task) = (n, Some(task));
         drop(call);
         self.called.notify_all();
     }
@@ -146,13 +147,11 @@ impl Shared {
         let mut seen = 0;
         loop {
             let mut call = self.call();
-            while call.number == seen && !call.is_last {
+            while (call.number == seen || call.task.is_none()) && !call.is_last {
                 call = self.called.wait(call).unwrap_or_else(PoisonError::into_inner);
             }
-            let (n, Some(task)) = (call.n, call.task.clone()) else { return };
-            if call.is_last {
-                return;
-            }
+            let (n, Some(task), false) = (call.n, call.task.clone(), call.is_last) else { return };
+            call.working += 1;
             seen = call.number;
             drop(call);
             let _ended = Ended(self);
@@ -197,16 +196,17 @@ impl Drop for Ended<'_> {
     }
 }
 
-/// Waits until all threads have ended their part.
+/// Waits until all threads that have begun have ended their part.
 struct Awaited<'a>(&'a Shared);
 
 impl Drop for Awaited<'_> {
     fn drop(&mut self) {
         let mut call = self.0.call();
+        // Nothing is left to do: whoever has not begun, because its processor has other work, is not waited for.
+        call.task = None;
         while call.working > 0 {
             call = self.0.done.wait(call).unwrap_or_else(PoisonError::into_inner);
         }
-        call.task = None;
     }
 }
 

@@ -164,7 +164,7 @@ pub struct Compiled {
     pub fallbacks: Arc<Vec<Side>>,
     /// Pairs whose first fallbacks are not apart: the shield promises nothing for them.
     pub too_close: Vec<(u32, u32)>,
-    /// What it was compiled from.
+    /// The text that it was compiled from.
     recipe: Arc<Recipe>,
 }
 

@@ -272,7 +272,7 @@ pub struct Compiled<const D: usize> {
     pub cycles: u64,
     /// The tables to keep.
     pub record: RecordSection,
-    /// What it was compiled from; none where no scenario was read.
+    /// The sections that it was compiled from; none where no scenario was read.
     pub(crate) recipe: Option<Arc<Recipe<D>>>,
 }
 

@@ -1,4 +1,4 @@
-//! What a scenario was compiled from, so that another seed reads no file again.
+//! The sections that a scenario was compiled from, so that another seed reads no file again.
 
 use super::{ChainFile, Compiled, Compiler};
 use crate::ground::Site;
