@@ -18,7 +18,7 @@ use super::rods::geometry::{Bounds, norm};
 use super::rods::rules::{Rotation, Rules};
 use super::world::{ChainSpec, ChainWorld};
 use chains::ChainSection;
-use obstacles::{FieldSection, GroundSection, ObstacleSection, fitted};
+use obstacles::{FieldSection, Ground, GroundSection, ObstacleSection, fitted};
 pub(crate) use recipe::Recipe;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
@@ -362,7 +362,7 @@ impl<const D: usize> Compiler<'_, D> {
         let look_m = 4.0 * radius_m.fold(0.05, f64::max);
         let escape = self.escape(&chains, &ground.movers, dt_s);
         let joint_speed_m_s = self.joint_speed_m_s(&chains);
-        let slave_step_max_m = self.slave_step_max_m(&chains, escape.as_ref(), dt_s);
+        let slave_step_max_m = self.slave_step_max_m(&chains, &ground, escape.as_ref(), dt_s);
         let rules = Rules { slave_step_max_m, ..self.rules(joint_speed_m_s * dt_s) };
         let world = ChainWorld {
             chains,
@@ -429,12 +429,22 @@ impl<const D: usize> Compiler<'_, D> {
     /// Returns the longest way of a slave in a sub-step, meters. The limit of escaping chains holds for led
     /// ones too; where nothing escapes, the usual one is some times the longest sub-step of an initiator,
     /// because rods that turn aside throw what hangs on them much farther.
-    fn slave_step_max_m(&self, chains: &[ChainSpec<D>], escape: Option<&Escape>, dt_s: f64) -> f64 {
+    fn slave_step_max_m(
+        &self,
+        chains: &[ChainSpec<D>],
+        ground: &Ground<D>,
+        escape: Option<&Escape>,
+        dt_s: f64,
+    ) -> f64 {
         let given_m = self.file.chain.slave_step_max_m.map(f64::from);
         if let Some(escape) = escape {
             return given_m.unwrap_or(f64::INFINITY).min(escape.speed_max_m_s * escape.dt_s);
         }
-        let step_m = self.file.chain.step_m.map(f64::from);
+        // Where nothing is in the way, a cycle is one sub-step.
+        let is_open = self.file.chain.self_collision == Some(false)
+            && ground.obstacles.is_empty()
+            && ground.movers.is_empty();
+        let step_m = self.file.chain.step_m.map(f64::from).or(is_open.then_some(f64::INFINITY));
         let longest_m = |spec: &ChainSpec<D>| {
             let led = spec.tasks.iter().map(|task| task.speed_m_s).fold(0.0, f64::max);
             (led * dt_s).min(step_m.unwrap_or(spec.start.step_m()))
