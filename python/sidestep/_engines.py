@@ -132,6 +132,9 @@ class Crew:
         except BrokenExecutor as error:
             copy = Future()
             copy.set_exception(error)
+        except RuntimeError as error:
+            remedy = "give one that was not shut down, or a function that makes one"
+            raise EngineError(f"the executor takes no tasks: {error}\n  help: {remedy}") from error
         task.copies.append(copy)
 
     def _send_slow(self, build: str, tasks: list[_Task]) -> Steps:

@@ -121,6 +121,8 @@ def sweep(
         "record": record,
     }
     _count("workers", workers, 1024)
+    if record and out is None:
+        raise wrong("record", "there is no folder to record runs to", "name one as `out`")
     if record and engine != "local":
         raise wrong("record", "runs are recorded on this machine alone", 'leave it out, or give engine="local"')
     crew = _engines.crew(engine, workers)

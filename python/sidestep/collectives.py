@@ -67,7 +67,7 @@ def minimize(
     returns a number, with ``strategies``, how many each player has.
 
     Sums are estimated in closed form (``"exact"``), objectives from ``block`` samples a round, which age by ``ageing`` a
-    round. ``step``, from 0 to 1, is that of the distributions' ``update``, by Newton's method or Brouwer's; ``utility`` is the cost that
+    round. ``step``, above 0 and up to 1, is that of the distributions' ``update``, by Newton's method or Brouwer's; ``utility`` is the cost that
     players learn from, the joint one or, for sums, the part that a player can influence. The temperature falls by ``cooling``
     a round, until no probability moves by more than ``threshold`` in ``calm_rounds`` rounds, or after ``max_rounds``. Costs should be
     of the order of 1. The same arguments and ``seed`` give the same answer, to the bit.

@@ -116,8 +116,16 @@ def _has(columns: Any, name: str) -> bool:
     return name in (columns if keys is None else list(keys))
 
 
+def _is_missing(cell: Any) -> bool:
+    try:
+        return bool(cell != cell)
+    except TypeError:
+        # The missing value of data frames is neither equal nor unequal to anything.
+        return True
+
+
 def _word(cell: Any) -> Any:
-    if cell is None or cell != cell:
+    if cell is None or _is_missing(cell):
         return ""
     if isinstance(cell, bool):
         return "yes" if cell else "no"

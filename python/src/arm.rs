@@ -179,6 +179,10 @@ impl Arm {
         let targets = rows("targets", &targets, targets.as_array().ncols())?;
         let start = rows("start", &start, chain.variables.len())?;
         let (goal, remarks) = options.goal(&self.0)?;
+        if start.len() != 1 && start.len() != targets.len() {
+            let cause = format!("{} postures for {} targets", start.len(), targets.len());
+            return Err(wrong("start", cause, "give one for all, or one for each"));
+        }
         let goals = targets.iter().map(|target| options.aimed(&goal, target));
         let goals = goals.collect::<PyResult<Vec<ArmGoal>>>()?;
         let numbers: Vec<usize> = (0..goals.len()).collect();
@@ -272,6 +276,11 @@ impl Options {
                 xyz_m: place,
                 rpy_rad: vector(&target[3..]),
             }),
+            width if width != 7 => {
+                let cause = format!("a target of {width} numbers");
+                let remedy = "give 3 (a place), 6 (with roll, pitch, yaw) or 7 (with a quaternion)";
+                return Err(wrong("targets", cause, remedy));
+            }
             _ => {
                 let xyzw = std::array::from_fn(|k| target[3 + k]);
                 Pose::from_quaternion("targets", place, xyzw).map_err(|e| told(&e))?

@@ -1,6 +1,6 @@
 //! Many worlds of one scenario, stepped together.
 
-use crate::arrays::numbers;
+use crate::arrays::{Whole, numbers};
 use crate::error::{self, wrong};
 use crate::json::{list, to_python};
 use crate::scenario::{Made, Scenario, made};
@@ -16,6 +16,11 @@ use std::time::{Duration, Instant};
 
 /// Time after which Python is asked for signals, between two cycles.
 const SLICE: Duration = Duration::from_millis(10);
+
+/// Largest number of worlds.
+const MOST_WORLDS: usize = 1 << 20;
+/// Largest number of workers, as of a sweep.
+const MOST_WORKERS: usize = 1024;
 
 /// Many worlds of one scenario, each with a seed of its own, that step together.
 ///
@@ -68,7 +73,7 @@ impl Batch {
         let array: Option<PyReadonlyArray1<'_, bool>> = mask.extract().ok();
         match array.filter(|array| array.len() == self.worlds) {
             Some(array) => Ok(Some(array.as_array().to_vec())),
-            None => Err(self.wrong_rows("mask", "truth values", mask)),
+            None => Err(self.wrong_rows("mask", "truth values (bool)", mask)),
         }
     }
 
@@ -77,16 +82,28 @@ impl Batch {
         let given: Option<Vec<u64>> = whole(seeds);
         given
             .filter(|given| given.len() == self.worlds)
-            .ok_or_else(|| self.wrong_rows("seeds", "seeds", seeds))
+            .ok_or_else(|| self.wrong_rows("seeds", "seeds (whole numbers from 0 on)", seeds))
     }
 
     fn wrong_rows(&self, key: &str, what: &str, given: &Bound<'_, PyAny>) -> PyErr {
         let shape = given.getattr("shape").map(|shape| shape.to_string());
         let found = shape.or_else(|_| given.len().map(|n| n.to_string()));
         let found = found.unwrap_or_else(|_| given.to_string());
-        let cause = format!("there are {} worlds, and not {found} {what}", self.worlds);
+        let cause = match given.len() {
+            Ok(n) if n == self.worlds => format!("they are no {what}"),
+            _ => format!("there are {} worlds, and not {found} {what}", self.worlds),
+        };
         wrong(key, cause, format!("give an array of {} {what}", self.worlds))
     }
+}
+
+/// Returns a number of something.
+fn within(name: &str, Whole(count): Whole, most: usize) -> PyResult<usize> {
+    let count = usize::try_from(count).unwrap_or(usize::MAX);
+    if (1..=most).contains(&count) {
+        return Ok(count);
+    }
+    Err(wrong(name, format!("is {count}"), format!("give a number from 1 to {most}")))
 }
 
 /// Returns whole numbers, of a list or an array.
@@ -133,20 +150,19 @@ fn start(scenario: &Arc<Made>) -> PyResult<Arc<Start>> {
 #[pymethods]
 impl Batch {
     #[new]
-    #[pyo3(signature = (scenario, worlds, *, workers=1, seeds=None))]
+    #[pyo3(
+        signature = (scenario, worlds, *, workers=Whole(1), seeds=None),
+        text_signature = "(scenario, worlds, *, workers=1, seeds=None)"
+    )]
     fn new(
         py: Python<'_>,
         scenario: &Bound<'_, PyAny>,
-        worlds: usize,
-        workers: usize,
+        worlds: Whole,
+        workers: Whole,
         seeds: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        if worlds == 0 {
-            return Err(wrong("worlds", "a batch of no worlds", "give 1 or more"));
-        }
-        if workers == 0 {
-            return Err(wrong("workers", "0 workers cannot simulate", "give 1 or more"));
-        }
+        let worlds = within("worlds", worlds, MOST_WORLDS)?;
+        let workers = within("workers", workers, MOST_WORKERS)?;
         let scenario = made(scenario)?;
         let first = scenario.compiled.plan().seed;
         let seeds = match seeds {
@@ -239,10 +255,10 @@ impl Batch {
     /// world) is true; orders to the others are dropped. A world that is over stays as it is.
     ///
     /// Raises ReplayError when a world breaks off; the others have advanced then.
-    #[pyo3(signature = (cycles=1, *, mask=None))]
-    fn step(&self, py: Python<'_>, cycles: u64, mask: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+    #[pyo3(signature = (cycles=Whole(1), *, mask=None), text_signature = "($self, cycles=1, *, mask=None)")]
+    fn step(&self, py: Python<'_>, cycles: Whole, mask: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let mask = self.mask(mask)?;
-        let (mut left, mut at_once) = (cycles, 1);
+        let (mut left, mut at_once) = (cycles.0, 1);
         loop {
             let now = left.min(at_once);
             let began = Instant::now();

@@ -1,6 +1,8 @@
 """Many worlds at once: the bits of simulations alone, whatever the workers."""
 
 import os
+import select
+import signal
 import threading
 
 import numpy as np
@@ -105,14 +107,18 @@ def test_a_wrong_order_is_refused_and_nobody_is_ordered_anything(make, order, va
 def test_wrong_input_says_what_would_be_right(make, external):
     batch = make()
     for call, words in [
-        (lambda: sidestep.Batch(external, 0), "give 1 or more"),
-        (lambda: sidestep.Batch(external, 2, workers=0), "0 workers"),
+        (lambda: sidestep.Batch(external, 0), "worlds: is 0"),
+        (lambda: sidestep.Batch(external, 2, workers=0), "workers: is 0\n  help: give a number from 1 to 1024"),
+        (lambda: sidestep.Batch(external, 2, workers=100_000), "workers: is 100000"),
+        (lambda: sidestep.Batch(external, 2**62), "worlds: is"),
+        (lambda: sidestep.Batch(external, -1), "-1 is out of range"),
+        (lambda: batch.step(-1), "-1 is out of range"),
         (lambda: sidestep.Batch(external, 2, seeds=[1]), "2 worlds, and not as many seeds"),
         (lambda: sidestep.Batch(external, 1, seeds=[-1]), "whole numbers of at least 0"),
         (lambda: batch.reset([1, 2]), "an array of 5 seeds"),
         (lambda: batch.step(mask=np.ones(4, bool)), r"not \(4,\) truth values"),
-        (lambda: batch.step(mask=[True] * 5), "not 5 truth values"),
-        (lambda: batch.reset(SEEDS, mask=np.ones(5)), "an array of 5 truth values"),
+        (lambda: batch.step(mask=[True] * 5), "they are no truth values"),
+        (lambda: batch.reset(SEEDS, mask=np.ones(5)), "they are no truth values"),
         (lambda: batch.observe(out={}), r"out.sonar-8_report: it is missing"),
         (lambda: batch.observe(out={}), r"help: give .* C order of the shape \(5, 5, 8\), int64"),
     ]:
@@ -170,10 +176,16 @@ def test_a_forked_process_has_workers_of_its_own(make):
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:
-        batch.step(10)
-        os.write(writer, "".join(batch.digests).encode())
-        os._exit(0)
+        try:
+            batch.step(10)
+            os.write(writer, "".join(batch.digests).encode())
+        finally:
+            # Whatever happens, the child is no second run of the tests.
+            os._exit(0)
     os.close(writer)
+    ready, _, _ = select.select([reader], [], [], 120)
+    if not ready:
+        os.kill(child, signal.SIGKILL)
     with open(reader) as pipe:
         told = pipe.read()
     os.waitpid(child, 0)

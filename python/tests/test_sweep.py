@@ -53,7 +53,7 @@ def files(folder):
 
 
 def begun(folder):
-    """How many runs the journal has, after its first line."""
+    """The number of runs that the journal has, after its first line."""
     journals = (folder / "shares").glob("*.journal")
     return sum(max(journal.read_bytes().count(b"\n") - 1, 0) for journal in journals)
 
@@ -166,18 +166,23 @@ def test_what_cannot_be_swept_is_an_error_before_any_run(options, words, floor):
 
 
 def test_ctrl_c_stops_a_sweep_and_the_same_call_goes_on(floor, tmp_path):
-    out, options = tmp_path / "s", {"set": {"cycles": 20_000}, "replicate": 40}
+    options = {"set": {"cycles": 60_000}, "replicate": 40}
+    out, done = tmp_path / "s", threading.Event()
 
     def interrupt():
-        while not begun(out):
+        while not begun(out) and not done.is_set():
             time.sleep(0.01)
-        os.kill(os.getpid(), signal.SIGINT)
+        if not done.is_set():
+            os.kill(os.getpid(), signal.SIGINT)
 
-    thread = threading.Thread(target=interrupt)
+    thread = threading.Thread(target=interrupt, daemon=True)
     thread.start()
-    with pytest.raises(KeyboardInterrupt):
-        sidestep.sweep(floor, **options, out=out, workers=2)
-    thread.join()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            sidestep.sweep(floor, **options, out=out, workers=2)
+    finally:
+        done.set()
+        thread.join()
     assert 0 < len(sidestep.read(out)["results"]) < 40
     swept = sidestep.sweep(floor, **options, out=out, workers=2)
     assert 0 < swept.told["took"]["runs"] < 40
@@ -191,7 +196,7 @@ from concurrent.futures import ThreadPoolExecutor
 import sidestep
 floor, out = sys.argv[1:]
 with ThreadPoolExecutor(2) as pool:
-    sidestep.sweep(floor, set={"cycles": 20_000}, replicate=40, out=out, engine=pool)
+    sidestep.sweep(floor, set={"cycles": 60_000}, replicate=40, out=out, engine=pool)
 """
 
 
@@ -205,7 +210,7 @@ def test_a_killed_driver_loses_nothing_that_is_in_the_journal(floor, tmp_path):
     driver.wait()
     finished = len(sidestep.read(out)["results"])
     assert 0 < finished < 40
-    options = {"set": {"cycles": 20_000}, "replicate": 40}
+    options = {"set": {"cycles": 60_000}, "replicate": 40}
     with ThreadPoolExecutor(2) as pool:
         swept = sidestep.sweep(floor, **options, out=out, engine=pool)
     assert swept.told["took"]["runs"] == 40 - finished
@@ -296,7 +301,7 @@ class Slow(ThreadPoolExecutor):
 
         def run():
             if is_first:
-                self.is_done.wait()
+                assert self.is_done.wait(120), "nobody was sent a second time"
             outcomes = fn(*args, **kwargs)
             if is_second:
                 self.is_done.set()
@@ -330,7 +335,7 @@ def sent_tasks(floor):
 
 
 class Wrapped(sidestep.InputError):
-    """What Ray makes of an error: of its type, with a traceback as its text."""
+    """The error that Ray makes of one: of its type, with a traceback as its text."""
 
     def __init__(self, error):
         super().__init__("Traceback ...")

@@ -64,7 +64,8 @@ impl Batch {
         let world = |&seed: &u64| Mutex::new(World::new(seed));
         let worlds = seeds.iter().map(world).collect();
         let shared = Arc::new(Shared { start, worlds, is_wrong: AtomicBool::new(false) });
-        let (crew, orders) = (Waiting::new(workers), Vec::new());
+        // More workers than worlds would have nothing to do.
+        let (crew, orders) = (Waiting::new(workers.min(seeds.len())), Vec::new());
         let mut batch = Self { shared, crew, teams: Arc::default(), orders };
         batch.each(|world, index, shared| world.restart(index, world.seed, &*shared.start, None));
         batch.told()?;
@@ -85,7 +86,7 @@ impl Batch {
         self.shared.worlds.len()
     }
 
-    /// Number of workers.
+    /// Number of workers: those that were asked for, at most one for each world.
     pub fn workers(&self) -> usize {
         self.crew.workers()
     }
@@ -197,13 +198,14 @@ impl Batch {
     pub fn restart(&mut self, seeds: &[Option<u64>]) -> Result<(), BatchError> {
         self.check_count(Some(seeds.len()), "seeds")?;
         self.orders.clear();
-        let (seeds, teams) = (seeds.to_vec(), Arc::clone(&self.teams));
+        let (wanted, teams) = (seeds.to_vec(), Arc::clone(&self.teams));
         self.each(move |world, index, shared| {
-            if let Some(seed) = seeds[index] {
+            if let Some(seed) = wanted[index] {
                 world.restart(index, seed, &*shared.start, Some(&teams));
             }
         });
-        let refused = self.first_error(|error| !matches!(error, BatchError::Broken { .. }));
+        // Those that were broken before, and are not among them, are none of this call's.
+        let refused = self.first_error(|index, _| seeds[index].is_some());
         refused.map_or(Ok(()), Err)
     }
 
@@ -267,16 +269,16 @@ impl Batch {
     /// Returns the error of the first world that has one. Those of broken worlds stay.
     fn told(&self) -> Result<(), BatchError> {
         match self.shared.is_wrong.load(Ordering::Relaxed) {
-            true => self.first_error(|_| true).map_or(Ok(()), Err),
+            true => self.first_error(|_, _| true).map_or(Ok(()), Err),
             false => Ok(()),
         }
     }
 
-    fn first_error(&self, counts: impl Fn(&BatchError) -> bool) -> Option<BatchError> {
+    fn first_error(&self, counts: impl Fn(usize, &BatchError) -> bool) -> Option<BatchError> {
         let (mut first, mut is_wrong) = (None, false);
         for index in 0..self.len() {
             let mut world = self.world(index);
-            if let Some(error) = world.error.clone().filter(&counts) {
+            if let Some(error) = world.error.clone().filter(|error| counts(index, error)) {
                 if world.run.is_some() {
                     world.error = None;
                 }

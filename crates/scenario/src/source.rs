@@ -279,7 +279,7 @@ mod tests {
         // An error of its own, and one that no key names, stay as they are.
         let own = source.error(0..1, "wrong", "right");
         assert_eq!((source.told(&own), source.told(&wrong)), (own, wrong.clone()));
-        assert_eq!(source.naming(0..0, wrong.clone()).key(), None);
+        assert_eq!(source.naming(0..source.text.len(), wrong).key(), None);
     }
 
     #[derive(Debug, Deserialize)]

@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv as GymnasiumVectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from .._errors import wrong
 from .._native import Batch as Worlds
 from .._native import Scenario
 from ._parallel import (
@@ -22,7 +23,6 @@ from ._parallel import (
     orders_of,
     rewards_of,
     space_of,
-    wrong,
 )
 from ._rewards import Reward, earned
 
@@ -128,6 +128,7 @@ class Batch:
             if one is not None and mask[k]:
                 self._rngs[k] = np.random.default_rng(one)
         self._restart(mask)
+        self._look()
         return self._observed(), {}
 
     def step(
@@ -153,8 +154,7 @@ class Batch:
         self.worlds.step(mask=goes_on)
         if begins.any():
             self._restart(begins)
-        else:
-            self._look()
+        self._look()
         gains = self._gains()
         gains[begins] = 0.0
         terminations = self.worlds.is_over & goes_on
@@ -165,6 +165,8 @@ class Batch:
             ended = self._ended
             infos = {"final_obs": self._observed(copy=True), "_final_obs": ended.copy()}
             self._restart(ended)
+            # Into the same arrays: those of the step before are still the caller's.
+            self.worlds.observe(self._number, out=self._raw[self._now])
         return self._observed(), gains, terminations, truncations, infos
 
     def close(self) -> None:
@@ -206,7 +208,6 @@ class Batch:
             seeds[k] = self._rngs[k].integers(MOST_SEED)
         self.worlds.reset(seeds, mask=mask)
         self._ended = self._ended & ~mask
-        self._look()
 
     def _look(self) -> None:
         self._now = 1 - self._now
@@ -231,8 +232,14 @@ class Batch:
         if unknown or missing:
             cause = f"there is no order `{unknown[0]}`" if unknown else f"`{missing[0]}` is missing"
             raise wrong("actions", cause, f"give {', '.join(sorted(known))}")
-        for name, values in actions.items():
-            self.worlds.order(name, np.asarray(values), team=self._number)
+        try:
+            for name, values in actions.items():
+                self.worlds.order(name, np.asarray(values), team=self._number)
+        except Exception:
+            # An action counts as a whole: what is noted of it is dropped.
+            n = self.num_worlds
+            self.worlds.reset(np.zeros(n, np.uint64), mask=np.zeros(n, bool))
+            raise
 
     def _gains(self) -> NDArray[np.float64]:
         n = self._shape[0] * self._shape[1]

@@ -12,7 +12,7 @@ import pettingzoo
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from .._errors import InputError
+from .._errors import wrong
 from .._native import Scenario, Simulation, Space, Team
 from ._rewards import DEFAULTS, Reward, earned, rewards
 
@@ -272,10 +272,3 @@ def action_space(chosen: list[Space]) -> spaces.Space[Any]:
     if len(chosen) == 1:
         return within(chosen[0])
     return spaces.Dict({space.name: within(space) for space in chosen})
-
-
-def wrong(place: str, cause: str, remedy: str) -> InputError:
-    """Returns the exception of wrong input."""
-    told = f"{place}: {cause}\n  help: {remedy}"
-    return InputError(told, place=place, key=place, cause=cause, remedy=remedy)
-

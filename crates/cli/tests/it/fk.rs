@@ -159,7 +159,8 @@ fn shared_models_are_where_others_computed_them() {
         let values = expected["q_test"].as_array().expect("values").iter();
         let joints = values.map(Value::to_string).collect::<Vec<_>>().join(",");
         let path = format!("{data}/{name}");
-        let fk = place.json(&["fk", &path, "--joints", &joints]);
+        let tip = expected["tip"].as_str().expect("a link");
+        let fk = place.json(&["fk", &path, "--tip", tip, "--joints", &joints]);
         let row = |i: usize| expected["fk_test"][i][3].as_f64().expect("a number");
         assert_near(&fk["tip"], [row(0), row(1), row(2)]);
         assert_eq!(fk["tip_link"], expected["tip"], "{name}");

@@ -91,6 +91,11 @@ impl Waiting {
     fn crew(&mut self) -> &Crew {
         let process = std::process::id();
         let is_here = self.crew.as_ref().is_some_and(|crew| crew.process == process);
+        let is_broken = |crew: &Crew| crew.shared.is_broken.load(Ordering::Relaxed);
+        if is_here && self.crew.as_ref().is_some_and(is_broken) {
+            // The last call unwound, and some of its threads are gone.
+            self.crew = None;
+        }
         if !is_here && let Some(lost) = self.crew.take() {
             // The threads belong to the parent: its locks may be held in this copy for ever.
             std::mem::forget(lost);

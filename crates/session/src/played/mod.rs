@@ -31,7 +31,7 @@ pub(crate) struct Played {
     shown: Cycle,
 }
 
-/// Where the bodies of a moment are told.
+/// The source of the bodies of a moment.
 enum Bodies {
     Tables(Places),
     Messages(McapScenes),

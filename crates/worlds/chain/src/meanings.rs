@@ -75,7 +75,7 @@ pub(super) const MEANINGS: &[Meaning] = &[
         name: "min_own_gap_m",
         words: "least distance of own parts",
         unit: "",
-        meaning: "least distance between parts of a chain that are no neighbors; below 0 where they overlapped; none if \
+        meaning: "least distance between parts of a chain that are no neighbors (of more than 32 rods: in every 16th cycle); below 0 where they overlapped; none if \
                   none came near",
     },
     Meaning { name: "done", words: "tasks done", unit: "", meaning: "tasks done, targets reached" },

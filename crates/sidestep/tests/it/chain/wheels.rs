@@ -57,7 +57,7 @@ speed_m_s = 0.5
 patience_s = 1000.0
 ";
 
-/// What robots did that wheels cannot, at most, in a run: a slip across the way in meters, a turn in rad in a
+/// The most that robots did in a run and wheels cannot: a slip across the way in meters, a turn in rad in a
 /// cycle, an overlap of two bodies in meters.
 fn excesses(text: &str, seed: u64, cycles: u64) -> [f64; 3] {
     let mut run = run::<2>(&source(seed, text), 1);

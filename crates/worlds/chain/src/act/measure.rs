@@ -6,9 +6,9 @@ use crate::events::EventKind;
 use crate::metrics::PENETRATION_M;
 use crate::rods::geometry::distance;
 
-/// Most rods of a chain whose own parts are measured in each cycle,
+/// Most rods of a chain whose own parts are measured in each cycle.
 const MOST_LOOKED_AT: usize = 32;
-/// and the cycles between two measurements of longer ones.
+/// Number of cycles between two measurements of longer ones.
 const LOOKS_EVERY: u64 = 16;
 
 impl<const D: usize> Acting<'_, D> {

@@ -14,9 +14,9 @@ use super::propagate::Propagator;
 use super::veto::{Mode, Motion, Outcome, Reason, Request, Source, Veto};
 use sidestep_kernel::InputError;
 
-/// Most double passes before the search is given up,
+/// Most double passes before the search is given up.
 const MAX_DOUBLE_PASSES: usize = 40;
-/// and where several connectors are held, whose return passes disturb each other.
+/// Most double passes where several connectors are held, whose return passes disturb each other.
 const MAX_MUTUAL_PASSES: usize = 400;
 /// Least relative gain of a double pass; one that brings the connector nearer by less ends the
 /// search.

@@ -85,7 +85,7 @@ pub(super) struct NavigatorSection {
     leave_rule: Option<bool>,
     /// Way to turn.
     turning: TurningWord,
-    /// What is done about something that moves ahead.
+    /// The answer to something that moves ahead.
     movers: MoversWord,
     /// Number of beams of the laser.
     beams: Option<usize>,

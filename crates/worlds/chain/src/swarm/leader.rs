@@ -240,9 +240,9 @@ pub struct Percept {
     pub walls_m: Sides<f64>,
     /// The target, if it is detected.
     pub target: Option<Sighting>,
-    /// Whether something that moves is close ahead,
+    /// Whether something that moves is close ahead.
     pub is_mover_ahead: bool,
-    /// and whether the leader still has the patience to stand for it.
+    /// Whether the leader still has the patience to stand for it.
     pub stands_for_it: bool,
 }
 
