@@ -121,10 +121,10 @@ def sweep(
         "record": record,
     }
     _count("workers", workers, 1024)
-    if record and out is None:
-        raise wrong("record", "there is no folder to record runs to", "name one as `out`")
     if record and engine != "local":
         raise wrong("record", "runs are recorded on this machine alone", 'leave it out, or give engine="local"')
+    if record and out is None:
+        raise wrong("record", "there is no folder to record runs to", "name one as `out`")
     crew = _engines.crew(engine, workers)
     if crew is None:
         return Sweep(*run_sweep(sweep, options, out, workers or 0, None))

@@ -196,3 +196,16 @@ def test_unknown_options_and_wrong_values_are_errors(external):
     own.reset(seed=1)
     with pytest.raises(sidestep.InputError, match=r"the shape \(10,\)"):
         own.step(np.zeros((2, 5)))
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode)[:2])
+def test_arrays_that_are_not_copied_stay_for_one_more_step(external, mode):
+    env = Batch(one(external), 3, max_cycles=4, copy=False, autoreset_mode=mode)
+    before, _ = env.reset(seed=1)
+    for _ in range(12):
+        kept = {name: array.copy() for name, array in before.items()}
+        after, *_ = env.step(np.zeros((3, 1), int))
+        for name, array in before.items():
+            assert not np.shares_memory(array, after[name]), name
+            np.testing.assert_array_equal(array, kept[name])
+        before = after
