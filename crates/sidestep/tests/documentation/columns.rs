@@ -32,7 +32,10 @@ const SCENARIOS: [(&str, &str); 3] = [
 
 /// A scenario of each world with an agent that is decided from outside.
 const EXTERNAL: [(&str, &str); 3] = [
-    ("robots", "[map]\nascii = \"....\"\n[robots]\nbehaviour = { kind = \"external\" }\n"),
+    (
+        "robots",
+        "[map]\nascii = \"....\"\n[robots]\ncount = 1\nbehaviour = { kind = \"external\" }\n",
+    ),
     (
         "airspace",
         "[airspace]\nmethod = \"external\"\n[airspace.generator]\nkind = \"superconflict\"\nn = 2\n",
