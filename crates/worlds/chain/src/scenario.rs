@@ -441,7 +441,7 @@ impl<const D: usize> Compiler<'_, D> {
             return given_m.unwrap_or(f64::INFINITY).min(escape.speed_max_m_s * escape.dt_s);
         }
         // A chain alone takes a cycle in one sub-step where nothing is in the way; several that have the floor for
-        // themselves are given as much, though they halve their steps near each other.
+        // themselves are given as much.
         let is_open = self.file.chain.self_collision == Some(false)
             && ground.obstacles.is_empty()
             && ground.movers.is_empty();
