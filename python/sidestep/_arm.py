@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._errors import wrong
+from ._errors import whole, wrong
 from ._native import Arm
 
 _Floats = NDArray[np.float64]
@@ -136,20 +136,22 @@ def ik(
     if len(begin) not in (1, len(places)):
         raise wrong("start", f"has {len(begin)} rows", f"give one row, or one per target, {len(places)}")
     spheres = np.empty((0, 4)) if obstacles is None else _rows("obstacles", obstacles)
+    if not np.isfinite(spheres).all():
+        raise wrong("obstacles", "has values that are no numbers", "give x, y, z and radius in meters")
     options = {
         "free": list(free),
         "engine": engine,
         "tolerance_m": tolerance_m,
         "tolerance_rad": tolerance_rad,
-        "solutions": solutions,
+        "solutions": whole("solutions", solutions, 1, 10_000),
         "apart": apart,
         "nearest": nearest,
-        "restarts": restarts,
-        "seed": seed,
+        "restarts": whole("restarts", restarts, 0, 1_000_000),
+        "seed": whole("seed", seed, 0, 2**64 - 1),
         "obstacles": _wide("obstacles", spheres, 4).tolist(),
         "body": body,
         "ignore_limits": ignore_limits,
-        "workers": workers,
+        "workers": whole("workers", workers, 1, 1024),
     }
     return Reached(**arm.inverse(np.ascontiguousarray(places), begin, options))
 

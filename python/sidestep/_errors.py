@@ -66,3 +66,10 @@ class ClosedError(SidestepError, RuntimeError):
 def wrong(place: str, cause: str, remedy: str) -> InputError:
     """Returns the error of an argument."""
     return InputError(f"{place}: {cause}\n  help: {remedy}", place, None, None, None, cause, remedy)
+
+
+def whole(name: str, value: int, least: int, most: int) -> int:
+    """Returns a whole number, if it is in its range."""
+    if not least <= value <= most:
+        raise wrong(name, f"is {value}", f"give a number from {least} to {most}")
+    return value

@@ -9,7 +9,7 @@ from typing import Any
 
 from . import _engines
 from ._engines import Engine
-from ._errors import wrong
+from ._errors import whole, wrong
 from ._native import Scenario, Table, compare_methods, run_sweep
 
 #: Largest number of runs of a variant.
@@ -174,15 +174,11 @@ def _mapping(name: str, values: Mapping[str, Any] | None) -> Mapping[str, Any]:
 
 
 def _count(name: str, value: int | None, most: int) -> int | None:
-    if value is not None and not 1 <= value <= most:
-        raise wrong(name, f"is {value}", f"give a number from 1 to {most}")
-    return value
+    return None if value is None else whole(name, value, 1, most)
 
 
 def _seed(seed: int | None) -> int | None:
-    if seed is not None and not 0 <= seed < 2**63:
-        raise wrong("seed", f"is {seed}", "give a number from 0 to 2^63 - 1")
-    return seed
+    return None if seed is None else whole("seed", seed, 0, 2**63 - 1)
 
 
 def _names(name: str, names: Sequence[str]) -> list[str]:

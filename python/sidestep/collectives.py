@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from ._errors import wrong
+from ._errors import whole, wrong
 
 __all__ = ["Minimum", "minimize"]
 
@@ -81,7 +81,7 @@ def minimize(
     is_exact = objective is None
     options: dict[str, Any] = {
         "estimator": estimator or ("exact" if is_exact else "sampled"),
-        "block": block,
+        "block": whole("block", block, 1, 1_000_000),
         "ageing": ageing,
         "update": update,
         "step": step,
@@ -89,10 +89,10 @@ def minimize(
         "utility": utility,
         "cooling": cooling,
         "threshold": threshold,
-        "calm_rounds": calm_rounds,
-        "max_rounds": max_rounds,
+        "calm_rounds": whole("calm_rounds", calm_rounds, 1, 1_000_000),
+        "max_rounds": whole("max_rounds", max_rounds, 1, 1_000_000_000),
         "choice": choice,
-        "seed": seed,
+        "seed": whole("seed", seed, 0, 2**64 - 1),
     }
     if objective is not None:
         if own is not None or pairs is not None or strategies is None:

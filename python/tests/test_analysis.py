@@ -250,3 +250,17 @@ def test_games_that_are_none_are_errors(options, words):
     with pytest.raises(sidestep.InputError) as caught:
         collectives.minimize(**options)
     assert words in str(caught.value)
+
+
+def test_numbers_out_of_range_are_told_with_the_range(urdf):
+    arm = sidestep.Arm(urdf)
+    for call, words in [
+        (lambda: sidestep.ik(arm, [0.3, 0, 0.3], restarts=-1), "restarts: is -1"),
+        (lambda: sidestep.ik(arm, [0.3, 0, 0.3], seed=2**64), "give a number from 0 to"),
+        (lambda: sidestep.ik(arm, [0.3, 0, 0.3], workers=0), "workers: is 0"),
+        (lambda: sidestep.ik(arm, [0.3, 0, 0.3], obstacles=[[0, 0, np.nan, 1]]), "no numbers"),
+        (lambda: collectives.minimize([[0.0, 1.0]], seed=-1), "seed: is -1"),
+        (lambda: collectives.minimize([[0.0, 1.0]], block=0), "block: is 0"),
+    ]:
+        with pytest.raises(sidestep.InputError, match=words):
+            call()

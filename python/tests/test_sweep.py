@@ -390,18 +390,22 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_table(floor, tmp_path
     )
     with cluster, distributed.Client(cluster) as client:
         worker = next(iter(cluster.workers.values()))
-        done = threading.Event()
+        done, at_kill = threading.Event(), []
 
         def kill():
             while not done.is_set() and not begun(tmp_path / "dask"):
                 time.sleep(0.01)
+            at_kill.append(begun(tmp_path / "dask"))
             os.kill(worker.pid, signal.SIGKILL)
 
-        thread = threading.Thread(target=kill)
+        thread = threading.Thread(target=kill, daemon=True)
         thread.start()
-        sidestep.sweep(floor, **options, out=tmp_path / "dask", engine=client.get_executor())
-        done.set()
-        thread.join()
+        try:
+            sidestep.sweep(floor, **options, out=tmp_path / "dask", engine=client.get_executor())
+        finally:
+            done.set()
+            thread.join()
+    assert 0 < at_kill[0] < 24, "the worker was there to the end"
     assert files(tmp_path / "dask") == files(tmp_path / "local")
 
 
@@ -425,14 +429,16 @@ def test_a_ray_cluster_that_loses_a_node_gives_the_same_table(floor, tmp_path, m
         def kill():
             while not done.is_set() and not begun(tmp_path / "ray"):
                 time.sleep(0.01)
-            cluster.remove_node(others[0], allow_graceful=False)
             at_kill.append(begun(tmp_path / "ray"))
+            cluster.remove_node(others[0], allow_graceful=False)
 
-        thread = threading.Thread(target=kill)
+        thread = threading.Thread(target=kill, daemon=True)
         thread.start()
-        swept = sidestep.sweep(floor, **options, out=tmp_path / "ray", engine="ray")
-        done.set()
-        thread.join()
+        try:
+            swept = sidestep.sweep(floor, **options, out=tmp_path / "ray", engine="ray")
+        finally:
+            done.set()
+            thread.join()
         assert 0 < at_kill[0] < 48, "the node was there to the end"
     finally:
         ray.shutdown()
