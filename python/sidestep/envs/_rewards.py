@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._errors import InputError
+from .._errors import InputError, wrong
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -105,6 +105,4 @@ def earned(
 
 
 def _wrong(name: str, cause: str, remedy: str) -> InputError:
-    place = f"rewards.{name}"
-    told = f"{place}: {cause}\n  help: {remedy}"
-    return InputError(told, place=place, key=place, cause=cause, remedy=remedy)
+    return wrong(f"rewards.{name}", cause, remedy)
