@@ -1,0 +1,16 @@
+//! A fleet: a world at a server, and its agents as processes on a network.
+//!
+//! ```text
+//! wire/      frames between parties: in memory, or by Zenoh (the one file that names sockets)
+//! words.rs   what parties say to each other          post.rs   letters: numbered, acknowledged, repeated
+//! mail.rs    a party's letters and notes             ports.rs  what is asked of a world and of an agent's program
+//! server/    the world's server                      node/     the node of an agent
+//! ```
+
+pub mod mail;
+pub mod node;
+pub mod ports;
+mod post;
+pub mod server;
+pub mod wire;
+pub mod words;
