@@ -18,7 +18,7 @@ pub trait Stage {
     fn cycle_s(&self) -> f64;
 
     /// Returns what each agent that decides in the cycle to come perceives, by rising id.
-    fn sights(&self) -> Vec<(EntityId, Begin)>;
+    fn sights(&self) -> Vec<Sight>;
 
     /// Makes the cycle to come with the controls of some agents; others do what is safe.
     ///
@@ -26,6 +26,17 @@ pub trait Stage {
     /// When it cannot be recorded. A control that makes no sense is returned with the reason, and its agent does
     /// what is safe.
     fn advance(&mut self, controls: Vec<(EntityId, Vec<u8>)>) -> Result<Vec<Absurd>, sidestep_session::Error>;
+}
+
+/// What an agent perceives at the start of a cycle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sight {
+    /// The agent.
+    pub agent: EntityId,
+    /// Those who decide together in this cycle, the agent among them, rising.
+    pub group: Vec<EntityId>,
+    /// The percept, as it is sent.
+    pub begin: Begin,
 }
 
 /// A control that makes no sense.
@@ -42,6 +53,8 @@ pub struct Absurd {
 pub struct Outgoing {
     /// The receivers, rising.
     pub to: Vec<EntityId>,
+    /// Its number among the sender's in the talk.
+    pub sequence: u32,
     /// The content.
     pub payload: Vec<u8>,
 }
@@ -59,14 +72,12 @@ pub struct Doing {
 
 /// The program of an agent: a state machine without a clock, a socket or a thread.
 pub trait Program: Send {
-    /// Begins a cycle with what the agent perceives; what it did in the one before is over.
+    /// Begins a cycle with what the agent perceives; what it did in the one before is over. Returns the tick in
+    /// which the cycle begins.
     ///
     /// # Errors
     /// When the percept cannot be read, with the reason.
-    fn begin(&mut self, sight: &[u8]) -> Result<(), String>;
-
-    /// Returns the tick in which the cycle begins.
-    fn first_tick(&self) -> u64;
+    fn begin(&mut self, cycle: Cycle, sight: &[u8]) -> Result<u64, String>;
 
     /// Takes a packet of another agent.
     fn on_packet(&mut self, from: EntityId, payload: &[u8], tick: u64);
@@ -79,6 +90,9 @@ pub trait Program: Send {
 
     /// Takes the packets that it sends.
     fn take_packets(&mut self) -> Vec<Outgoing>;
+
+    /// Whether its control is there.
+    fn is_done(&self) -> bool;
 
     /// Returns its control, once it is there.
     fn control(&self) -> Option<Vec<u8>>;
@@ -98,12 +112,10 @@ pub trait Program: Send {
 pub struct Sent {
     /// The receiver.
     pub to: EntityId,
-    /// The tick in which it is sent.
+    /// The tick in which it is sent. In real time it is that in which the cycle began, so that the same packets
+    /// meet the same faults although they are not sent at the same times.
     pub tick: u64,
-    /// The tick by which its faults are drawn: the same packets of a talk meet the same faults, although in real
-    /// time they are not sent in the same ticks.
-    pub drawn_in: u64,
-    /// Its number among the sender's in the cycle.
+    /// Its number among the sender's in that tick.
     pub sequence: u32,
     /// Its size.
     pub bytes: usize,
@@ -118,5 +130,5 @@ pub trait Channel: Send {
     fn tick_s(&self) -> f64;
 
     /// Begins a cycle: links are free again.
-    fn begin(&mut self);
+    fn begin(&mut self, cycle: Cycle);
 }

@@ -133,13 +133,14 @@ impl Node {
 
     /// Begins a cycle.
     fn begin(&mut self, begin: Begin) -> Result<(), NodeError> {
-        self.program.begin(&begin.sight).map_err(NodeError::Percept)?;
+        let begun = self.program.begin(begin.cycle, &begin.sight);
+        let first_tick = begun.map_err(NodeError::Percept)?;
         self.status.cycle = begin.cycle;
         let tick_s = self.channel.as_mut().map(|channel| {
-            channel.begin();
+            channel.begin(begin.cycle);
             channel.tick_s()
         });
-        self.turn = Some(Turn::new(begin, self.clock, tick_s, self.program.first_tick()));
+        self.turn = Some(Turn::new(begin, self.clock, tick_s, first_tick));
         for (from, packet) in std::mem::take(&mut self.early) {
             self.on_packet(from, packet);
         }

@@ -170,7 +170,7 @@ impl Turn {
             tick: self.tick,
             sent,
             timer: ends.program.next_timer(),
-            is_done: ends.program.control().is_some(),
+            is_done: ends.program.is_done(),
         };
         ends.mail.letter(Party::Server, Word::Ticked(report));
     }
@@ -199,22 +199,24 @@ impl Turn {
 
     /// Sends a packet to each of its receivers, with the faults that happen to it.
     fn send(&mut self, packet: Outgoing, ends: &mut Ends<'_>, sent: &mut Vec<(EntityId, u64)>) {
-        let (sequence, bytes) = (self.sequence, packet.payload.len());
+        let bytes = packet.payload.len();
+        // In real time the number is the sender's in the whole cycle, as all draws are for its first tick.
+        let (tick, sequence) = match self.time {
+            Time::Running(_) => (self.first_tick, self.sequence),
+            _ => (self.tick, packet.sequence),
+        };
         self.sequence += 1;
         for to in packet.to {
             self.sent.packets += 1;
             self.sent.bytes += bytes as u64;
-            let is_beyond = self.begin.beyond.binary_search(&to).is_ok();
-            let drawn_in = if self.time == Time::Counted { self.tick } else { self.first_tick };
-            let way = Sent { to, tick: self.tick, drawn_in, sequence, bytes };
             let arrivals = match &mut ends.channel {
-                _ if is_beyond => Vec::new(),
-                Some(channel) => channel.arrivals(&way),
-                None => vec![self.tick + 1],
+                _ if self.begin.beyond.binary_search(&to).is_ok() => Vec::new(),
+                Some(channel) => channel.arrivals(&Sent { to, tick, sequence, bytes }),
+                None => vec![tick + 1],
             };
             for arrives in arrivals {
-                let payload = packet.payload.clone();
-                let cycle = self.begin.cycle;
+                let (cycle, payload) = (self.begin.cycle, packet.payload.clone());
+                let arrives = self.tick + (arrives - tick);
                 let packet = Packet { cycle, sent: self.tick, sequence, arrives, payload };
                 sent.push((to, arrives));
                 self.part(to, packet, ends.mail);

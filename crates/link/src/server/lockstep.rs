@@ -10,14 +10,14 @@ impl Server<'_> {
     /// When a node is gone, the world cannot go on, or somebody asks the fleet to end.
     pub(super) fn cycle_in_lockstep(&mut self) -> Result<(), Broken> {
         let began = Instant::now();
-        let decide = self.hand_out_sights();
+        let groups = self.hand_out_sights();
         if self.terms.has_faults {
-            self.count_ticks(&decide)?;
+            self.count_ticks(&groups)?;
         }
-        while !self.has_controls(&decide) {
+        while !self.has_controls(&groups) {
             self.hear(LOOK)?;
         }
         self.tally.talked.add(began.elapsed());
-        self.advance(&decide)
+        self.advance(&groups)
     }
 }

@@ -16,9 +16,9 @@ pub mod tally;
 mod ticks;
 
 use crate::mail::{Heard, Mail};
-use crate::ports::Stage;
+use crate::ports::{Sight, Stage};
 use crate::wire::Party;
-use crate::words::{Clock, Control, Fingerprint, Status, Ticked, Welcome, Word};
+use crate::words::{Clock, Control, Fingerprint, Ticked, Welcome, Word};
 pub use seat::Seat;
 use sidestep::kernel::{Cycle, EntityId};
 use std::collections::BTreeMap;
@@ -251,21 +251,23 @@ impl<'a> Server<'a> {
         }
     }
 
-    /// Hands each agent that decides its percept; returns who they are.
-    fn hand_out_sights(&mut self) -> Vec<EntityId> {
+    /// Hands each agent that decides its percept; returns the groups of those who decide together.
+    fn hand_out_sights(&mut self) -> Vec<Vec<EntityId>> {
         self.seats.values_mut().for_each(|seat| seat.control = None);
-        let sights = self.stage.sights();
-        let decide = sights.iter().map(|(agent, _)| *agent).collect();
-        for (agent, begin) in sights {
+        let mut groups = Vec::new();
+        for Sight { agent, group, begin } in self.stage.sights() {
             self.mail.letter(Party::Node(agent), Word::Begin(begin));
+            if group.first() == Some(&agent) {
+                groups.push(group);
+            }
         }
-        decide
+        groups
     }
 
     /// Lets the world go on with the controls that are there, and counts those that are not.
-    fn advance(&mut self, decide: &[EntityId]) -> Result<(), Broken> {
-        let mut controls = Vec::with_capacity(decide.len());
-        for agent in decide {
+    fn advance(&mut self, groups: &[Vec<EntityId>]) -> Result<(), Broken> {
+        let mut controls = Vec::new();
+        for agent in groups.iter().flatten() {
             let Some(seat) = self.seats.get_mut(agent) else { continue };
             match seat.control.take() {
                 Some(control) => {
@@ -280,6 +282,7 @@ impl<'a> Server<'a> {
         }
         let began = Instant::now();
         let cycle = self.stage.cycle();
+        controls.sort_unstable_by_key(|(agent, _)| *agent);
         for absurd in self.stage.advance(controls)? {
             tracing::warn!(airplane = absurd.agent, cycle, reason = absurd.reason, "an absurd control");
             self.tally.absurd_controls += 1;
@@ -293,13 +296,7 @@ impl<'a> Server<'a> {
     }
 
     /// Whether all of these agents have sent their controls.
-    fn has_controls(&self, decide: &[EntityId]) -> bool {
-        decide.iter().all(|agent| self.seats.get(agent).is_some_and(|seat| seat.control.is_some()))
-    }
-
-    /// Returns the status that a node has told last.
-    #[cfg(test)]
-    fn status(&self, agent: EntityId) -> &Status {
-        &self.seats[&agent].status
+    fn has_controls(&self, groups: &[Vec<EntityId>]) -> bool {
+        groups.iter().flatten().all(|agent| self.seats.get(agent).is_some_and(|seat| seat.control.is_some()))
     }
 }

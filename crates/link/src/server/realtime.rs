@@ -24,12 +24,12 @@ impl Server<'_> {
         while !self.stage.is_over() {
             self.note_lateness(due.elapsed(), cycle);
             let began = Instant::now();
-            let decide = self.hand_out_sights();
+            let groups = self.hand_out_sights();
             // A server that was stopped for a while does not hurry to catch up.
             due = (due + cycle).max(began + cycle / 2);
             let mut talked = None;
             loop {
-                if talked.is_none() && self.has_controls(&decide) {
+                if talked.is_none() && self.has_controls(&groups) {
                     talked = Some(began.elapsed());
                 }
                 let left = due.saturating_duration_since(Instant::now());
@@ -39,7 +39,7 @@ impl Server<'_> {
                 self.hear(left)?;
             }
             self.tally.talked.add(talked.unwrap_or(cycle));
-            self.advance(&decide)?;
+            self.advance(&groups)?;
         }
         Ok(())
     }

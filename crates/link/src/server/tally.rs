@@ -29,6 +29,14 @@ impl Histogram {
         self.counts.iter().sum()
     }
 
+    /// Returns the bound in seconds below which so great a part of the durations is; `None` of no durations, and
+    /// infinity above the last bound.
+    pub fn quantile(&self, part: f64) -> Option<f64> {
+        let wanted = (part * self.count() as f64).ceil().max(1.0) as u64;
+        let bound = self.cumulative().find(|(_, count)| *count >= wanted);
+        (self.count() > 0).then(|| bound.map_or(f64::INFINITY, |(bound_s, _)| bound_s))
+    }
+
     /// Returns, for each bound, how many were at most that long.
     pub fn cumulative(&self) -> impl Iterator<Item = (f64, u64)> + '_ {
         BOUNDS_S.iter().zip(&self.counts).scan(0, |sum, (&bound, &count)| {

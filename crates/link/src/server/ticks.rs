@@ -42,58 +42,81 @@ impl Course {
     }
 }
 
+/// The courses of the nodes of one group, whose ticks are those of nobody else.
+#[derive(Debug, Default)]
+struct Talk {
+    courses: BTreeMap<EntityId, Course>,
+    is_over: bool,
+}
+
+impl Talk {
+    fn new(group: &[EntityId]) -> Self {
+        let out = || Course { is_out: true, ..Course::default() };
+        let courses = group.iter().map(|&agent| (agent, out())).collect();
+        Self { courses, is_over: false }
+    }
+
+    fn note(&mut self, agent: EntityId, report: Ticked) {
+        for (receiver, arrives) in report.sent {
+            if let Some(course) = self.courses.get_mut(&receiver) {
+                *course.arrivals.entry(arrives).or_default() += 1;
+            }
+        }
+        if let Some(course) = self.courses.get_mut(&agent) {
+            (course.timer, course.is_done, course.is_out) = (report.timer, report.is_done, false);
+        }
+    }
+
+    /// Returns the nodes that go on, with the packets that have arrived at each by then, and the tick; none before all
+    /// have reported. When all are done, or nothing can happen any more, the talk is over.
+    fn go_on(&mut self) -> Vec<(EntityId, u64, u64)> {
+        if self.is_over || self.courses.values().any(|course| course.is_out) {
+            return Vec::new();
+        }
+        let next = self.courses.values().filter_map(Course::next).min();
+        let next = next.filter(|&tick| tick < u64::MAX);
+        let is_done = self.courses.values().all(|course| course.is_done);
+        let Some(tick) = next.filter(|_| !is_done) else {
+            self.is_over = true;
+            return Vec::new();
+        };
+        let go = self.courses.iter_mut().filter(|(_, course)| course.next() == Some(tick));
+        go.map(|(&agent, course)| (agent, course.go_on_to(tick), tick)).collect()
+    }
+}
+
 impl Server<'_> {
     /// Lets nodes talk, tick by tick, until each of them has a control.
     ///
     /// # Errors
     /// When a node is gone, or somebody asks the fleet to end.
-    pub(super) fn count_ticks(&mut self, decide: &[EntityId]) -> Result<(), Broken> {
+    pub(super) fn count_ticks(&mut self, groups: &[Vec<EntityId>]) -> Result<(), Broken> {
         let cycle = self.stage.cycle();
-        let out = || Course { is_out: true, ..Course::default() };
-        let mut courses: BTreeMap<EntityId, Course> =
-            decide.iter().map(|&agent| (agent, out())).collect();
-        loop {
-            self.hear_reports(&mut courses)?;
-            if courses.values().all(|course| course.is_done) {
-                break;
-            }
-            let Some(tick) = courses.values().filter_map(Course::next).min() else { break };
-            for (&agent, course) in &mut courses {
-                if course.next().is_some_and(|next| next <= tick) {
-                    let packets = course.go_on_to(tick);
-                    let word = Word::Tick(Tick { cycle, tick, packets });
-                    self.mail.letter(Party::Node(agent), word);
-                }
-            }
-        }
-        for &agent in decide {
-            self.mail.letter(Party::Node(agent), Word::Close(cycle));
-        }
-        Ok(())
-    }
-
-    /// Waits until no node has yet to report, and notes what they have sent.
-    fn hear_reports(&mut self, courses: &mut BTreeMap<EntityId, Course>) -> Result<(), Broken> {
-        let cycle = self.stage.cycle();
-        while courses.values().any(|course| course.is_out) {
+        let mut talks: Vec<Talk> = groups.iter().map(|group| Talk::new(group)).collect();
+        while talks.iter().any(|talk| !talk.is_over) {
             self.hear(LOOK)?;
             for (agent, report) in std::mem::take(&mut self.ticked) {
-                if report.cycle == cycle {
-                    note(courses, agent, report);
+                let of = |talk: &&mut Talk| talk.courses.contains_key(&agent);
+                if let Some(talk) = talks.iter_mut().find(of)
+                    && report.cycle == cycle
+                {
+                    talk.note(agent, report);
+                    self.let_go_on(talk);
                 }
             }
         }
         Ok(())
     }
-}
 
-fn note(courses: &mut BTreeMap<EntityId, Course>, agent: EntityId, report: Ticked) {
-    for (receiver, arrives) in report.sent {
-        if let Some(course) = courses.get_mut(&receiver) {
-            *course.arrivals.entry(arrives).or_default() += 1;
+    fn let_go_on(&mut self, talk: &mut Talk) {
+        let cycle = self.stage.cycle();
+        for (agent, packets, tick) in talk.go_on() {
+            self.mail.letter(Party::Node(agent), Word::Tick(Tick { cycle, tick, packets }));
         }
-    }
-    if let Some(course) = courses.get_mut(&agent) {
-        (course.timer, course.is_done, course.is_out) = (report.timer, report.is_done, false);
+        if talk.is_over {
+            for &agent in talk.courses.keys() {
+                self.mail.letter(Party::Node(agent), Word::Close(cycle));
+            }
+        }
     }
 }

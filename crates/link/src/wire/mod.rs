@@ -2,6 +2,7 @@
 //!
 //! Everything that must arrive is numbered, acknowledged and repeated above it ([`crate::post`]).
 
+pub mod board;
 pub mod memory;
 pub mod zenoh;
 

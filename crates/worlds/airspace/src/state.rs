@@ -12,7 +12,7 @@ use super::wish::Wish;
 use super::world::{AirspaceWorld, Method};
 use neighborhood::Neighborhood;
 use sidestep_kernel::column::Shared;
-use sidestep_kernel::{Cycle, EntityId, Slot};
+use sidestep_kernel::{Cycle, EntityId, Slot, math};
 pub use snapshot::{AirplaneRecord, PairRecord, Snapshot};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
@@ -197,6 +197,14 @@ fn remembered<T: Clone + Default>(n: usize, saved: &[T]) -> Box<[Mutex<T>]> {
 }
 
 impl AirspaceState {
+    /// Returns the distance between two airplanes in meters, heights included.
+    pub(crate) fn apart_m(&self, [a, b]: [EntityId; 2]) -> f64 {
+        let [a, b] = [a, b].map(|id| &self.airplanes[id as usize]);
+        let ([ax, ay], [bx, by]) = (a.pose().at, b.pose().at);
+        let level_m = math::hypot(ax - bx, ay - by);
+        math::hypot(level_m, a.altitude_m.get() - b.altitude_m.get())
+    }
+
     /// Returns the state that a snapshot describes.
     pub(super) fn restore(world: &AirspaceWorld, snapshot: &Snapshot) -> Self {
         let n = snapshot.airplanes.len();

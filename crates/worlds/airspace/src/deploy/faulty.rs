@@ -12,7 +12,7 @@ use crate::world::AirspaceWorld;
 use sidestep_kernel::distr::Chance;
 use sidestep_kernel::ports::{Envelope, Transport};
 use sidestep_kernel::stream::Streams;
-use sidestep_kernel::{Cycle, EntityId, math};
+use sidestep_kernel::{Cycle, EntityId};
 use std::collections::BTreeMap;
 
 /// A transport, some of whose links may be cut, for the talks of one cycle.
@@ -27,7 +27,7 @@ pub(super) struct Faulty<'a, T> {
     /// Start of the cycle, in seconds after the start of the run.
     starts_s: f64,
     /// Tick from which on each way of a link is free, where messages of some size take time.
-    free_at: BTreeMap<[EntityId; 2], f64>,
+    pub(super) free_at: BTreeMap<[EntityId; 2], f64>,
 }
 
 impl<'a, T: Transport> Faulty<'a, T> {
@@ -52,22 +52,14 @@ impl<'a, T: Transport> Faulty<'a, T> {
         }
     }
 
-    /// Returns the distance between two airplanes in meters, heights included.
-    fn apart_m(&self, [a, b]: [EntityId; 2]) -> f64 {
-        let Some(state) = self.state else { return 0.0 };
-        let [a, b] = [a, b].map(|id| &state.airplanes[id as usize]);
-        let ([ax, ay], [bx, by]) = (a.pose().at, b.pose().at);
-        let level_m = math::hypot(ax - bx, ay - by);
-        math::hypot(level_m, a.altitude_m.get() - b.altitude_m.get())
-    }
-
     /// Returns whether the link of a message lets it through: it is not cut, within range, and not
     /// in a burst that takes the message.
     fn lets_through(&self, envelope: &Envelope) -> bool {
         let Some(network) = self.network else { return true };
         let &Envelope { cycle: tick, sender, receiver, sequence, .. } = envelope;
         let (link, at_s) = ([sender, receiver], self.time_s(network, tick));
-        if !network.carries(link, at_s) || self.apart_m(link) > network.range_m {
+        let apart_m = self.state.map_or(0.0, |state| state.apart_m(link));
+        if !network.carries(link, at_s) || apart_m > network.range_m {
             return false;
         }
         let Some(bursts) = &network.bursts else { return true };

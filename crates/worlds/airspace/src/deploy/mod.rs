@@ -16,12 +16,14 @@
 //! faults of the scenario (`faulty.rs`), by a loop that knows neither (`drive.rs`).
 
 mod drive;
+mod ether;
 mod faulty;
 mod group;
 mod kind;
 #[cfg(test)]
 mod silence;
 
+pub use ether::Ether;
 pub(crate) use group::flown;
 pub use kind::Deployment;
 pub(crate) use kind::refuses;

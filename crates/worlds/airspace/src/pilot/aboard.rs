@@ -222,7 +222,7 @@ impl Pilot {
     }
 
     /// Returns whether it knows what it wants in the present cycle.
-    pub(crate) fn has_decided(&self) -> bool {
+    pub fn has_decided(&self) -> bool {
         self.turn.as_ref().is_some_and(|turn| !matches!(turn.stage, Stage::Deciding(_)))
     }
 

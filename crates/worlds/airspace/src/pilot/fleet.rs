@@ -27,6 +27,13 @@ pub trait Fleet {
     /// When one of them is of another airplane or cycle, or cannot be flown; none is taken then. When the run is
     /// recorded without its controls, or one process decides for all.
     fn control(&mut self, controls: Vec<Control>) -> Result<(), OrderError>;
+
+    /// Returns the controls, each serialized, that cannot be flown in the cycle to come, with the reasons.
+    fn absurd(&self, controls: &[(EntityId, Vec<u8>)]) -> Vec<(EntityId, String)>;
+
+    /// Returns, of each airplane that decides in the cycle to come, the others of its group that its radio does
+    /// not reach, both by rising id.
+    fn beyond(&self) -> Vec<(EntityId, Vec<EntityId>)>;
 }
 
 impl Fleet for AirspaceRun {
@@ -41,6 +48,19 @@ impl Fleet for AirspaceRun {
         let controls: Vec<_> = controls.iter().map(|one| (one.id, bytes(one))).collect();
         self.hand_over(&controls)
     }
+
+    fn absurd(&self, controls: &[(EntityId, Vec<u8>)]) -> Vec<(EntityId, String)> {
+        let sights = self.sights();
+        let sight = |id| sights.iter().find(|sight| sight.own.id == id);
+        let why = |(id, bytes): &(EntityId, Vec<u8>)| {
+            Some((*id, self.world().read_control(*id, bytes, sight(*id)).err()?))
+        };
+        controls.iter().filter_map(why).collect()
+    }
+
+    fn beyond(&self) -> Vec<(EntityId, Vec<EntityId>)> {
+        self.world().beyond(self.state(), self.cycle())
+    }
 }
 
 impl AirspaceWorld {
@@ -52,6 +72,24 @@ impl AirspaceWorld {
             all.extend(Sight::all(turn, &slots, intruders));
         });
         all.sort_unstable_by_key(|sight| sight.own.id);
+        all
+    }
+
+    /// Returns the others of its group that each airplane does not reach in cycle `now`.
+    fn beyond(&self, state: &AirspaceState, now: Cycle) -> Vec<(EntityId, Vec<EntityId>)> {
+        let range_m = self.network.as_ref().map_or(f64::INFINITY, |network| network.range_m);
+        let mut all = Vec::new();
+        if range_m == f64::INFINITY {
+            return all;
+        }
+        self.perceived(state, now, |turn, flown, _| {
+            for own in flown {
+                let is_beyond = |other: &EntityId| turn.state.apart_m([own.slot, *other]) > range_m;
+                let others = flown.iter().map(|known| known.slot).filter(|&id| id != own.slot);
+                all.push((own.slot, others.filter(is_beyond).collect()));
+            }
+        });
+        all.sort_unstable();
         all
     }
 
