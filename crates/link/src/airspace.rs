@@ -21,7 +21,9 @@ pub fn fingerprint(compiled: &dyn Compiled, source: &Source) -> Result<Fingerpri
     let resolved = compiled.resolve(source)?;
     let mut all = resolved.text.into_bytes();
     for (name, content) in resolved.files {
-        all.extend([name.as_bytes(), &content].map(|part| Digest::of(part).to_string()).concat().bytes());
+        all.extend(
+            [name.as_bytes(), &content].map(|part| Digest::of(part).to_string()).concat().bytes(),
+        );
     }
     Ok(Digest::of(&all).to_string()[..16].to_string())
 }
@@ -30,8 +32,12 @@ pub fn fingerprint(compiled: &dyn Compiled, source: &Source) -> Result<Fingerpri
 ///
 /// # Errors
 /// When it is another world, or one process decides for all.
-pub fn world_of(compiled: &dyn Compiled, source: &Source) -> Result<Arc<AirspaceWorld>, InputError> {
-    let airspace = compiled.as_any().downcast_ref::<sidestep::worlds::airspace::scenario::Compiled>();
+pub fn world_of(
+    compiled: &dyn Compiled,
+    source: &Source,
+) -> Result<Arc<AirspaceWorld>, InputError> {
+    let airspace =
+        compiled.as_any().downcast_ref::<sidestep::worlds::airspace::scenario::Compiled>();
     let Some(airspace) = airspace else {
         let cause = format!("agents of the world `{}` decide in one process", compiled.world());
         let remedy = "give a scenario with world = \"airspace\"";

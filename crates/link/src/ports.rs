@@ -25,7 +25,10 @@ pub trait Stage {
     /// # Errors
     /// When it cannot be recorded. A control that makes no sense is returned with the reason, and its agent does
     /// what is safe.
-    fn advance(&mut self, controls: Vec<(EntityId, Vec<u8>)>) -> Result<Vec<Absurd>, sidestep_session::Error>;
+    fn advance(
+        &mut self,
+        controls: Vec<(EntityId, Vec<u8>)>,
+    ) -> Result<Vec<Absurd>, sidestep_session::Error>;
 }
 
 /// What an agent perceives at the start of a cycle.

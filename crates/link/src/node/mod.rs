@@ -58,6 +58,8 @@ pub struct Node {
     early: Vec<(EntityId, Packet)>,
     status: Status,
     report_at: Instant,
+    /// Told how the node is, as often as the server.
+    looks: Box<dyn FnMut(EntityId, &Status)>,
 }
 
 impl Node {
@@ -82,7 +84,14 @@ impl Node {
             early: Vec::new(),
             status: Status::default(),
             report_at: Instant::now(),
+            looks: Box::new(|_, _| {}),
         }
+    }
+
+    /// Tells somebody else, too, how the node is, twice a second.
+    #[must_use]
+    pub fn watched(self, looks: impl FnMut(EntityId, &Status) + 'static) -> Self {
+        Self { looks: Box::new(looks), ..self }
     }
 
     /// Takes part in the fleet until the server ends it.
@@ -150,7 +159,8 @@ impl Node {
     /// Meets the other nodes, and finds out whether they hear it.
     fn meet(&mut self, members: Vec<Member>) -> Result<(), NodeError> {
         self.mail.join(self.agent, &members)?;
-        let is_new = |member: &&Member| member.agent != self.agent && !self.members.contains(member);
+        let is_new =
+            |member: &&Member| member.agent != self.agent && !self.members.contains(member);
         for member in members.iter().filter(is_new) {
             let party = Party::Node(member.agent);
             self.mail.meet(party, member.life);
@@ -205,6 +215,7 @@ impl Node {
         self.status.heard = self.program.heard();
         self.status.retries = counts.retries;
         self.status.dropped = dropped.chain(self.program.dropped()).collect();
+        (self.looks)(self.agent, &self.status);
         self.mail.note(Party::Server, Word::Status(self.status.clone()));
     }
 }

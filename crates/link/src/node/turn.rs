@@ -144,7 +144,8 @@ impl Turn {
         }
         // Where time is counted, messages are, too: until nobody has any more to say.
         let may_tell = self.time != Time::Counted || self.is_closed;
-        if may_tell && !self.has_told
+        if may_tell
+            && !self.has_told
             && let Some(control) = ends.program.control()
         {
             self.has_told = true;
@@ -158,7 +159,8 @@ impl Turn {
         let is_first = !std::mem::replace(&mut self.has_begun, true);
         if !is_first {
             let Some(tick) = self.granted else { return };
-            let due: usize = self.arrived.range(..=tick.tick).map(|(_, packets)| packets.len()).sum();
+            let due: usize =
+                self.arrived.range(..=tick.tick).map(|(_, packets)| packets.len()).sum();
             if self.taken + (due as u64) < tick.packets {
                 return;
             }

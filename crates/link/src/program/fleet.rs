@@ -107,7 +107,9 @@ fn finish(
         Err(Broken::World(error)) => Err(error),
         Err(gone @ Broken::Gone { .. }) => {
             let remedy = match folder {
-                Some(folder) => format!("go on without nodes: sidestep resume {}", folder.display()),
+                Some(folder) => {
+                    format!("go on without nodes: sidestep resume {}", folder.display())
+                }
                 None => "start the fleet again; with --out DIR it could be resumed".into(),
             };
             Err(Error::stopped(gone.to_string(), remedy))
@@ -196,7 +198,10 @@ impl<'a> Captain<'a> {
                 bytes: status.bytes,
                 packets_per_s: rate(status.packets, packets),
                 bytes_per_s: rate(status.bytes, bytes),
-                silent_s: fleet.mail.silent_for(Party::Node(airplane)).map(|silent| silent.as_secs_f64()),
+                silent_s: fleet
+                    .mail
+                    .silent_for(Party::Node(airplane))
+                    .map(|silent| silent.as_secs_f64()),
             });
         }
         let quantile_ms = |q: f64| fleet.tally.talked.quantile(q).map(|s| 1e3 * s);

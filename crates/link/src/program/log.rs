@@ -15,7 +15,8 @@ pub(super) fn start(is_json: bool, level: &str) -> Result<(), InputError> {
         let remedy = "give one of off, error, warn, info, debug and trace";
         InputError::new("--log", format!("there is no level `{level}`"), remedy)
     })?;
-    let of_others = if wanted == LevelFilter::TRACE { wanted } else { wanted.min(LevelFilter::WARN) };
+    let of_others =
+        if wanted == LevelFilter::TRACE { wanted } else { wanted.min(LevelFilter::WARN) };
     let targets = Targets::new().with_target("sidestep_link", wanted).with_default(of_others);
     let lines = fmt::layer().with_writer(std::io::stderr).with_ansi(false).with_target(false);
     let told = tracing_subscriber::registry();

@@ -1,5 +1,6 @@
 //! A node as a process.
 
+use super::metrics::{Board, of_node};
 use super::scenario::Scenario;
 use crate::airspace::{Aboard, Faults};
 use crate::mail::Mail;
@@ -24,6 +25,7 @@ pub(super) fn fly(job: &NodeJob) -> Result<(), Error> {
     let ports = job.listen.iter().map(|endpoint| hold(endpoint)).collect::<Result<Vec<Held>, _>>();
     let ports = ports.map_err(wrong_endpoint)?;
     let listens = ports.iter().map(|held| held.endpoint.clone()).collect();
+    let board = Board::open(job.common.metrics.as_deref())?;
     let patience = Duration::from_secs_f64(job.patience_s);
     let tls = job.common.tls.as_ref();
     let wire = ZenohWire::node(Party::Node(agent), &job.connect, tls, patience);
@@ -37,10 +39,12 @@ pub(super) fn fly(job: &NodeJob) -> Result<(), Error> {
         listens,
         process: std::process::id(),
     };
-    let welcome = join(&mut mail, &Asked { join: question, patience }).map_err(|e| failed(e, job))?;
+    let welcome =
+        join(&mut mail, &Asked { join: question, patience }).map_err(|e| failed(e, job))?;
     if welcome.topology == Topology::Mesh && job.listen.is_empty() {
         let cause = "in a mesh other nodes must reach this one";
-        let remedy = "give it an address of this machine: --listen tcp/ADDRESS:PORT (port 0 for any)";
+        let remedy =
+            "give it an address of this machine: --listen tcp/ADDRESS:PORT (port 0 for any)";
         return Err(InputError::new("--listen", cause, remedy).into());
     }
     let scenario = scenario.with(&welcome.overrides)?;
@@ -50,6 +54,7 @@ pub(super) fn fly(job: &NodeJob) -> Result<(), Error> {
     let lease = Duration::from_secs_f64(job.common.lease_s);
     tracing::info!(airplane = agent, "joined");
     let node = Node::new(agent, mail, (program, channel), &welcome, lease);
+    let node = node.watched(move |agent, status| board.show(|| of_node(agent, status)));
     node.run().map(drop).map_err(|e| failed(e, job))
 }
 
@@ -90,7 +95,9 @@ fn failed(error: NodeError, job: &NodeJob) -> Error {
             InputError::new(job.connect.join(", "), cause, remedy).into()
         }
         NodeError::Wire(error) => wrong_endpoint(error),
-        NodeError::Silence(_) => Error::stopped(cause, "see whether the server runs, and start both again"),
+        NodeError::Silence(_) => {
+            Error::stopped(cause, "see whether the server runs, and start both again")
+        }
         NodeError::Percept(_) => Error::stopped(cause, "please report it with the scenario"),
     }
 }

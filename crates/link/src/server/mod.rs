@@ -135,7 +135,18 @@ impl<'a> Server<'a> {
         let seats = stage.agents().into_iter().map(|agent| (agent, Seat::default())).collect();
         let (beat_at, look_at) = (Instant::now(), Instant::now());
         let (tally, ticked) = (Tally::default(), Vec::new());
-        Self { mail, stage, attendant, terms, seats, tally, has_begun: false, beat_at, look_at, ticked }
+        Self {
+            mail,
+            stage,
+            attendant,
+            terms,
+            seats,
+            tally,
+            has_begun: false,
+            beat_at,
+            look_at,
+            ticked,
+        }
     }
 
     /// Waits for all nodes, and flies the world to its end. The nodes are told to end in any case.
@@ -284,7 +295,12 @@ impl<'a> Server<'a> {
         let cycle = self.stage.cycle();
         controls.sort_unstable_by_key(|(agent, _)| *agent);
         for absurd in self.stage.advance(controls)? {
-            tracing::warn!(airplane = absurd.agent, cycle, reason = absurd.reason, "an absurd control");
+            tracing::warn!(
+                airplane = absurd.agent,
+                cycle,
+                reason = absurd.reason,
+                "an absurd control"
+            );
             self.tally.absurd_controls += 1;
             if let Some(seat) = self.seats.get_mut(&absurd.agent) {
                 seat.absurd += 1;
@@ -297,6 +313,9 @@ impl<'a> Server<'a> {
 
     /// Whether all of these agents have sent their controls.
     fn has_controls(&self, groups: &[Vec<EntityId>]) -> bool {
-        groups.iter().flatten().all(|agent| self.seats.get(agent).is_some_and(|seat| seat.control.is_some()))
+        groups
+            .iter()
+            .flatten()
+            .all(|agent| self.seats.get(agent).is_some_and(|seat| seat.control.is_some()))
     }
 }

@@ -22,7 +22,13 @@ impl Server<'_> {
     pub(super) fn on_join(&mut self, agent: EntityId, life: Life, join: Join) {
         if let Some((reason, refusal)) = self.refusal(agent, life, &join) {
             let Refusal { cause, remedy } = &refusal;
-            tracing::warn!(airplane = agent, process = join.process, cause, remedy, "a node is refused");
+            tracing::warn!(
+                airplane = agent,
+                process = join.process,
+                cause,
+                remedy,
+                "a node is refused"
+            );
             *self.tally.refused.entry(reason).or_default() += 1;
             self.mail.note(Party::Node(agent), Word::Refused(refusal));
             return;

@@ -48,7 +48,11 @@ impl Server<'_> {
         self.tally.late.add(late);
         if late > cycle.mul_f64(LATE_PART) {
             self.tally.late_cycles += 1;
-            tracing::warn!(cycle = self.stage.cycle(), late_ms = late.as_millis() as u64, "the server is late");
+            tracing::warn!(
+                cycle = self.stage.cycle(),
+                late_ms = late.as_millis() as u64,
+                "the server is late"
+            );
         }
     }
 }

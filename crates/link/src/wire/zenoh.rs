@@ -313,3 +313,6 @@ fn vacant(endpoint: &str) -> Result<(), WireError> {
 fn taken(endpoints: &[String], reason: String) -> WireError {
     WireError::Taken { endpoint: endpoints.join(", "), reason }
 }
+
+#[cfg(test)]
+mod tests;

@@ -66,8 +66,7 @@ impl link::Agent for Agent {
 
     fn check(&self, from: usize, intent: &Intent) -> Result<(), Unsound> {
         let Filed { most_way_points, orders, .. } = self.start.filed[from];
-        let is_filed =
-            intent.next as usize <= most_way_points && intent.orders as usize <= orders;
+        let is_filed = intent.next as usize <= most_way_points && intent.orders as usize <= orders;
         Unsound::Plan.unless(is_filed)?;
         Unsound::Number.unless(intent.altitude_m.is_finite())?;
         intent.resolving.check(self.start.airplanes)

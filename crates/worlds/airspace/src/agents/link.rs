@@ -217,7 +217,8 @@ impl<A: Agent> Endpoint<A> {
     fn answer(&mut self, to: usize, from_number: u32) {
         let missing = self.said.get(from_number as usize..).unwrap_or_default().to_vec();
         if missing.is_empty() {
-            let nothing = if self.agent.is_done() { Wired::<A::Message>::Done } else { Wired::Wait };
+            let nothing =
+                if self.agent.is_done() { Wired::<A::Message>::Done } else { Wired::Wait };
             self.tell(to, Draft::of(&nothing));
         }
         missing.into_iter().for_each(|message| self.tell(to, message));

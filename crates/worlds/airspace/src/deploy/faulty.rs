@@ -38,7 +38,8 @@ impl<'a, T: Transport> Faulty<'a, T> {
         state: Option<&'a AirspaceState>,
         (now, schedule): (Cycle, Schedule),
     ) -> Self {
-        let (network, streams, starts_s) = (world.network.as_ref(), world.streams, world.starts_s(now));
+        let (network, streams, starts_s) =
+            (world.network.as_ref(), world.streams, world.starts_s(now));
         Self { inner, network, streams, state, schedule, starts_s, free_at: BTreeMap::new() }
     }
 

@@ -1,8 +1,8 @@
 //! The pilots of a group, on a network in memory.
 
+use super::Deployment;
 use super::drive::drive;
 use super::faulty::Faulty;
-use super::Deployment;
 use crate::Turn;
 use crate::agents::coordinator::{self, Journey, Migration, parts};
 use crate::agents::network::Traffic;

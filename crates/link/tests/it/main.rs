@@ -1,0 +1,7 @@
+//! Fleets: in threads, over sockets, and as processes.
+
+mod faults;
+mod input;
+mod processes;
+mod support;
+mod threads;
