@@ -69,6 +69,11 @@ impl Mail {
         &self.counts
     }
 
+    /// Whether all letters to another party have come, or it was not met.
+    pub fn has_delivered_to(&self, other: Party) -> bool {
+        self.others.get(&other).is_none_or(|other| other.post.has_delivered())
+    }
+
     fn now(&self) -> Duration {
         self.began.elapsed()
     }

@@ -75,8 +75,12 @@ pub enum Word {
     Control(Control),
     /// Server to node, as a note: it is there.
     Beat,
+    /// Node to server: packets that it has sent, where all are recorded.
+    Packets(Vec<Logged>),
     /// Server to node: the fleet has ended.
     End,
+    /// Node to server: it has said all that it had to say.
+    Left,
 }
 
 /// A node that wants to join.
@@ -106,6 +110,8 @@ pub struct Welcome {
     pub topology: Topology,
     /// Changes of the scenario beyond those that the node was given, as `key=value`.
     pub overrides: Vec<String>,
+    /// Whether all packets are recorded.
+    pub logs_packets: bool,
 }
 
 /// The reason why a node may not join, and the remedy.
@@ -178,6 +184,25 @@ pub struct Packet {
     pub arrives: u64,
     /// Its content.
     pub payload: Vec<u8>,
+}
+
+/// A packet to one receiver, as it is recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Logged {
+    /// The cycle of the talk.
+    pub cycle: Cycle,
+    /// The tick in which it was sent.
+    pub sent: u64,
+    /// The receiver.
+    pub to: EntityId,
+    /// Its number among the sender's, in the talk or, in real time, in the cycle.
+    pub sequence: u32,
+    /// Its size.
+    pub bytes: u32,
+    /// Number of times that it arrives: 0 if the scenario's faults take it, 2 if they double it.
+    pub copies: u32,
+    /// The tick in which it first arrives; 0 if it does not.
+    pub arrives: u64,
 }
 
 /// The control of an agent.

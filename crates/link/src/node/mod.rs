@@ -50,6 +50,7 @@ pub struct Node {
     program: Box<dyn Program>,
     channel: Option<Box<dyn Channel>>,
     clock: Clock,
+    logs_packets: bool,
     lease: Duration,
     members: Vec<Member>,
     is_ready: bool,
@@ -77,6 +78,7 @@ impl Node {
             program,
             channel,
             clock: welcome.clock,
+            logs_packets: welcome.logs_packets,
             lease,
             members: Vec::new(),
             is_ready: false,
@@ -103,8 +105,7 @@ impl Node {
             let wait = self.turn.as_ref().and_then(|turn| turn.wait(self.program.as_ref()));
             if let Some(heard) = self.mail.receive(wait.unwrap_or(LOOK).min(LOOK)) {
                 if self.hear(heard)? {
-                    // The server waits until it knows that this has come.
-                    self.mail.note(Party::Server, Word::Hello);
+                    self.leave();
                     return Ok(self.status);
                 }
             }
@@ -114,6 +115,18 @@ impl Node {
             if silent.is_some_and(|silent| silent > self.lease) {
                 return Err(NodeError::Silence(self.lease.as_secs()));
             }
+        }
+    }
+
+    /// Says what is left to say, and waits a little until it has come.
+    fn leave(&mut self) {
+        if let Some(turn) = &mut self.turn {
+            turn.hand_over_log(&mut self.mail);
+        }
+        self.mail.letter(Party::Server, Word::Left);
+        let until = Instant::now() + REPORT;
+        while !self.mail.has_delivered_to(Party::Server) && Instant::now() < until {
+            self.mail.receive(LOOK);
         }
     }
 
@@ -149,7 +162,11 @@ impl Node {
             channel.begin(begin.cycle);
             channel.tick_s()
         });
-        self.turn = Some(Turn::new(begin, self.clock, tick_s, first_tick));
+        if let Some(turn) = &mut self.turn {
+            turn.hand_over_log(&mut self.mail);
+        }
+        let turn = Turn::new(begin, self.clock, tick_s, first_tick);
+        self.turn = Some(if self.logs_packets { turn.logged() } else { turn });
         for (from, packet) in std::mem::take(&mut self.early) {
             self.on_packet(from, packet);
         }

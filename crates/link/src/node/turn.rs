@@ -3,7 +3,7 @@
 use crate::mail::Mail;
 use crate::ports::{Channel, Outgoing, Program, Sent};
 use crate::wire::Party;
-use crate::words::{Begin, Clock, Control, Packet, Tick, Ticked, Word};
+use crate::words::{Begin, Clock, Control, Logged, Packet, Tick, Ticked, Word};
 use sidestep::kernel::{Cycle, EntityId};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -50,6 +50,8 @@ pub(super) struct Turn {
     is_closed: bool,
     has_told: bool,
     sent: Sums,
+    /// What it has sent, where all is recorded.
+    log: Option<Vec<Logged>>,
 }
 
 /// Packets and their bytes.
@@ -83,6 +85,19 @@ impl Turn {
             is_closed: false,
             has_told: false,
             sent: Sums::default(),
+            log: None,
+        }
+    }
+
+    /// Returns the turn, which keeps what it sends.
+    pub(super) fn logged(self) -> Self {
+        Self { log: Some(Vec::new()), ..self }
+    }
+
+    /// Hands over what was sent since the last call.
+    pub(super) fn hand_over_log(&mut self, mail: &mut Mail) {
+        if let Some(log) = self.log.as_mut().filter(|log| !log.is_empty()) {
+            mail.letter(Party::Server, Word::Packets(std::mem::take(log)));
         }
     }
 
@@ -149,6 +164,7 @@ impl Turn {
             && let Some(control) = ends.program.control()
         {
             self.has_told = true;
+            self.hand_over_log(ends.mail);
             let control = Control { cycle: self.begin.cycle, control };
             ends.mail.letter(Party::Server, Word::Control(control));
         }
@@ -216,6 +232,7 @@ impl Turn {
                 Some(channel) => channel.arrivals(&Sent { to, tick, sequence, bytes }),
                 None => vec![tick + 1],
             };
+            self.note(to, (tick, sequence, bytes), &arrivals);
             for arrives in arrivals {
                 let (cycle, payload) = (self.begin.cycle, packet.payload.clone());
                 let arrives = self.tick + (arrives - tick);
@@ -224,6 +241,20 @@ impl Turn {
                 self.part(to, packet, ends.mail);
             }
         }
+    }
+
+    fn note(&mut self, to: EntityId, (tick, sequence, bytes): (u64, u32, usize), arrivals: &[u64]) {
+        let Some(log) = &mut self.log else { return };
+        let first = arrivals.iter().min();
+        log.push(Logged {
+            cycle: self.begin.cycle,
+            sent: self.tick,
+            to,
+            sequence,
+            bytes: bytes as u32,
+            copies: arrivals.len() as u32,
+            arrives: first.map_or(0, |at| self.tick + (at - tick)),
+        });
     }
 
     /// Lets a packet leave: at once, or after its delay.

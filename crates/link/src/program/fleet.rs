@@ -4,6 +4,7 @@ use super::crew::Crew;
 use super::lifeline::Lifeline;
 use super::metrics;
 use super::node::wrong_endpoint;
+use super::packets::Packets;
 use super::scenario::Scenario;
 use super::told::tell;
 use crate::airspace::Airspace;
@@ -11,7 +12,8 @@ use crate::mail::Mail;
 use crate::server::{Attendant, Broken, Look, Server, Tally, Terms};
 use crate::wire::Party;
 use crate::wire::zenoh::{WireError, ZenohWire, hold};
-use crate::words::{Clock, Topology, Welcome};
+use crate::words::{Clock, Logged, Topology, Welcome};
+use sidestep::kernel::ports::RecordError;
 use sidestep::kernel::{EntityId, Interrupt};
 use sidestep_session::fleet::{FleetJob, FleetNow, NodeJob, NodeNow, Told};
 use sidestep_session::{Error, Journey, Keep, Watcher};
@@ -37,7 +39,8 @@ pub(super) fn fly(job: &FleetJob, lifeline: &Lifeline) -> Result<(), Error> {
     let journey = Journey::start(scenario.compiled.as_ref(), &scenario.source, 1, keep, None)?;
     tell(&Told::Listens(listen.clone()));
     let mail = Mail::new(Party::Server, Box::new(wire));
-    let welcome = Welcome { clock: job.clock, topology: job.topology, overrides };
+    let welcome =
+        Welcome { clock: job.clock, topology: job.topology, overrides, logs_packets: job.packets };
     let terms = Terms {
         scenario: fingerprint,
         build: sidestep_session::build().into(),
@@ -51,8 +54,17 @@ pub(super) fn fly(job: &FleetJob, lifeline: &Lifeline) -> Result<(), Error> {
     let crew = Crew::start(node_jobs(job, &listen, all), job.clock != Clock::Lockstep)?;
     let cycles = stage.journey().simulation().plan().cycles;
     let mut captain = Captain::new(crew, lifeline, cycles, told);
+    captain.packets = job
+        .out
+        .as_ref()
+        .filter(|_| job.packets)
+        .map(|folder| {
+            Packets::begin(folder, &scenario.source.text, stage.journey().simulation().plan().seed)
+        })
+        .transpose()?;
     let (flown, tally) = Server::new(mail, &mut stage, &mut captain, terms).run();
     captain.crew.end();
+    let flown = flown.and_then(|()| captain.finish_packets());
     finish(stage.into_journey(), &watcher, flown, captain.now(&tally))
 }
 
@@ -145,6 +157,10 @@ struct Captain<'a> {
     /// Packets and bytes of each node at the last report, and when that was.
     before: BTreeMap<EntityId, (u64, u64)>,
     reported: Instant,
+    /// The table of all packets, if it is wanted,
+    packets: Option<Packets>,
+    /// and why it cannot be written.
+    unwritten: Option<RecordError>,
 }
 
 impl<'a> Captain<'a> {
@@ -159,7 +175,16 @@ impl<'a> Captain<'a> {
             now: FleetNow { cycles, ..FleetNow::default() },
             before: BTreeMap::new(),
             reported: now,
+            packets: None,
+            unwritten: None,
         }
+    }
+
+    /// Completes the table of packets.
+    fn finish_packets(&mut self) -> Result<(), Broken> {
+        let finished = self.packets.take().map_or(Ok(()), Packets::finish);
+        let stored = self.unwritten.take().map_or(finished, Err);
+        stored.map_err(|e| Broken::World(e.into()))
     }
 
     /// Returns the fleet as it was when it was looked at last, with the counts at the end.
@@ -222,6 +247,9 @@ impl Attendant for Captain<'_> {
         if self.lifeline.has_ended() {
             return Err(Broken::Stopped);
         }
+        if let Some(error) = self.unwritten.take() {
+            return Err(Broken::World(error.into()));
+        }
         if Instant::now() >= self.report_at {
             self.report_at = Instant::now() + REPORT;
             self.look(fleet);
@@ -234,5 +262,13 @@ impl Attendant for Captain<'_> {
             return Err(Broken::Gone { agent, cycle: fleet.cycle, reason });
         }
         Ok(gone)
+    }
+
+    fn take_packets(&mut self, packets: Vec<(EntityId, Logged)>) {
+        if let Some(table) = &mut self.packets
+            && let Err(error) = table.add(packets)
+        {
+            self.unwritten = Some(error);
+        }
     }
 }

@@ -5,6 +5,7 @@
 //! node.rs    one node                                           lifeline.rs whoever started it is gone
 //! told.rs    lines that are told                                metrics.rs  Prometheus' text
 //! log.rs     logs to standard error                             scenario.rs what server and nodes fly
+//! packets.rs the table of all packets
 //! ```
 
 mod crew;
@@ -13,6 +14,7 @@ mod lifeline;
 mod log;
 mod metrics;
 mod node;
+mod packets;
 mod scenario;
 mod told;
 

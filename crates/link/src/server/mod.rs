@@ -18,7 +18,7 @@ mod ticks;
 use crate::mail::{Heard, Mail};
 use crate::ports::{Sight, Stage};
 use crate::wire::Party;
-use crate::words::{Clock, Control, Fingerprint, Ticked, Welcome, Word};
+use crate::words::{Clock, Control, Fingerprint, Logged, Ticked, Welcome, Word};
 pub use seat::Seat;
 use sidestep::kernel::{Cycle, EntityId};
 use std::collections::BTreeMap;
@@ -88,6 +88,10 @@ pub trait Attendant {
     /// # Errors
     /// When the fleet is to end.
     fn attend(&mut self, fleet: &Look<'_>) -> Result<Vec<(EntityId, String)>, Broken>;
+
+    /// Takes packets that nodes have sent, where all are recorded: those of the cycles before the present one, each
+    /// with its sender.
+    fn take_packets(&mut self, _: Vec<(EntityId, Logged)>) {}
 }
 
 /// Counts of a server.
@@ -122,6 +126,8 @@ pub struct Server<'a> {
     look_at: Instant,
     /// Reports of nodes that have done a tick.
     ticked: Vec<(EntityId, Ticked)>,
+    /// Packets that nodes have sent, where all are recorded.
+    packets: Vec<(EntityId, Logged)>,
 }
 
 impl<'a> Server<'a> {
@@ -134,7 +140,7 @@ impl<'a> Server<'a> {
     ) -> Self {
         let seats = stage.agents().into_iter().map(|agent| (agent, Seat::default())).collect();
         let (beat_at, look_at) = (Instant::now(), Instant::now());
-        let (tally, ticked) = (Tally::default(), Vec::new());
+        let (tally, ticked, packets) = (Tally::default(), Vec::new(), Vec::new());
         Self {
             mail,
             stage,
@@ -146,6 +152,7 @@ impl<'a> Server<'a> {
             beat_at,
             look_at,
             ticked,
+            packets,
         }
     }
 
@@ -172,14 +179,17 @@ impl<'a> Server<'a> {
         }
     }
 
-    /// Tells all nodes that the fleet has ended, and waits a little until they have heard it.
+    /// Tells all nodes that the fleet has ended, and waits a little until they have said what they had to say.
     fn end(&mut self) {
         let seated: Vec<EntityId> = self.seated().collect();
         seated.iter().for_each(|&agent| self.mail.letter(Party::Node(agent), Word::End));
         let until = Instant::now() + BEAT;
-        while !self.mail.has_delivered() && Instant::now() < until {
-            self.mail.receive(LOOK);
+        while self.seated().any(|agent| !self.seats[&agent].has_left) && Instant::now() < until {
+            if let Some(heard) = self.mail.receive(LOOK) {
+                self.take(heard);
+            }
         }
+        self.attendant.take_packets(std::mem::take(&mut self.packets));
     }
 
     /// Agents whose nodes are there, rising.
@@ -250,6 +260,10 @@ impl<'a> Server<'a> {
             Word::Status(status) => seat.status = status,
             Word::Control(control) => self.on_control(agent, control),
             Word::Ticked(ticked) => self.ticked.push((agent, ticked)),
+            Word::Packets(sent) => {
+                self.packets.extend(sent.into_iter().map(|logged| (agent, logged)));
+            }
+            Word::Left => seat.has_left = true,
             // Of a node that says what only others say.
             _ => {}
         }
@@ -308,6 +322,9 @@ impl<'a> Server<'a> {
             }
         }
         self.tally.advanced.add(began.elapsed());
+        // A node may tell of a cycle until it hears of the next one.
+        let past = self.packets.extract_if(.., |(_, packet)| packet.cycle < cycle).collect();
+        self.attendant.take_packets(past);
         Ok(())
     }
 

@@ -16,7 +16,9 @@ pub struct Seat {
     pub status: Status,
     /// Whether its node is gone: it has ended, or was not heard for too long.
     pub is_gone: bool,
-    /// The present cycle's control, and when it came.
+    /// Whether its node has said that it has nothing more to say.
+    pub has_left: bool,
+    /// The present cycle's control, once it has come.
     pub control: Option<Vec<u8>>,
     /// Number of its controls that were flown.
     pub flown: u64,

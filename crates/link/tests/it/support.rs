@@ -88,7 +88,12 @@ pub(crate) fn in_threads(text: &str, way: Way<'_>) -> (Came, Result<(), Broken>,
     let (source, compiled) = compiled(text);
     let scenario = fingerprint(compiled.as_ref(), &source).expect("a fingerprint");
     let world = world_of(compiled.as_ref(), &source).expect("an airspace");
-    let welcome = Welcome { clock: way.clock, topology: way.topology, overrides: Vec::new() };
+    let welcome = Welcome {
+        clock: way.clock,
+        topology: way.topology,
+        overrides: Vec::new(),
+        logs_packets: false,
+    };
     let terms = Terms {
         scenario: scenario.clone(),
         build: "test".into(),
