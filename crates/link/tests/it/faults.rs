@@ -1,7 +1,7 @@
 //! Faults of real processes, in real time: killed and stopped nodes, a stopped server. Airplanes stay apart.
 
 use crate::processes::{Program, folder, job, signal};
-use crate::support::superconflict;
+use crate::support::{superconflict, wide};
 use sidestep_session::fleet::{Clock, FleetJob, FleetNow, Job, Told, Topology};
 use std::time::Duration;
 
@@ -29,7 +29,7 @@ fn ended(mut program: Program) -> (u64, FleetNow) {
 
 #[test]
 fn a_node_that_is_killed_is_started_again_and_all_stay_apart() {
-    let folder = folder(&superconflict(4, "compact-team", 1_000_000, ""));
+    let folder = folder(&wide(&superconflict(4, "compact-team", 1_000_000, ""), 8_000));
     let program = program(folder.path(), Topology::Mesh);
     let now = program.fleet("some cycles", |now| now.cycle >= 4);
     let killed = now.nodes[2].process.expect("a process");
@@ -47,7 +47,7 @@ fn a_node_that_is_killed_is_started_again_and_all_stay_apart() {
 
 #[test]
 fn a_node_that_is_stopped_is_late_and_flies_on_when_it_goes_on() {
-    let folder = folder(&superconflict(4, "compact-team", 1_000_000, ""));
+    let folder = folder(&wide(&superconflict(4, "compact-team", 1_000_000, ""), 8_000));
     let program = program(folder.path(), Topology::Star);
     let now = program.fleet("some cycles", |now| now.cycle >= 4);
     let stopped = now.nodes[1].process.expect("a process");
@@ -65,7 +65,7 @@ fn a_node_that_is_stopped_is_late_and_flies_on_when_it_goes_on() {
 /// The server does not hurry to catch up, and counts that it was late.
 #[test]
 fn a_server_that_is_stopped_for_a_while_is_late_once_and_goes_on() {
-    let folder = folder(&superconflict(3, "compact-team", 1_000_000, ""));
+    let folder = folder(&wide(&superconflict(3, "compact-team", 1_000_000, ""), 8_000));
     let program = program(folder.path(), Topology::Star);
     let now = program.fleet("some cycles", |now| now.cycle >= 4);
     let before = now.late_cycles;

@@ -2,6 +2,7 @@
 
 mod faults;
 mod input;
+mod namespaces;
 mod processes;
 mod support;
 mod threads;

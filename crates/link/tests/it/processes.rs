@@ -1,6 +1,6 @@
 //! Fleets as processes: the program `sidestep-link` as it is started by `sidestep fleet`.
 
-use crate::support::{alone, superconflict, untimed};
+use crate::support::{alone, superconflict, untimed, wide};
 use sidestep::worlds::WORLDS;
 use sidestep_session::fleet::{
     Clock, Common, Failed, FleetJob, FleetNow, Flown, Job, Told, Topology,
@@ -44,7 +44,17 @@ pub(crate) struct Program {
 
 impl Program {
     pub(crate) fn start(job: &Job) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_sidestep-link"));
+        Self::start_by(Command::new(env!("CARGO_BIN_EXE_sidestep-link")), job)
+    }
+
+    /// Starts the program in a network namespace.
+    pub(crate) fn start_in(namespace: &str, job: &Job) -> Self {
+        let mut command = Command::new("ip");
+        command.args(["netns", "exec", namespace, env!("CARGO_BIN_EXE_sidestep-link")]);
+        Self::start_by(command, job)
+    }
+
+    fn start_by(mut command: Command, job: &Job) -> Self {
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
         let mut child = command.spawn().expect("the program starts");
         let mut stdin = child.stdin.take().expect("a pipe");
@@ -152,7 +162,7 @@ fn processes_come_out_as_one_process_does_and_leave_an_ordinary_folder() {
 
 #[test]
 fn a_fleet_whose_starter_is_gone_ends_in_good_order_and_leaves_no_process() {
-    let folder = folder(&superconflict(4, "compact-team", 1_000_000, ""));
+    let folder = folder(&wide(&superconflict(4, "compact-team", 1_000_000, ""), 1_000_000));
     let out = folder.path().join("run");
     let job =
         FleetJob { out: Some(out.clone()), ..job(folder.path(), Topology::Star, Clock::Lockstep) };
@@ -169,10 +179,11 @@ fn a_fleet_whose_starter_is_gone_ends_in_good_order_and_leaves_no_process() {
 /// The server is killed, and its nodes end although nobody ends them; the folder is not lost.
 #[test]
 fn nodes_of_a_server_that_is_killed_end_by_themselves_and_the_folder_resumes() {
-    let text = superconflict(4, "compact-team", 60, "") + "[record]\ncheckpoint_every = 5\n";
+    let text = wide(&superconflict(4, "compact-team", 200, ""), 8_000)
+        + "[record]\ncheckpoint_every = 5\n";
     let folder = folder(&text);
     let out = folder.path().join("run");
-    let slow = Clock::Realtime { speed: 50.0 };
+    let slow = Clock::Realtime { speed: 100.0 };
     let job = FleetJob { out: Some(out.clone()), ..job(folder.path(), Topology::Mesh, slow) };
     let mut program = Program::start(&Job::Fleet(job));
     let fleet = program.fleet("some cycles", |now| now.cycle > 10);
@@ -186,7 +197,7 @@ fn nodes_of_a_server_that_is_killed_end_by_themselves_and_the_folder_resumes() {
 
 #[test]
 fn lockstep_does_not_go_on_without_a_node_that_is_killed() {
-    let folder = folder(&superconflict(4, "compact-team", 1_000_000, ""));
+    let folder = folder(&wide(&superconflict(4, "compact-team", 1_000_000, ""), 1_000_000));
     let job = job(folder.path(), Topology::Mesh, Clock::Lockstep);
     let program = Program::start(&Job::Fleet(job));
     let fleet = program.fleet("some cycles", |now| now.cycle > 3);

@@ -27,6 +27,11 @@ pub(crate) fn superconflict(n: usize, deployment: &str, cycles: u64, more: &str)
     )
 }
 
+/// Returns the same on a circle of another size, so that it takes longer.
+pub(crate) fn wide(text: &str, radius_m: u32) -> String {
+    text.replace("radius_m = 1500.0", &format!("radius_m = {radius_m}.0"))
+}
+
 /// The outcome of a run: the digest of its state, and the metrics but for those that a clock measures.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Came {
