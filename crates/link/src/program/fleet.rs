@@ -14,7 +14,7 @@ use crate::wire::Party;
 use crate::wire::zenoh::{WireError, ZenohWire, hold};
 use crate::words::{Clock, Logged, Topology, Welcome};
 use sidestep::kernel::ports::RecordError;
-use sidestep::kernel::{EntityId, Interrupt};
+use sidestep::kernel::EntityId;
 use sidestep_session::fleet::{FleetJob, FleetNow, NodeJob, NodeNow, Told};
 use sidestep_session::{Error, Journey, Keep, Watcher};
 use std::collections::BTreeMap;
@@ -48,7 +48,7 @@ pub(super) fn fly(job: &FleetJob, lifeline: &Lifeline) -> Result<(), Error> {
         lease: Duration::from_secs_f64(job.common.lease_s),
         has_faults: scenario.world.network.is_some(),
     };
-    let watcher = Watched(lifeline.clone());
+    let watcher = Watched;
     let mut stage = Airspace::new(journey, &watcher);
     let all = scenario.world.airplanes.len();
     let crew = Crew::start(node_jobs(job, &listen, all), job.clock != Clock::Lockstep)?;
@@ -129,21 +129,14 @@ fn finish(
     }
 }
 
-/// The program as a watcher of the run.
-struct Watched(Lifeline);
+/// The program as a watcher of the run, which goes on cycle by cycle: who looks after the fleet says when to stop.
+struct Watched;
 
 impl Watcher for Watched {
     fn warn(&self, error: &Error) {
         tracing::warn!("{error}");
     }
 
-    fn go_on(&self) -> bool {
-        !self.0.has_ended()
-    }
-
-    fn interrupt(&self) -> Interrupt {
-        Interrupt::default()
-    }
 }
 
 /// Looks after nodes, and tells how the fleet is.

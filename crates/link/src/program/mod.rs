@@ -5,9 +5,10 @@
 //! node.rs    one node                                           lifeline.rs whoever started it is gone
 //! told.rs    lines that are told                                metrics.rs  Prometheus' text
 //! log.rs     logs to standard error                             scenario.rs what server and nodes fly
-//! packets.rs the table of all packets
+//! packets.rs the table of all packets                           certificates.rs whether they hold
 //! ```
 
+mod certificates;
 mod crew;
 mod fleet;
 mod lifeline;
@@ -62,6 +63,7 @@ fn do_job(job: Job) -> Result<(), Error> {
     };
     log::start(common.json_log, &common.log)?;
     check_build(&common.flown)?;
+    common.tls.as_ref().map_or(Ok(()), certificates::check)?;
     match job {
         Job::Fleet(job) => fleet::fly(&job, &Lifeline::watch()),
         Job::Node(job) => {

@@ -6,3 +6,4 @@ mod namespaces;
 mod processes;
 mod support;
 mod threads;
+mod tls;
