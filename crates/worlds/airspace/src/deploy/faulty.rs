@@ -8,7 +8,6 @@ use crate::agents::network::Network;
 use crate::pilot::Schedule;
 use crate::purpose;
 use crate::state::AirspaceState;
-use crate::world::AirspaceWorld;
 use sidestep_kernel::distr::Chance;
 use sidestep_kernel::ports::{Envelope, Transport};
 use sidestep_kernel::stream::Streams;
@@ -31,14 +30,14 @@ pub(super) struct Faulty<'a, T> {
 }
 
 impl<'a, T: Transport> Faulty<'a, T> {
-    /// Returns a network for the talks of a cycle over another one, which adds its own faults.
+    /// Returns a network for the talks of a cycle that starts `starts_s` seconds after the start of the run, over
+    /// another one, which adds its own faults.
     pub(super) fn new(
         inner: T,
-        world: &'a AirspaceWorld,
+        (network, streams): (Option<&'a Network>, Streams),
         state: Option<&'a AirspaceState>,
-        (now, schedule): (Cycle, Schedule),
+        (starts_s, schedule): (f64, Schedule),
     ) -> Self {
-        let (network, streams, starts_s) = (world.network.as_ref(), world.streams, world.starts_s(now));
         Self { inner, network, streams, state, schedule, starts_s, free_at: BTreeMap::new() }
     }
 

@@ -5,12 +5,12 @@ use super::faulty::Faulty;
 use super::Deployment;
 use crate::Turn;
 use crate::agents::coordinator::{self, Journey, Migration, parts};
-use crate::agents::network::Traffic;
+use crate::agents::network::{Network, Traffic};
 use crate::agents::{Conclusion, Ended, OwnShip};
 use crate::decide::{Considered, Manner};
 use crate::flight::Known;
 use crate::intruder::Intruder;
-use crate::pilot::{Control, Pilot, Schedule, Sight, Topic, own_ship, patience};
+use crate::pilot::{Control, Memory, Pilot, Schedule, Sight, Topic, own_ship, patience};
 use crate::purpose;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::Slot;
@@ -57,15 +57,16 @@ pub(crate) fn flown(
 /// Returns the network of the talks of a cycle.
 fn network<'a>(turn: &Turn<'a>, schedule: Schedule) -> Faulty<'a, MemoryTransport> {
     let Turn { world, state, now, .. } = *turn;
-    let faults = world.network.as_ref().map(|network| network.faults()).unwrap_or_default();
-    let memory = MemoryTransport::new(world.streams, purpose::NETWORK, faults);
-    Faulty::new(memory, world, Some(state), (now, schedule))
+    let (network, streams) = (world.network.as_ref(), world.streams);
+    let faults = network.map(Network::faults).unwrap_or_default();
+    let memory = MemoryTransport::new(streams, purpose::NETWORK, faults);
+    Faulty::new(memory, (network, streams), Some(state), (world.starts_s(now), schedule))
 }
 
 fn pilots(
     world: &AirspaceWorld,
     flown: &[Slot],
-    memories: Vec<crate::pilot::Memory>,
+    memories: Vec<Memory>,
 ) -> Vec<Pilot> {
     // Nearly all of a world is shared by its copies.
     let world = Arc::new(world.clone());
