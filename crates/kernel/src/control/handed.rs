@@ -96,9 +96,8 @@ impl ControlReader {
 
     /// Reads the rows that come next. `None` if they are not those of controls.
     pub fn read(&mut self, schema: &TableSchema, columns: &[Values]) -> Option<()> {
-        let column = |name: &str| {
-            columns.get(schema.columns.iter().position(|column| column.name == name)?)
-        };
+        let column =
+            |name: &str| columns.get(schema.columns.iter().position(|column| column.name == name)?);
         let (Values::U64(cycles), Values::U32(agents)) = (column("cycle")?, column("agent")?)
         else {
             return None;

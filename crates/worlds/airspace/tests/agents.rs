@@ -1,8 +1,8 @@
 //! Pilots are programs of their own: each in a thread, with packets through channels and at a pace of its own,
 //! they do what one process decides for all.
 
-use sidestep_airspace::airspace_run;
 use sidestep_airspace::agents::contact::Contacts;
+use sidestep_airspace::airspace_run;
 use sidestep_airspace::pilot::{Control, Fleet, Packet, Pilot, Sight};
 use sidestep_airspace::world::AirspaceWorld;
 use sidestep_kernel::{Digest, EntityId, Simulation};

@@ -30,11 +30,7 @@ pub(super) fn decided(
 }
 
 /// Returns what the airplanes of a group want, and controls that say all but what they fly.
-fn wanted(
-    turn: &mut Turn<'_>,
-    own: &[Own],
-    intruders: &[Intruder],
-) -> Vec<(Control, Considered)> {
+fn wanted(turn: &mut Turn<'_>, own: &[Own], intruders: &[Intruder]) -> Vec<(Control, Considered)> {
     let Turn { world, state, now, .. } = *turn;
     let slots: Vec<Slot> = own.iter().map(|own| own.id).collect();
     let group: Vec<Known> = own.iter().map(Own::known).collect();

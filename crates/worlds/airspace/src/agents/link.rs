@@ -217,7 +217,8 @@ impl<A: Agent> Endpoint<A> {
     fn answer(&mut self, to: usize, from_number: u32) {
         let missing = self.said.get(from_number as usize..).unwrap_or_default().to_vec();
         if missing.is_empty() {
-            let nothing = if self.agent.is_done() { Wired::<A::Message>::Done } else { Wired::Wait };
+            let nothing =
+                if self.agent.is_done() { Wired::<A::Message>::Done } else { Wired::Wait };
             self.tell(to, Draft::of(&nothing));
         }
         missing.into_iter().for_each(|message| self.tell(to, message));
@@ -278,7 +279,7 @@ impl<A: Agent + Send> Party for Endpoint<A> {
             return;
         }
         self.quiet_since = tick;
-        let waited = (tick - self.began) as f64;
+        let waited = tick.saturating_sub(self.began) as f64;
         let has_time = waited < self.agent.waits_until() * self.radio.ticks as f64;
         for j in self.agent.awaits() {
             let Patience { tries, first_tries, .. } = self.radio.patience;

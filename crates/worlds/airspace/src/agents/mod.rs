@@ -35,8 +35,8 @@ use contact::Beacon;
 pub use link::{Agent, Ended, Endpoint, Most, Radio};
 pub use own_ship::{Briefing, Filed, OwnShip};
 pub use party::{Concludes, Outgoing, Party, Unsound};
-pub use talk::{Frame, Talk};
 use serde::{Deserialize, Serialize};
+pub use talk::{Frame, Talk};
 
 /// Outcome of the optimization for an airplane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

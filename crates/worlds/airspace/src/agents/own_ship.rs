@@ -2,7 +2,7 @@
 
 use super::Decided;
 use super::contact::{Beacon, Contact, Contacts};
-use super::party::Unsound;
+use super::party::{Unsound, are_places};
 use crate::flight::{Action, Air, Known, Model, Point, Pose, Prediction};
 use crate::intruder::Intruder;
 use crate::objective::{Objective, Options};
@@ -99,7 +99,7 @@ impl Briefing {
         ways.iter().try_for_each(|way| {
             let is_whole = way.points.len() == self.air.timing.horizon;
             Unsound::Length.unless(is_whole && way.counted <= way.points.len())?;
-            Unsound::Number.unless(way.points.as_flattened().iter().all(|v| v.is_finite()))
+            Unsound::Number.unless(are_places(way.points.as_flattened().iter().copied()))
         })
     }
 

@@ -77,6 +77,11 @@ impl Draft {
         Self(postcard::to_extend(message, room).expect("messages are plain data"))
     }
 
+    /// Returns a message that is serialized already.
+    pub fn of_bytes(message: &[u8]) -> Self {
+        Self([&[0; HEADER_BYTES], message].concat())
+    }
+
     /// The message.
     pub fn message(&self) -> &[u8] {
         &self.0[HEADER_BYTES..]
@@ -89,7 +94,7 @@ impl Draft {
     }
 
     /// Returns the bytes of the packet.
-    pub(super) fn sealed(mut self, seal: &Seal) -> Vec<u8> {
+    pub fn sealed(mut self, seal: &Seal) -> Vec<u8> {
         seal.write(&mut self.0[..CHECKSUM_AT]);
         let (head, message) = self.0.split_at(HEADER_BYTES);
         let checksum = digest([&head[..CHECKSUM_AT], message]).to_le_bytes();

@@ -1,8 +1,8 @@
 //! The pilots of a group, on a network in memory.
 
+use super::Deployment;
 use super::drive::drive;
 use super::faulty::Faulty;
-use super::Deployment;
 use crate::Turn;
 use crate::agents::coordinator::{self, Journey, Migration, parts};
 use crate::agents::network::{Network, Traffic};
@@ -12,9 +12,10 @@ use crate::flight::Known;
 use crate::intruder::Intruder;
 use crate::pilot::{Control, Memory, Pilot, Schedule, Sight, Topic, own_ship, patience};
 use crate::purpose;
+use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
-use sidestep_kernel::Slot;
 use sidestep_kernel::ports::MemoryTransport;
+use sidestep_kernel::{Cycle, Slot};
 use std::sync::Arc;
 
 /// Lets the pilots of a group decide. Returns what each does and what it has considered; `flown` are the group's
@@ -28,7 +29,7 @@ pub(crate) fn flown(
     let began_ns = clock.thread_cpu_ns();
     let schedule = Schedule::of_cycle(now, world.network.as_ref());
     let sights = Sight::all(turn, flown, intruders);
-    let mut transport = network(turn, schedule);
+    let mut transport = network(world, state, (now, schedule));
     let mut pilots = pilots(world, flown, state.take_memories(flown));
     let migrates = matches!(world.deployment, Deployment::Pim | Deployment::HierarchicalPim);
     let group: Vec<Known> = sights.iter().map(|sight| sight.own.known()).collect();
@@ -54,20 +55,31 @@ pub(crate) fn flown(
     pilots.into_iter().map(over).collect()
 }
 
+/// Lets pilots that have begun a cycle talk until all have come to an end.
+#[cfg(test)]
+pub(crate) fn fly_all(
+    world: &AirspaceWorld,
+    state: &AirspaceState,
+    (now, schedule): (Cycle, Schedule),
+    pilots: &mut [Pilot],
+) {
+    let mut transport = network(world, state, (now, schedule));
+    drive(&mut transport, pilots, schedule.begins, Pilot::is_done);
+}
+
 /// Returns the network of the talks of a cycle.
-fn network<'a>(turn: &Turn<'a>, schedule: Schedule) -> Faulty<'a, MemoryTransport> {
-    let Turn { world, state, now, .. } = *turn;
+fn network<'a>(
+    world: &'a AirspaceWorld,
+    state: &'a AirspaceState,
+    (now, schedule): (Cycle, Schedule),
+) -> Faulty<'a, MemoryTransport> {
     let (network, streams) = (world.network.as_ref(), world.streams);
     let faults = network.map(Network::faults).unwrap_or_default();
     let memory = MemoryTransport::new(streams, purpose::NETWORK, faults);
     Faulty::new(memory, (network, streams), Some(state), (world.starts_s(now), schedule))
 }
 
-fn pilots(
-    world: &AirspaceWorld,
-    flown: &[Slot],
-    memories: Vec<Memory>,
-) -> Vec<Pilot> {
+fn pilots(world: &AirspaceWorld, flown: &[Slot], memories: Vec<Memory>) -> Vec<Pilot> {
     // Nearly all of a world is shared by its copies.
     let world = Arc::new(world.clone());
     let pilot = |(&slot, memory)| Pilot::remembering(world.clone(), slot, memory);

@@ -23,6 +23,8 @@ mod kind;
 mod silence;
 
 pub(crate) use group::flown;
+#[cfg(test)]
+pub(crate) use group::fly_all;
 pub use kind::Deployment;
 pub(crate) use kind::refuses;
 

@@ -1,11 +1,11 @@
 //! The pilot, as a state machine.
 
+use super::briefing::unheard;
 use super::control::{Control, Course, Memory, Optimized};
 use super::early::Early;
 use super::schedule::{Schedule, patience};
 use super::sight::Sight;
 use super::talks::{Came, Speaker, optimizes, proposes, tells};
-use super::briefing::unheard;
 use crate::agents::contact::{Contacts, note};
 use crate::agents::intent::Intent;
 use crate::agents::network::Traffic;
@@ -92,8 +92,7 @@ impl Pilot {
     /// Returns the same pilot, which talks only with those of the same build.
     #[must_use]
     pub fn of_build(self, build: &str) -> Self {
-        let fingerprint =
-            digest([build.as_bytes(), &self.world.fingerprint.to_le_bytes()]);
+        let fingerprint = digest([build.as_bytes(), &self.world.fingerprint.to_le_bytes()]);
         Self { fingerprint, ..self }
     }
 
@@ -283,7 +282,11 @@ impl Pilot {
                     if talk.is_done() || tick >= talk.frame().ends =>
                 {
                     let ended = talk.end();
-                    let ticks = tick.min(talk.frame().ends) - talk.frame().begins;
+                    // Where nothing is lost, messages take no time that counts.
+                    let ticks = match self.world.network {
+                        Some(_) => tick.min(talk.frame().ends).saturating_sub(talk.frame().begins),
+                        None => 0,
+                    };
                     turn.note_traffic(ticks);
                     self.conclude(ended);
                 }

@@ -35,9 +35,8 @@ impl Fleet for AirspaceRun {
     }
 
     fn control(&mut self, controls: Vec<Control>) -> Result<(), OrderError> {
-        let bytes = |control: &Control| {
-            postcard::to_stdvec(control).expect("controls are plain data")
-        };
+        let bytes =
+            |control: &Control| postcard::to_stdvec(control).expect("controls are plain data");
         let controls: Vec<_> = controls.iter().map(|one| (one.id, bytes(one))).collect();
         self.hand_over(&controls)
     }
@@ -75,7 +74,8 @@ impl AirspaceWorld {
                 let who = format!("airplane {}", self.called_if_known(*id));
                 OrderError::Control { who, cause }
             };
-            let control = self.read_control(*id, bytes, sights.get(id).copied()).map_err(refused)?;
+            let control =
+                self.read_control(*id, bytes, sights.get(id).copied()).map_err(refused)?;
             if read.insert(*id, control).is_some() {
                 return Err(refused("there are two of it; give one for each airplane".into()));
             }
@@ -97,7 +97,8 @@ impl AirspaceWorld {
         sight: Option<&Sight>,
     ) -> Result<Control, String> {
         let Some(sight) = sight else {
-            let cause = "it does not decide in this cycle; give controls for those of `sights` only";
+            let cause =
+                "it does not decide in this cycle; give controls for those of `sights` only";
             return Err(cause.into());
         };
         let read = postcard::take_from_bytes::<Control>(bytes);

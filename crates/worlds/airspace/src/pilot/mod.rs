@@ -36,8 +36,8 @@ mod tests;
 
 pub use crate::agents::packet::{Packet, Refusal, Refused, TalkId, Topic};
 pub use aboard::Pilot;
+pub(crate) use briefing::own_ship;
 pub use control::{Control, Course, Memory, Optimized};
 pub use fleet::Fleet;
-pub(crate) use briefing::own_ship;
 pub(crate) use schedule::{Schedule, patience};
 pub use sight::{Own, Sight, Sighted};

@@ -26,19 +26,14 @@ impl Schedule {
     /// over one that loses nothing the second follows on the first, and each takes as long as it takes.
     pub(crate) fn from(tick: u64, network: Option<&Network>) -> Self {
         let Some(network) = network else {
-            return Self {
-                begins: tick,
-                decided_by: u64::MAX,
-                shield_from: tick,
-                ends: u64::MAX,
-            };
+            return Self { begins: tick, decided_by: u64::MAX, shield_from: tick, ends: u64::MAX };
         };
         let long = network.deadline_ticks();
         Self {
             begins: tick,
-            decided_by: tick + long,
-            shield_from: tick + long + 1,
-            ends: tick + 2 * long + 1,
+            decided_by: tick.saturating_add(long),
+            shield_from: tick.saturating_add(long + 1),
+            ends: tick.saturating_add(2 * long + 1),
         }
     }
 

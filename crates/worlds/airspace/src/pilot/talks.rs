@@ -2,6 +2,7 @@
 
 use super::briefing::{filed, own_ship, scene};
 use super::sight::Sight;
+use crate::agents::contact::Contacts;
 use crate::agents::exchange::{self, Agreed};
 use crate::agents::intent::{self, Intent};
 use crate::agents::{
@@ -12,7 +13,6 @@ use crate::baseline::mvp::Resolving;
 use crate::deploy::Deployment;
 use crate::shield::Way;
 use crate::world::AirspaceWorld;
-use crate::agents::contact::Contacts;
 use sidestep_collectives::Estimator;
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
@@ -125,9 +125,8 @@ pub(super) fn tells(
     radio: Radio,
 ) -> Box<Speaker> {
     let own = &sight.own;
-    let expected = |id: EntityId| {
-        contacts.get(&id).is_none_or(|contact| contact.heard_in + 1 >= sight.cycle)
-    };
+    let expected =
+        |id: EntityId| contacts.get(&id).is_none_or(|contact| contact.heard_in + 1 >= sight.cycle);
     let start = intent::Start {
         me: radio.me,
         own: Intent {
