@@ -5,7 +5,8 @@
 //! on sender, receiver and tick, never on the order in which agents are visited.
 
 use crate::agents::network::{Network, Patience, Traffic};
-use crate::agents::{Agent, Ended, Endpoint, Radio};
+use crate::agents::coordinator::Host;
+use crate::agents::{Agent, Conclusion, Ended, Endpoint, Radio};
 use crate::purpose;
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
@@ -154,6 +155,66 @@ impl Transport for Carrier<'_> {
     }
 }
 
+/// One of those who talk: a state machine, stepped with a network.
+pub(super) trait Party {
+    /// Type of its outcome.
+    type Outcome;
+
+    /// Sends what it has to say before it hears anything.
+    fn start(&mut self, transport: &mut dyn Transport, tick: u64);
+
+    /// Takes the packets that have arrived by a tick, and does whatever is due.
+    fn step(&mut self, transport: &mut dyn Transport, tick: u64);
+
+    /// Returns the tick in which something is due.
+    fn next_timer(&self) -> Option<u64>;
+
+    /// Returns whether the talk has ended for it.
+    fn is_done(&self) -> bool;
+
+    /// Returns the count of its messages so far.
+    fn traffic(&self) -> Traffic;
+
+    /// Returns the end of the talk.
+    fn end(self) -> Ended<Self::Outcome>;
+}
+
+/// Makes a type one of those who talk by its own functions of the same names.
+macro_rules! party {
+    ($type:ty, $outcome:ty $(, $bound:ident)?) => {
+        impl$(<$bound: Agent>)? Party for $type {
+            type Outcome = $outcome;
+
+            fn start(&mut self, transport: &mut dyn Transport, tick: u64) {
+                self.start(transport, tick);
+            }
+
+            fn step(&mut self, transport: &mut dyn Transport, tick: u64) {
+                self.step(transport, tick);
+            }
+
+            fn next_timer(&self) -> Option<u64> {
+                self.next_timer()
+            }
+
+            fn is_done(&self) -> bool {
+                self.is_done()
+            }
+
+            fn traffic(&self) -> Traffic {
+                self.traffic()
+            }
+
+            fn end(self) -> Ended<$outcome> {
+                self.end()
+            }
+        }
+    };
+}
+
+party!(Endpoint<A>, A::Outcome, A);
+party!(Host, Conclusion);
+
 /// Lets agents talk until all are done or time is up; `agents[i]` is the agent of `ids[i]`.
 pub(super) fn run<A: Agent>(
     talk: &Talk<'_>,
@@ -161,7 +222,6 @@ pub(super) fn run<A: Agent>(
     agents: Vec<A>,
 ) -> (Vec<Ended<A::Outcome>>, Traffic) {
     let (begin, end) = talk.ticks();
-    let mut transport = talk.transport();
     let radio = |me: usize| Radio {
         group: ids.clone(),
         me,
@@ -170,22 +230,31 @@ pub(super) fn run<A: Agent>(
         is_silent: talk.is_silent(ids[me]),
     };
     let endpoint = |(me, agent)| Endpoint::new(agent, radio(me));
-    let mut endpoints: Vec<Endpoint<A>> = agents.into_iter().enumerate().map(endpoint).collect();
-    endpoints.iter_mut().for_each(|endpoint| endpoint.start(&mut transport, begin));
+    drive(talk, agents.into_iter().enumerate().map(endpoint).collect())
+}
+
+/// Lets parties talk until all are done or time is up.
+pub(super) fn drive<P: Party>(
+    talk: &Talk<'_>,
+    mut parties: Vec<P>,
+) -> (Vec<Ended<P::Outcome>>, Traffic) {
+    let (begin, end) = talk.ticks();
+    let mut transport = talk.transport();
+    parties.iter_mut().for_each(|party| party.start(&mut transport, begin));
     let mut now = begin;
-    while !endpoints.iter().all(Endpoint::is_done) {
+    while !parties.iter().all(P::is_done) {
         interrupt::look();
-        let timers = endpoints.iter().filter_map(Endpoint::next_timer);
+        let timers = parties.iter().filter_map(P::next_timer);
         let next = timers.chain(transport.memory.next_arrival()).min().unwrap_or(end);
         now = next.min(end);
         if now == end {
             break;
         }
-        endpoints.iter_mut().for_each(|endpoint| endpoint.step(&mut transport, next));
+        parties.iter_mut().for_each(|party| party.step(&mut transport, next));
     }
     let mut traffic = Traffic { ticks: now - begin, ..Traffic::default() };
-    endpoints.iter().for_each(|endpoint| traffic.add(endpoint.traffic()));
-    (endpoints.into_iter().map(Endpoint::end).collect(), traffic)
+    parties.iter().for_each(|party| traffic.add(party.traffic()));
+    (parties.into_iter().map(P::end).collect(), traffic)
 }
 
 #[cfg(test)]

@@ -1,13 +1,13 @@
 //! The optimization of a group, by the deployment of the world.
 
-use super::drive::{Talk, Topic, run};
+use super::drive::{Talk, Topic, drive, run};
 use super::{Deployment, note_end};
 use crate::Turn;
 use crate::agents::contact::{self, Beacon, Contact, Contacts, Orbiting};
-use crate::agents::coordinator::{self, Journey, Migration, parts};
+use crate::agents::coordinator::{Host, Journey, parts};
 use crate::agents::network::Traffic;
 use crate::agents::{Briefing, Conclusion, Decided, Ended, Filed, OwnShip, informed, sampling};
-use crate::flight::Known;
+use crate::flight::{Known, Point};
 use crate::intruder::Intruder;
 use crate::world::AirspaceWorld;
 use sidestep_collectives::Estimator;
@@ -54,8 +54,11 @@ fn talked(
 ) -> (Vec<Ended<Conclusion>>, Traffic) {
     let ids = own[0].briefing.ids.clone();
     match (world.deployment, world.settings.estimator) {
-        (Deployment::Pim, _) => migrated(talk, &own, &[(0..own.len()).collect()]),
-        (Deployment::HierarchicalPim, _) => migrated(talk, &own, &parts(&own)),
+        (Deployment::Pim, _) => migrated(talk, own, [(0..ids.len()).collect()].into()),
+        (Deployment::HierarchicalPim, _) => {
+            let at: Vec<Point> = own.iter().map(|own| own.known.pose.at).collect();
+            migrated(talk, own, parts(&at).into())
+        }
         (Deployment::Team, Estimator::Sampled { block, ageing }) => {
             let agents = own.into_iter().map(|own| sampling::Agent::new(own, block, ageing));
             run(talk, &ids, agents.collect())
@@ -71,14 +74,15 @@ fn talked(
 /// Lets a coordinator for each part of a group migrate.
 fn migrated(
     talk: &Talk<'_>,
-    own: &[OwnShip],
-    parts: &[Vec<usize>],
+    own: Vec<OwnShip>,
+    parts: Arc<[Vec<usize>]>,
 ) -> (Vec<Ended<Conclusion>>, Traffic) {
-    let (begin, end) = talk.ticks();
-    let silent: Vec<bool> = own.iter().map(|own| talk.is_silent(own.known.slot)).collect();
-    let journey = Journey { begin, end, patience: talk.patience() };
-    let mut transport = talk.transport();
-    coordinator::run(Migration::new(&mut transport, own, &silent, journey), parts)
+    let ((begin, end), patience) = (talk.ticks(), talk.patience());
+    let host = |own: OwnShip| {
+        let is_silent = talk.is_silent(own.known.slot);
+        Host::new(own, parts.clone(), &Journey { begin, ticks: end - begin, patience, is_silent })
+    };
+    drive(talk, own.into_iter().map(host).collect())
 }
 
 /// Returns the knowledge that all agents of a group share before they talk.
