@@ -6,7 +6,6 @@ use super::Ship;
 use crate::agents::link::Ended;
 use crate::agents::{Conclusion, OwnShip};
 use crate::flight::{Point, distance_m};
-use std::sync::Arc;
 
 /// An airplane as coordinators see it.
 #[derive(Debug, Clone)]
@@ -14,7 +13,7 @@ pub(super) struct Aboard {
     pub own: OwnShip,
     /// The parts of the group, each of which has a coordinator; with several there is one above them,
     /// which has the number after theirs.
-    pub parts: Arc<[Vec<usize>]>,
+    pub parts: Vec<Vec<usize>>,
     /// The part that the airplane belongs to.
     pub part: usize,
     /// Tick in which sampling ends, so that some time is left to bring the controls.
@@ -39,13 +38,13 @@ pub(super) struct Answer {
 }
 
 impl Aboard {
-    pub(super) fn new(own: OwnShip, parts: Arc<[Vec<usize>]>, enough_at: u64) -> Self {
+    pub(super) fn new(own: OwnShip, parts: Vec<Vec<usize>>) -> Self {
         let part = parts.iter().position(|part| part.contains(&own.me)).unwrap_or(0);
         Self {
             own,
             parts,
             part,
-            enough_at,
+            enough_at: u64::MAX,
             report: None,
             answer: None,
             is_orphan: false,
@@ -102,7 +101,7 @@ impl Ship for Aboard {
 
 /// Splits a group at some places by proximity into parts of about as many members as there are
 /// parts: each time the first that is left and those nearest to it.
-pub fn parts(at: &[Point]) -> Vec<Vec<usize>> {
+pub(super) fn parts(at: &[Point]) -> Vec<Vec<usize>> {
     let size = (at.len() as f64).sqrt().ceil() as usize;
     let mut left: Vec<usize> = (0..at.len()).collect();
     let mut parts = Vec::new();

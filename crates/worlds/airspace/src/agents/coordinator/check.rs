@@ -3,37 +3,47 @@
 
 use super::aboard::Aboard;
 use super::state::{Coordinator, Overview, Task, Visited, block};
-use crate::agents::contact::Beacon;
+use crate::agents::party::Unsound;
 use crate::agents::{Briefing, Decided};
-use crate::flight::{Levels, Prediction};
 
-/// Returns whether a state can be that of the coordinator number `seat` of the host's group.
-pub(super) fn is_sound(state: &Coordinator, ship: &Aboard, seat: usize) -> bool {
-    let is_above = ship.above() == Some(seat);
+/// Checks the state of the coordinator number `seat` of the host's group.
+///
+/// # Errors
+/// When it cannot be that.
+pub(super) fn state(state: &Coordinator, ship: &Aboard, seat: usize) -> Result<(), Unsound> {
     let airplanes = &state.gathered.airplanes;
     let places: Vec<usize> = airplanes.iter().map(|airplane| airplane.place).collect();
-    let is_of_group = match &state.overview {
-        Some(overview) => is_above && is_overview(overview, ship) && are_of_group(&places, ship),
-        None => !is_above && places == ship.parts[seat],
+    let is_above = ship.above() == Some(seat);
+    match &state.overview {
+        Some(of_parts) if is_above => {
+            overview(of_parts, ship)?;
+            Unsound::Airplane.unless(are_of_group(&places, ship))?;
+        }
+        None if !is_above => Unsound::Airplane.unless(places == ship.parts[seat])?,
+        _ => return Err(Unsound::Kind),
+    }
+    // The ways of those that it has visited in this round are taken by the next step.
+    let (is_of_level, known) = match state.task {
+        Task::Gather(k) => (!is_above, k),
+        Task::Return | Task::Await => (!is_above, places.len()),
+        Task::Deliver(_) => (!is_above, 0),
+        Task::Collect(k) => (is_above && k <= ship.parts.len(), places.len()),
+        Task::HandBack(k) => (is_above && k <= ship.parts.len(), 0),
     };
-    // Those whose ways the next step of the algorithm takes.
-    let known = match state.task {
-        Task::Gather(k) if !is_above => k,
-        Task::Return | Task::Await if !is_above => places.len(),
-        Task::Deliver(_) if !is_above => 0,
-        Task::Collect(k) if is_above && k <= ship.parts.len() => places.len(),
-        Task::HandBack(k) if is_above && k <= ship.parts.len() => 0,
-        _ => return false,
-    };
-    let is_right = |(k, airplane): (usize, &Visited)| is_airplane(airplane, k < known, ship);
-    is_of_group && known <= places.len() && airplanes.iter().enumerate().all(is_right)
+    Unsound::Kind.unless(is_of_level)?;
+    Unsound::Round.unless(known <= places.len())?;
+    let briefing = &*ship.own.briefing;
+    let rounds = briefing.settings.stop.max_rounds;
+    Unsound::Round.unless(state.gathered.round <= rounds && state.gathered.calm <= rounds)?;
+    airplanes.iter().enumerate().try_for_each(|(k, one)| airplane(one, k < known, briefing))
 }
 
-fn is_overview(Overview { epochs, missing, unreachable }: &Overview, ship: &Aboard) -> bool {
+fn overview(of_parts: &Overview, ship: &Aboard) -> Result<(), Unsound> {
+    let Overview { epochs, missing, unreachable } = of_parts;
     let (group, parts) = (ship.own.briefing.ids.len(), ship.parts.len());
-    [epochs.len(), missing.len()].iter().all(|&len| len == 0 || len == parts)
-        && epochs.iter().all(|epoch| epoch.is_of(group))
-        && unreachable.len() <= group
+    Unsound::Length.unless([epochs.len(), missing.len()] == [parts; 2])?;
+    Unsound::Length.unless(unreachable.len() <= group)?;
+    Unsound::Round.unless(epochs.iter().all(|epoch| epoch.is_of(group)))
 }
 
 /// Returns whether all are members of the group, and none is there twice.
@@ -44,56 +54,32 @@ fn are_of_group(places: &[usize], ship: &Aboard) -> bool {
     is_once && sorted.last().is_none_or(|&last| last < ship.own.briefing.ids.len())
 }
 
-/// Returns whether the data of an airplane are sound, ways included if they are `known`.
-fn is_airplane(airplane: &Visited, known: bool, ship: &Aboard) -> bool {
-    let briefing = &*ship.own.briefing;
+/// Checks the data of an airplane of the group, which must have ways if they are `known`.
+fn airplane(airplane: &Visited, known: bool, briefing: &Briefing) -> Result<(), Unsound> {
     let actions = briefing.filed[airplane.place].actions.len();
-    let Visited { beacon, player, samples, ways, own_costs, separation_m, levels, decided, .. } =
-        airplane;
-    let wanted = match block(briefing) {
+    let block = block(briefing);
+    let wanted = match block {
         Some(block) => block,
         None if airplane.is_presumed => 1,
         None => actions,
     };
-    let are_there = ways.len() == wanted || (ways.is_empty() && !known);
-    let are_samples = samples.is_empty() || samples.len() == wanted;
-    are_there
-        && own_costs.len() == ways.len()
-        && are_finite(own_costs)
-        && ways.iter().all(|way| is_way(way, briefing))
-        && are_samples
-        && samples.iter().all(|&x| x < actions)
-        && player.as_ref().is_none_or(|player| player.is_of(actions))
-        && (0.0..f64::INFINITY).contains(separation_m)
-        && are_levels(levels)
-        && beacon.as_ref().is_none_or(is_beacon)
-        && decided.as_ref().is_none_or(|decided| is_decided(decided, actions))
+    let Visited { place, beacon, samples, ways, own_costs, separation_m, levels, .. } = airplane;
+    if known || !ways.is_empty() {
+        briefing.admits_ways(ways, wanted)?;
+    }
+    Unsound::Length.unless(own_costs.len() == ways.len())?;
+    Unsound::Length.unless(samples.is_empty() || Some(samples.len()) == block)?;
+    let is_player = airplane.player.as_ref().is_none_or(|player| player.is_of(actions));
+    let is_wide = (0.0..f64::INFINITY).contains(separation_m);
+    let are_numbers = own_costs.iter().all(|cost| cost.is_finite());
+    let is_level = levels.low_m <= levels.high_m && samples.iter().all(|&x| x < actions);
+    Unsound::Number.unless(is_player && is_wide && are_numbers && is_level)?;
+    beacon.as_ref().map_or(Ok(()), |beacon| briefing.admits(*place, beacon))?;
+    airplane.decided.as_ref().map_or(Ok(()), |one| decided(one, actions))
 }
 
-fn are_finite(numbers: &[f64]) -> bool {
-    numbers.iter().all(|number| number.is_finite())
-}
-
-fn is_way(Prediction { points, counted }: &Prediction, briefing: &Briefing) -> bool {
-    let horizon = briefing.air.timing.horizon;
-    points.len() == horizon && *counted <= horizon && points.iter().all(|at| are_finite(at))
-}
-
-fn are_levels(Levels { low_m, high_m }: &Levels) -> bool {
-    low_m <= high_m
-}
-
-fn is_beacon(beacon: &Beacon) -> bool {
-    let Beacon { pose, goal, v_m_s, omega_max_rad_s, orbit_rad_s, separation_m, levels } = beacon;
-    let positive = [v_m_s, omega_max_rad_s, orbit_rad_s];
-    are_finite(&pose.at)
-        && pose.heading_rad.is_finite()
-        && goal.is_none_or(|goal| are_finite(&goal))
-        && positive.iter().all(|number| (0.0..f64::INFINITY).contains(*number))
-        && (0.0..f64::INFINITY).contains(separation_m)
-        && are_levels(levels)
-}
-
-fn is_decided(Decided { chosen, expected, .. }: &Decided, actions: usize) -> bool {
-    *chosen < actions && expected.len() == actions && are_finite(expected)
+fn decided(decided: &Decided, actions: usize) -> Result<(), Unsound> {
+    Unsound::Length.unless(decided.expected.len() == actions)?;
+    let are_finite = decided.expected.iter().all(|cost| cost.is_finite());
+    Unsound::Number.unless(decided.chosen < actions && are_finite)
 }

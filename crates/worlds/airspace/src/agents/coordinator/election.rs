@@ -4,6 +4,7 @@ use super::epoch::{Epoch, Position, is_majority};
 use super::messages::{Candidacy, Message};
 use super::seat::{Copy, Post, Seat, Standing};
 use super::Passenger;
+use crate::agents::party::Unsound;
 
 impl<P: Passenger> Seat<P> {
     /// Stands for election, after the coordinator could not reach `lost` from here, or was not
@@ -74,21 +75,23 @@ impl<P: Passenger> Seat<P> {
     }
 
     /// Takes a vote, and the copy that came with it if that is the newest one.
+    ///
+    /// # Errors
+    /// When that copy is not sound.
     pub(super) fn on_vote(
         &mut self,
         from: usize,
         (epoch, copy): (Epoch, Option<Copy>),
         ship: &P::Ship,
         tick: u64,
-    ) {
-        let Post::Standing(standing) = &mut self.post else { return };
+    ) -> Result<(), Unsound> {
+        let Post::Standing(standing) = &mut self.post else { return Ok(()) };
         if standing.asks.epoch != epoch {
-            return;
+            return Ok(());
         }
-        // A copy that cannot be read is none; the vote counts all the same.
         let is_newer = |copy: &Copy| self.copy.as_ref().is_none_or(|own| copy.at > own.at);
-        let read = |copy: &Copy| P::read(&copy.state, ship, self.number.into()).is_some();
-        if let Some(copy) = copy.filter(|copy| is_newer(copy) && read(copy)) {
+        if let Some(copy) = copy.filter(is_newer) {
+            P::read(&copy.state, ship, self.number.into())?;
             self.copy = Some(copy);
             // Where it was lost in the end is not known then.
             standing.lost = None;
@@ -97,6 +100,7 @@ impl<P: Passenger> Seat<P> {
         if is_majority(&standing.votes) {
             self.bring_back(ship, tick);
         }
+        Ok(())
     }
 
     /// Brings the coordinator back from the newest copy that a majority has, or else from nothing.
@@ -104,7 +108,7 @@ impl<P: Passenger> Seat<P> {
         let Post::Standing(Standing { asks, lost, .. }) = &self.post else { return };
         let (at, lost): (Position, _) = (asks.epoch.start(), *lost);
         let number = self.number.into();
-        let copied = self.copy.as_ref().and_then(|copy| P::read(&copy.state, ship, number));
+        let copied = self.copy.as_ref().and_then(|copy| P::read(&copy.state, ship, number).ok());
         let mut passenger = copied.unwrap_or_else(|| P::new(ship, number));
         if let Some(lost) = lost {
             passenger.cannot_reach(lost);

@@ -11,7 +11,7 @@ const MOST: u32 = 1 << 24;
 /// it had to be brought back from a copy. It names the host that began it, so no two hosts begin the
 /// same one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub struct Epoch {
+pub(super) struct Epoch {
     /// The higher one is newer.
     pub number: u32,
     /// Place of the host that began it; among equal numbers the lower one is newer.
@@ -49,7 +49,7 @@ impl Epoch {
 
 /// A point on a coordinator's journey: the epoch, and the number of hops in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub struct Position {
+pub(super) struct Position {
     /// Its epoch.
     pub epoch: Epoch,
     /// Number of hops since the epoch began.

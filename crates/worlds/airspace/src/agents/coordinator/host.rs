@@ -4,6 +4,7 @@ use super::epoch::Epoch;
 use super::messages;
 use super::seat::{Seat, Sent, Stay};
 use super::{Here, Passenger, Rules, Ship, Step};
+use crate::agents::party::Unsound;
 use std::sync::Arc;
 
 /// The program aboard one airplane that takes coordinators in, runs them, and sends them on: a state
@@ -32,17 +33,22 @@ impl<P: Passenger> Hosting<P> {
         self.settle(tick);
     }
 
-    /// Takes a packet of another host. Returns whether it could be read; one that could not counts
-    /// as lost.
-    pub(super) fn on_packet(&mut self, from: usize, bytes: &[u8], tick: u64) -> bool {
+    /// Takes a message of another host.
+    ///
+    /// # Errors
+    /// When it is not sound; nothing has changed then.
+    pub(super) fn on_message(
+        &mut self,
+        from: usize,
+        bytes: &[u8],
+        tick: u64,
+    ) -> Result<(), Unsound> {
         let size = (self.rules.group, self.seats.len());
-        let Some((seat, message, state)) = messages::read(bytes, [from, self.rules.me], size)
-        else {
-            return false;
-        };
-        self.seats[usize::from(seat)].on_message(from, (message, state), &self.ship, tick);
+        let (seat, message, state) = messages::read(bytes, [from, self.rules.me], size)?;
+        let seat = &mut self.seats[usize::from(seat)];
+        seat.on_message(from, (message, state), &self.ship, tick)?;
         self.settle(tick);
-        true
+        Ok(())
     }
 
     /// Does whatever is due.
@@ -91,6 +97,11 @@ impl<P: Passenger> Hosting<P> {
             }
         }
         true
+    }
+
+    /// Returns whether no coordinator is in the care of the host, and none is missed by it.
+    pub(super) fn is_idle(&self) -> bool {
+        self.seats.iter().all(Seat::is_empty)
     }
 
     /// Returns the messages on their way out.

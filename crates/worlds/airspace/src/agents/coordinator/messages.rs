@@ -2,7 +2,8 @@
 //! sees it.
 
 use super::epoch::{Epoch, Position};
-use crate::agents::bytes_of;
+use crate::agents::packet::Draft;
+use crate::agents::party::Unsound;
 use serde::{Deserialize, Serialize};
 
 /// A message about one of the coordinators of a group.
@@ -23,6 +24,13 @@ pub(super) enum Message {
     Vote(Epoch, Option<Position>),
 }
 
+impl Message {
+    /// Returns whether the bytes of a state follow it.
+    fn has_state(&self) -> bool {
+        matches!(self, Self::Hop(_) | Self::Vote(_, Some(_)))
+    }
+}
+
 /// A host that stands for election.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub(super) struct Candidacy {
@@ -40,34 +48,39 @@ pub(super) struct Candidacy {
 /// state where it carries one.
 pub(super) type Read<'a> = (u16, Message, &'a [u8]);
 
-/// Returns a message in the form in which it travels.
-pub(super) fn written(seat: u16, message: &Message, state: &[u8]) -> Vec<u8> {
-    let mut bytes = bytes_of(&(seat, message));
-    bytes.extend_from_slice(state);
-    bytes
+/// Returns a message in the form in which it travels: a state goes behind it.
+pub(super) fn written(seat: u16, message: &Message, state: &[u8]) -> Draft {
+    Draft::with(&(seat, message), state)
 }
 
 /// Returns a message from host `from` to host `me` of a group of `group` hosts and `seats`
-/// coordinators; none where it can be no such message.
+/// coordinators.
+///
+/// # Errors
+/// When it can be no such message.
 pub(super) fn read(
     bytes: &[u8],
     [from, me]: [usize; 2],
     (group, seats): (usize, usize),
-) -> Option<Read<'_>> {
-    let ((seat, message), state) = postcard::take_from_bytes::<(u16, Message)>(bytes).ok()?;
-    let (is_right, has_state) = match &message {
-        Message::Hop(at) => (at.is_of(group) && at.hop > 0, true),
-        Message::Ack(at) | Message::Alive(at) => (at.is_of(group), false),
-        Message::Stale(epoch) => (epoch.is_of(group), false),
+) -> Result<Read<'_>, Unsound> {
+    let read = postcard::take_from_bytes::<(u16, Message)>(bytes);
+    let ((seat, message), state) = read.map_err(|_| Unsound::Form)?;
+    Unsound::Airplane.unless(from < group && from != me)?;
+    Unsound::Kind.unless(usize::from(seat) < seats)?;
+    Unsound::Form.unless(message.has_state() || state.is_empty())?;
+    let is_right = match &message {
+        Message::Hop(at) => at.is_of(group) && at.hop > 0,
+        Message::Ack(at) | Message::Alive(at) => at.is_of(group),
+        Message::Stale(epoch) => epoch.is_of(group),
         Message::Elect(Candidacy { epoch, seen, has, .. }) => {
-            let is_right = epoch.is_of(group) && usize::from(epoch.owner) == from;
-            (is_right && seen.is_of(group) && has.is_none_or(|has| has.is_of(group)), false)
+            let is_own = epoch.is_of(group) && usize::from(epoch.owner) == from;
+            is_own && seen.is_of(group) && has.is_none_or(|has| has.is_of(group))
         }
         Message::Vote(epoch, copy) => {
-            let is_right = epoch.is_of(group) && usize::from(epoch.owner) == me;
-            (is_right && copy.is_none_or(|copy| copy.is_of(group)), copy.is_some())
+            let is_mine = epoch.is_of(group) && usize::from(epoch.owner) == me;
+            is_mine && copy.is_none_or(|copy| copy.is_of(group))
         }
     };
-    let is_right = is_right && usize::from(seat) < seats && from < group && from != me;
-    (is_right && (has_state || state.is_empty())).then_some((seat, message, state))
+    Unsound::Round.unless(is_right)?;
+    Ok((seat, message, state))
 }

@@ -12,9 +12,9 @@ mod state;
 mod tour;
 
 use super::network::Patience;
-pub use aboard::parts;
+use super::party::Unsound;
 use epoch::Epoch;
-pub use party::{Host, Journey};
+pub use party::Host;
 
 /// The next step of a coordinator that was run on a host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,8 +51,11 @@ trait Passenger: Sized {
     /// Returns its state in the form in which it travels.
     fn written(&self) -> Vec<u8>;
 
-    /// Returns a state that has come to a host, if it is sound in every part.
-    fn read(bytes: &[u8], ship: &Self::Ship, seat: usize) -> Option<Self>;
+    /// Returns a state that has come to a host.
+    ///
+    /// # Errors
+    /// When any part of it is not sound.
+    fn read(bytes: &[u8], ship: &Self::Ship, seat: usize) -> Result<Self, Unsound>;
 
     /// Goes on until it has to hop, to wait, or is done.
     fn go_on(&mut self, ship: &mut Self::Ship, here: &Here<'_>) -> Step;

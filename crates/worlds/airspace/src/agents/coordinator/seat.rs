@@ -5,13 +5,15 @@
 use super::epoch::{Epoch, Position};
 use super::messages::{Candidacy, Message, written};
 use super::{Passenger, Rules};
+use crate::agents::packet::Draft;
+use crate::agents::party::Unsound;
 use std::sync::Arc;
 
 /// A message on its way out, to one other host or to all.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone)]
 pub(super) struct Sent {
     pub to: Option<usize>,
-    pub payload: Vec<u8>,
+    pub message: Draft,
 }
 
 /// The state with which a coordinator has left a host.
@@ -112,11 +114,6 @@ impl<P: Passenger> Seat<P> {
         }
     }
 
-    /// Returns the host to which the coordinator returns: that which began its epoch.
-    pub(super) fn home(&self) -> usize {
-        self.promised.owner.into()
-    }
-
     /// Takes the coordinator out in order to run it, if it is here.
     pub(super) fn take_aboard(&mut self) -> Option<Stay<P>> {
         match std::mem::replace(&mut self.post, Post::Empty) {
@@ -131,6 +128,11 @@ impl<P: Passenger> Seat<P> {
     /// Returns whether the coordinator is here.
     pub(super) fn is_aboard(&self) -> bool {
         matches!(self.post, Post::Aboard(_))
+    }
+
+    /// Returns whether the host has nothing to do with the coordinator.
+    pub(super) fn is_empty(&self) -> bool {
+        matches!(self.post, Post::Empty)
     }
 
     /// Takes the coordinator in, or back in.
@@ -160,43 +162,53 @@ impl<P: Passenger> Seat<P> {
     }
 
     /// Takes a checked message of another host.
+    ///
+    /// # Errors
+    /// When the state that comes with it is not sound; nothing has changed then.
     pub(super) fn on_message(
         &mut self,
         from: usize,
         (message, state): (Message, &[u8]),
         ship: &P::Ship,
         tick: u64,
-    ) {
-        if let Post::Standing(standing) = &mut self.post {
-            standing.heard[from] = true;
-        }
+    ) -> Result<(), Unsound> {
         match message {
-            Message::Hop(at) => self.on_hop(from, (at, state), ship, tick),
+            Message::Hop(at) => self.on_hop(from, (at, state), ship, tick)?,
+            Message::Vote(epoch, copy) => {
+                let copy = copy.map(|at| Copy { at, state: state.into() });
+                self.on_vote(from, (epoch, copy), ship, tick)?;
+            }
             Message::Ack(at) => self.on_ack(from, at, tick),
             Message::Alive(at) => self.on_alive(from, at, tick),
             Message::Stale(epoch) => self.on_stale(epoch, ship, tick),
             Message::Elect(candidacy) => self.on_elect(from, candidacy, tick),
-            Message::Vote(epoch, copy) => {
-                let copy = copy.map(|at| Copy { at, state: state.into() });
-                self.on_vote(from, (epoch, copy), ship, tick);
-            }
         }
+        if let Post::Standing(standing) = &mut self.post {
+            standing.heard[from] = true;
+        }
+        Ok(())
     }
 
-    fn on_hop(&mut self, from: usize, (at, state): (Position, &[u8]), ship: &P::Ship, tick: u64) {
+    fn on_hop(
+        &mut self,
+        from: usize,
+        (at, state): (Position, &[u8]),
+        ship: &P::Ship,
+        tick: u64,
+    ) -> Result<(), Unsound> {
         if at.epoch < self.promised {
-            return self.send(from, &Message::Stale(self.promised), &[]);
-        }
-        if at <= self.taken {
+            self.send(from, &Message::Stale(self.promised), &[]);
+        } else if at <= self.taken {
             // A copy on the network, or the acknowledgement was lost.
-            return self.acknowledge(from, at);
+            self.acknowledge(from, at);
+        } else {
+            let passenger = P::read(state, ship, self.number.into())?;
+            self.note(at, tick);
+            self.taken = at;
+            self.acknowledge(from, at);
+            self.board(passenger, tick);
         }
-        // A state that cannot be read counts as lost.
-        let Some(passenger) = P::read(state, ship, self.number.into()) else { return };
-        self.note(at, tick);
-        self.taken = at;
-        self.acknowledge(from, at);
-        self.board(passenger, tick);
+        Ok(())
     }
 
     fn acknowledge(&mut self, to: usize, at: Position) {
@@ -294,8 +306,8 @@ impl<P: Passenger> Seat<P> {
         let to = *to;
         if *beat_at <= tick {
             *beat_at = tick + self.rules.beat_ticks();
-            let payload = written(self.number, &Message::Alive(copy.at), &[]);
-            self.out.push(Sent { to: None, payload });
+            let message = written(self.number, &Message::Alive(copy.at), &[]);
+            self.out.push(Sent { to: None, message });
         }
         if *due > tick {
             return;
@@ -306,7 +318,7 @@ impl<P: Passenger> Seat<P> {
             return self.send(to, &Message::Hop(copy.at), &copy.state);
         }
         let passenger = P::read(&copy.state, ship, self.number.into());
-        if passenger.is_some_and(|passenger| passenger.is_over_without(to)) {
+        if passenger.is_ok_and(|passenger| passenger.is_over_without(to)) {
             self.post = Post::Empty;
         } else {
             // It may have arrived all the same, so it goes on in a new epoch or not at all.
@@ -334,11 +346,11 @@ impl<P: Passenger> Seat<P> {
     }
 
     pub(super) fn send(&mut self, to: usize, message: &Message, state: &[u8]) {
-        let payload = written(self.number, message, state);
-        self.out.push(Sent { to: Some(to), payload });
+        let message = written(self.number, message, state);
+        self.out.push(Sent { to: Some(to), message });
     }
 
     pub(super) fn broadcast(&mut self, message: &Message) {
-        self.out.push(Sent { to: None, payload: written(self.number, message, &[]) });
+        self.out.push(Sent { to: None, message: written(self.number, message, &[]) });
     }
 }

@@ -1,10 +1,11 @@
 //! The tours of coordinators: which airplane they visit next, and for what.
 
 use super::aboard::{Aboard, Answer};
-use super::epoch::Epoch;
 use super::state::{Coordinator, Gathered, Overview, Task, Visited};
 use super::{Here, Passenger, Step, check};
-use crate::agents::{Conclusion, bytes_of};
+use crate::agents::link::bytes_of;
+use crate::agents::party::Unsound;
+use crate::agents::Conclusion;
 
 impl Coordinator {
     /// Gathers the data of the airplanes of its part, from number `k` on.
@@ -207,9 +208,12 @@ impl Passenger for Coordinator {
         bytes_of(self)
     }
 
-    fn read(bytes: &[u8], ship: &Aboard, seat: usize) -> Option<Self> {
-        let read: Self = postcard::from_bytes(bytes).ok()?;
-        check::is_sound(&read, ship, seat).then_some(read)
+    fn read(bytes: &[u8], ship: &Aboard, seat: usize) -> Result<Self, Unsound> {
+        let read = postcard::take_from_bytes::<Self>(bytes);
+        let (state, rest) = read.map_err(|_| Unsound::Form)?;
+        Unsound::Form.unless(rest.is_empty())?;
+        check::state(&state, ship, seat)?;
+        Ok(state)
     }
 
     fn go_on(&mut self, ship: &mut Aboard, here: &Here<'_>) -> Step {
