@@ -82,6 +82,13 @@ impl Draft {
         Self([&[0; HEADER_BYTES], message].concat())
     }
 
+    /// Returns a message that is followed by bytes in a form of their own.
+    pub fn with<M: Serialize + ?Sized>(message: &M, bytes: &[u8]) -> Self {
+        let Self(mut draft) = Self::of(message);
+        draft.extend_from_slice(bytes);
+        Self(draft)
+    }
+
     /// The message.
     pub fn message(&self) -> &[u8] {
         &self.0[HEADER_BYTES..]

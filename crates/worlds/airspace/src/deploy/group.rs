@@ -1,16 +1,12 @@
 //! The pilots of a group, on a network in memory.
 
-use super::Deployment;
 use super::drive::drive;
 use super::faulty::Faulty;
 use crate::Turn;
-use crate::agents::coordinator::{self, Journey, Migration, parts};
-use crate::agents::network::{Network, Traffic};
-use crate::agents::{Conclusion, Ended, OwnShip};
-use crate::decide::{Considered, Manner};
-use crate::flight::Known;
+use crate::agents::network::Network;
+use crate::decide::Considered;
 use crate::intruder::Intruder;
-use crate::pilot::{Control, Memory, Pilot, Schedule, Sight, Topic, own_ship, patience};
+use crate::pilot::{Control, Memory, Pilot, Schedule, Sight};
 use crate::purpose;
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
@@ -31,19 +27,8 @@ pub(crate) fn flown(
     let sights = Sight::all(turn, flown, intruders);
     let mut transport = network(world, state, (now, schedule));
     let mut pilots = pilots(world, flown, state.take_memories(flown));
-    let migrates = matches!(world.deployment, Deployment::Pim | Deployment::HierarchicalPim);
-    let group: Vec<Known> = sights.iter().map(|sight| sight.own.known()).collect();
-    if migrates && Manner::of(world, &group, intruders) == Manner::Optimizing {
-        let own = |(sight, pilot): (&Sight, &Pilot)| own_ship(world, sight, pilot.contacts());
-        let own: Vec<OwnShip> = sights.iter().zip(&pilots).map(own).collect();
-        let (ended, mut traffic) = migrated(world, &mut transport, &own, schedule);
-        for ((pilot, sight), ended) in pilots.iter_mut().zip(sights).zip(ended) {
-            pilot.begin_told(sight, schedule, ended, std::mem::take(&mut traffic));
-        }
-    } else {
-        for (pilot, sight) in pilots.iter_mut().zip(sights) {
-            pilot.begin_by(sight, schedule);
-        }
+    for (pilot, sight) in pilots.iter_mut().zip(sights) {
+        pilot.begin_by(sight, schedule);
     }
     drive(&mut transport, &mut pilots, schedule.begins, Pilot::has_decided);
     turn.scratch.decide_ns += clock.thread_cpu_ns() - began_ns;
@@ -84,24 +69,4 @@ fn pilots(world: &AirspaceWorld, flown: &[Slot], memories: Vec<Memory>) -> Vec<P
     let world = Arc::new(world.clone());
     let pilot = |(&slot, memory)| Pilot::remembering(world.clone(), slot, memory);
     flown.iter().zip(memories).map(pilot).collect()
-}
-
-/// Lets a coordinator for each part of a group migrate.
-fn migrated(
-    world: &AirspaceWorld,
-    transport: &mut Faulty<'_, MemoryTransport>,
-    own: &[OwnShip],
-    schedule: Schedule,
-) -> (Vec<Ended<Conclusion>>, Traffic) {
-    let parts = match world.deployment {
-        Deployment::HierarchicalPim => parts(own),
-        _ => vec![(0..own.len()).collect()],
-    };
-    let is_silent = |own: &OwnShip| world.is_silent(own.known.slot, own.briefing.now);
-    let silent: Vec<bool> = own.iter().map(is_silent).collect();
-    let (begin, end) = schedule.of(Topic::Decision, schedule.begins);
-    let network = world.network.as_ref();
-    let patience = network.map(|_| patience(network, Topic::Decision));
-    let journey = Journey { begin, end, patience };
-    coordinator::run(Migration::new(transport, own, &silent, journey), &parts)
 }

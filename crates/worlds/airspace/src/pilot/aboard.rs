@@ -123,22 +123,6 @@ impl Pilot {
         self.settle(schedule.begins);
     }
 
-    /// Starts a cycle whose optimization was made elsewhere.
-    pub(crate) fn begin_told(
-        &mut self,
-        sight: Sight,
-        schedule: Schedule,
-        ended: Ended<crate::agents::Conclusion>,
-        traffic: Traffic,
-    ) {
-        self.take_up(sight, schedule);
-        let Ended { outcome, unheard, late } = ended;
-        self.conclude(Ended { outcome: outcome.map(Came::Decided), unheard, late });
-        if let Some(turn) = &mut self.turn {
-            turn.control.deciding = traffic;
-        }
-    }
-
     fn take_up(&mut self, sight: Sight, schedule: Schedule) {
         assert_eq!(sight.own.id, self.id, "the sight is that of another airplane");
         if let Some(turn) = self.turn.take()

@@ -51,7 +51,7 @@ fn is_flown_alike(airspace: &str, airplanes: &str, mut orders: impl FnMut(&mut A
 
 #[test]
 fn a_run_flown_from_outside_is_the_run_that_flies_itself() {
-    for deployment in ["team", "compact-team"] {
+    for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {
         for method in ["pc", "mvp", "orca", "none"] {
             let airspace = format!("deployment = \"{deployment}\"\nmethod = \"{method}\"");
             is_flown_alike(&airspace, FOUR, |_| {});

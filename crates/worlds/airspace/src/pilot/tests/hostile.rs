@@ -9,11 +9,14 @@ use std::collections::VecDeque;
 
 const THREE: &str = "[airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 2600.0\n";
 
-const KINDS: [&str; 7] = [
+const KINDS: [&str; 10] = [
     "deployment = \"team\"",
     "deployment = \"compact-team\"",
     "deployment = \"team\"\npreset = \"paper\"",
     "deployment = \"compact-team\"\npreset = \"paper\"",
+    "deployment = \"pim\"",
+    "deployment = \"hierarchical-pim\"\npreset = \"paper\"",
+    "deployment = \"pim\"\nnetwork = { loss = 0.2 }",
     "deployment = \"team\"\nmethod = \"mvp\"",
     "deployment = \"team\"\nmethod = \"none\"\nnetwork = {}",
     "deployment = \"team\"\nnetwork = { loss = 0.2 }",
