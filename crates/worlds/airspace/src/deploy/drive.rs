@@ -298,7 +298,7 @@ mod tests {
         let mut stations: Vec<Alone> = (0..group).map(station).collect();
         let faults = network.map(Network::faults).unwrap_or_default();
         let memory = MemoryTransport::new(streams, purpose::NETWORK, faults);
-        let mut faulty = Faulty::new(memory, (network, streams), None, (15.0, schedule));
+        let mut faulty = Faulty::with(memory, (network, streams), None, (15.0, schedule));
         drive(&mut faulty, &mut stations, begins, |station| station.ended.is_some());
         stations.into_iter().map(|station| station.ended.expect("all end")).collect()
     }

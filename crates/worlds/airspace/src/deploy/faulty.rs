@@ -8,6 +8,7 @@ use crate::agents::network::Network;
 use crate::pilot::Schedule;
 use crate::purpose;
 use crate::state::AirspaceState;
+use crate::world::AirspaceWorld;
 use sidestep_kernel::distr::Chance;
 use sidestep_kernel::ports::{Envelope, Transport};
 use sidestep_kernel::stream::Streams;
@@ -30,9 +31,19 @@ pub(super) struct Faulty<'a, T> {
 }
 
 impl<'a, T: Transport> Faulty<'a, T> {
-    /// Returns a network for the talks of a cycle that starts `starts_s` seconds after the start of the run, over
-    /// another one, which adds its own faults.
+    /// Returns a network for the talks of a cycle over another one, which adds its own faults.
     pub(super) fn new(
+        inner: T,
+        world: &'a AirspaceWorld,
+        state: Option<&'a AirspaceState>,
+        (now, schedule): (Cycle, Schedule),
+    ) -> Self {
+        let faults = (world.network.as_ref(), world.streams);
+        Self::with(inner, faults, state, (world.starts_s(now), schedule))
+    }
+
+    /// Returns the same with some faults, in a cycle that starts `starts_s` seconds after the start of the run.
+    pub(super) fn with(
         inner: T,
         (network, streams): (Option<&'a Network>, Streams),
         state: Option<&'a AirspaceState>,

@@ -33,10 +33,7 @@ pub(crate) fn flown(
     drive(&mut transport, &mut pilots, schedule.begins, Pilot::has_decided);
     turn.scratch.decide_ns += clock.thread_cpu_ns() - began_ns;
     drive(&mut transport, &mut pilots, schedule.begins, Pilot::is_done);
-    let over = |pilot: Pilot| {
-        let control = pilot.control().expect("on a network in memory all come to an end");
-        (control, pilot.considered())
-    };
+    let over = |pilot: Pilot| pilot.into_outcome().expect("in memory all come to an end");
     pilots.into_iter().map(over).collect()
 }
 
@@ -58,10 +55,9 @@ fn network<'a>(
     state: &'a AirspaceState,
     (now, schedule): (Cycle, Schedule),
 ) -> Faulty<'a, MemoryTransport> {
-    let (network, streams) = (world.network.as_ref(), world.streams);
-    let faults = network.map(Network::faults).unwrap_or_default();
-    let memory = MemoryTransport::new(streams, purpose::NETWORK, faults);
-    Faulty::new(memory, (network, streams), Some(state), (world.starts_s(now), schedule))
+    let faults = world.network.as_ref().map(Network::faults).unwrap_or_default();
+    let memory = MemoryTransport::new(world.streams, purpose::NETWORK, faults);
+    Faulty::new(memory, world, Some(state), (now, schedule))
 }
 
 fn pilots(world: &AirspaceWorld, flown: &[Slot], memories: Vec<Memory>) -> Vec<Pilot> {
