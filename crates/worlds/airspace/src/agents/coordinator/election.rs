@@ -60,7 +60,8 @@ impl<P: Passenger> Seat<P> {
             Post::Empty => !has_voted && is_news && tick < self.missed_at(),
         };
         if is_alive {
-            return self.send(from, &Message::Alive(known), &[]);
+            let ago = if self.is_empty() { tick.saturating_sub(self.heard_at) } else { 0 };
+            return self.send(from, &Message::Alive(known, ago), &[]);
         }
         self.promised = asks.epoch;
         self.heard_at = tick;
@@ -116,7 +117,7 @@ impl<P: Passenger> Seat<P> {
         self.note(at, tick);
         self.taken = at;
         self.board(passenger, tick);
-        self.broadcast(&Message::Alive(at));
+        self.broadcast(&Message::Alive(at, 0));
     }
 
     /// Asks those who have not voted again, unless they have been asked often enough.

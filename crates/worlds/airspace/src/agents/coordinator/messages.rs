@@ -13,8 +13,9 @@ pub(super) enum Message {
     Hop(Position),
     /// "It has arrived here."
     Ack(Position),
-    /// "It is alive, and I know it to have come as far as this."
-    Alive(Position),
+    /// "It was alive so many ticks ago, and I know it to have come as far as this": none ago, if it is in
+    /// the sender's care. Hearsay ages, or else two hosts could keep telling each other for ever.
+    Alive(Position, u64),
     /// "I have accepted a newer one."
     Stale(Epoch),
     /// "The coordinator is missed. Shall I bring it back?"
@@ -70,7 +71,7 @@ pub(super) fn read(
     Unsound::Form.unless(message.has_state() || state.is_empty())?;
     let is_right = match &message {
         Message::Hop(at) => at.is_of(group) && at.hop > 0,
-        Message::Ack(at) | Message::Alive(at) => at.is_of(group),
+        Message::Ack(at) | Message::Alive(at, _) => at.is_of(group),
         Message::Stale(epoch) => epoch.is_of(group),
         Message::Elect(Candidacy { epoch, seen, has, .. }) => {
             let is_own = epoch.is_of(group) && usize::from(epoch.owner) == from;

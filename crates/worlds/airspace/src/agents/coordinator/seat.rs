@@ -180,7 +180,7 @@ impl<P: Passenger> Seat<P> {
                 self.on_vote(from, (epoch, copy), ship, tick)?;
             }
             Message::Ack(at) => self.on_ack(from, at, tick),
-            Message::Alive(at) => self.on_alive(from, at, tick),
+            Message::Alive(at, ago) => self.on_alive(from, at, tick.saturating_sub(ago)),
             Message::Stale(epoch) => self.on_stale(epoch, ship, tick),
             Message::Elect(candidacy) => self.on_elect(from, candidacy, tick),
         }
@@ -226,7 +226,8 @@ impl<P: Passenger> Seat<P> {
         }
     }
 
-    fn on_alive(&mut self, from: usize, at: Position, tick: u64) {
+    /// Takes the news that it was alive at tick `heard_at`.
+    fn on_alive(&mut self, from: usize, at: Position, heard_at: u64) {
         if at.epoch < self.promised {
             return self.send(from, &Message::Stale(self.promised), &[]);
         }
@@ -244,7 +245,7 @@ impl<P: Passenger> Seat<P> {
         if is_over {
             self.post = Post::Empty;
         }
-        self.note(at, tick);
+        self.note(at, heard_at);
     }
 
     fn has_arrived(&self, to: usize, from: usize, at: Position) -> bool {
@@ -273,11 +274,11 @@ impl<P: Passenger> Seat<P> {
         }
     }
 
-    /// Notes that the coordinator is known to have come as far as this.
-    pub(super) fn note(&mut self, at: Position, tick: u64) {
+    /// Notes that the coordinator was alive at a tick, and has come as far as this.
+    pub(super) fn note(&mut self, at: Position, heard_at: u64) {
         self.promised = self.promised.max(at.epoch);
         self.seen = self.seen.max(at);
-        self.heard_at = tick;
+        self.heard_at = self.heard_at.max(heard_at);
     }
 
     /// Does whatever is due; `watches` says whether the host needs the coordinator.
@@ -290,7 +291,7 @@ impl<P: Passenger> Seat<P> {
             Post::Standing(_) => self.ask_again(tick),
             Post::Aboard(stay) if stay.beat_at <= tick => {
                 stay.beat_at = tick + self.rules.beat_ticks();
-                self.broadcast(&Message::Alive(self.taken));
+                self.broadcast(&Message::Alive(self.taken, 0));
             }
             // The coordinator looks at the time when it is run.
             Post::Aboard(_) => {}
@@ -307,7 +308,7 @@ impl<P: Passenger> Seat<P> {
         let to = *to;
         if *beat_at <= tick {
             *beat_at = tick + self.rules.beat_ticks();
-            let message = written(self.number, &Message::Alive(copy.at), &[]);
+            let message = written(self.number, &Message::Alive(copy.at, 0), &[]);
             self.out.push(Sent { to: None, message });
         }
         if *due > tick {

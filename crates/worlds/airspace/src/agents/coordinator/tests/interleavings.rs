@@ -10,8 +10,6 @@ use std::collections::{BTreeMap, HashSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 const GROUP: usize = 3;
-/// Epochs with higher numbers are not followed.
-const MOST_EPOCHS: u32 = 2;
 const PATIENCE: Patience =
     Patience { ticks: 10, bits_per_tick: f64::INFINITY, tries: 3, first_tries: 3 };
 const MISS_TICKS: u64 = 400;
@@ -19,11 +17,11 @@ const MISS_TICKS: u64 = 400;
 /// A message under way.
 type Flight = (usize, usize, Vec<u8>);
 
-/// A state of the whole: hosts, each with its own clock, and a network.
+/// A state of the whole: hosts and a network.
 #[derive(Clone)]
 struct Whole {
     hosts: Vec<Hosting<Tourist>>,
-    ticks: [u64; GROUP],
+    tick: u64,
     is_alive: [bool; GROUP],
     /// In order, because only what is under way matters, and not since when.
     flights: Vec<Flight>,
@@ -48,7 +46,7 @@ impl Whole {
     fn new(faults: u8) -> Self {
         let mut whole = Self {
             hosts: hosts(GROUP, 1, PATIENCE, MISS_TICKS),
-            ticks: [0; GROUP],
+            tick: 0,
             is_alive: [true; GROUP],
             flights: Vec::new(),
             faults_left: faults,
@@ -77,8 +75,13 @@ impl Whole {
         self.accepted.entry(promised).or_insert([false; GROUP])[k] = true;
     }
 
-    fn is_due(&self, k: usize) -> bool {
-        self.is_alive[k] && self.hosts[k].next_timer().is_some()
+    /// Returns the next tick in which something is due, and the hosts for which.
+    fn next_due(&self) -> Option<(u64, Vec<usize>)> {
+        let alive = (0..GROUP).filter(|&k| self.is_alive[k]);
+        let timers: Vec<(u64, usize)> =
+            alive.filter_map(|k| Some((self.hosts[k].next_timer()?, k))).collect();
+        let next = timers.iter().map(|(due, _)| *due).min()?;
+        Some((next, timers.into_iter().filter(|(due, _)| *due == next).map(|(_, k)| k).collect()))
     }
 
     /// Returns all that may happen next.
@@ -86,13 +89,13 @@ impl Whole {
         let different = |&k: &usize| k == 0 || self.flights[k] != self.flights[k - 1];
         let flights: Vec<usize> = (0..self.flights.len()).filter(different).collect();
         let mut all: Vec<Happens> = flights.iter().map(|&k| Happens::Arrives(k)).collect();
-        let due = (0..GROUP).filter(|&k| self.is_due(k));
+        let due = self.next_due().map_or(Vec::new(), |(_, hosts)| hosts);
         if flights.is_empty() {
-            all.extend(due.clone().map(Happens::IsDue));
+            all.extend(due.iter().map(|&k| Happens::IsDue(k)));
         }
         if self.faults_left > 0 {
             if !flights.is_empty() {
-                all.extend(due.map(Happens::IsDueEarly));
+                all.extend(due.iter().map(|&k| Happens::IsDueEarly(k)));
             }
             all.extend(flights.iter().flat_map(|&k| [Happens::IsLost(k), Happens::IsDoubled(k)]));
             all.extend((0..GROUP).filter(|&k| self.is_alive[k]).map(Happens::Crashes));
@@ -106,13 +109,13 @@ impl Whole {
         match what {
             Happens::Arrives(k) => {
                 let (from, to, bytes) = next.flights.remove(k);
-                next.hosts[to].on_message(from, &bytes, next.ticks[to]).expect("sound");
+                next.hosts[to].on_message(from, &bytes, next.tick).expect("sound");
                 next.collect(to);
             }
             Happens::IsDue(k) | Happens::IsDueEarly(k) => {
                 let due = next.hosts[k].next_timer().expect("due");
-                next.ticks[k] = next.ticks[k].max(due);
-                next.hosts[k].on_timer(next.ticks[k]);
+                next.tick = next.tick.max(due);
+                next.hosts[k].on_timer(next.tick);
                 next.collect(k);
             }
             Happens::IsLost(k) => drop(next.flights.remove(k)),
@@ -157,6 +160,13 @@ impl Whole {
         }
     }
 
+    /// Checks that nobody goes back to an older epoch.
+    fn check_after(&self, before: &Self) {
+        for (now, then) in self.hosts.iter().zip(&before.hosts) {
+            assert!(now.seats[0].promised >= then.seats[0].promised);
+        }
+    }
+
     /// Checks the end: whoever is alive has ended, and with a control if a majority is alive.
     fn check_end(&self) {
         for k in (0..GROUP).filter(|&k| self.is_alive[k]) {
@@ -170,12 +180,7 @@ impl Whole {
 
     /// Returns whether all have ended and nothing more is under way.
     fn is_over(&self) -> bool {
-        self.flights.is_empty() && !(0..GROUP).any(|k| self.is_due(k))
-    }
-
-    fn is_beyond(&self) -> bool {
-        let seats = self.hosts.iter().map(|host| &host.seats[0]);
-        seats.map(|seat| seat.promised.number.max(seat.stood)).any(|number| number > MOST_EPOCHS)
+        self.flights.is_empty() && self.next_due().is_none()
     }
 
     /// Returns a digest of all that matters for what may come: times are told as those that are
@@ -186,7 +191,7 @@ impl Whole {
         for k in 0..GROUP {
             add(&(self.is_alive[k], self.hotel(k).is_rested, self.hotel(k).is_cut_off));
             add(&self.hotel(k).told);
-            let (seat, now) = (&self.hosts[k].seats[0], self.ticks[k]);
+            let (seat, now) = (&self.hosts[k].seats[0], self.tick);
             let left = |tick: u64| tick.saturating_sub(now);
             add(&(seat.promised, seat.seen, seat.taken, seat.stood, left(seat.missed_at())));
             add(&seat.unanswering);
@@ -239,7 +244,6 @@ fn search(faults: u8) -> (usize, usize) {
     let (mut known, mut ends) = (HashSet::from([start.digest()]), 0);
     let mut left = vec![start];
     while let Some(whole) = left.pop() {
-        if known.len() > 3_000_000 { println!("stopped"); break; }
         whole.check();
         if whole.is_over() {
             whole.check_end();
@@ -247,24 +251,27 @@ fn search(faults: u8) -> (usize, usize) {
         }
         for what in whole.choices() {
             let next = whole.after(what);
-            if !next.is_beyond() && known.insert(next.digest()) {
+            next.check_after(&whole);
+            if known.insert(next.digest()) {
                 left.push(next);
             }
         }
     }
+    println!("{faults} faults: {} states, {ends} ends", known.len());
     (known.len(), ends)
 }
 
+/// Half a second of processor time. The numbers of states are those of a search that has left nothing
+/// out: a protocol that does less has fewer.
 #[test]
-fn in_all_interleavings_of_three_hosts_and_one_fault_there_is_one_coordinator() {
-    let (states, ends) = search(1);
-    println!("{states} states, {ends} ends");
-    assert!(ends > 0);
+fn in_all_interleavings_of_three_hosts_and_two_faults_one_coordinator_rules_and_all_come_to_an_end() {
+    let found: Vec<_> = (0..=2).map(search).collect();
+    assert!(found.iter().all(|(_, ends)| *ends > 0));
+    assert!(found.windows(2).all(|pair| pair[0].0 * 10 < pair[1].0), "{found:?}");
 }
 
 #[test]
-fn in_all_interleavings_of_three_hosts_and_two_faults_there_is_one_coordinator() {
-    let (states, ends) = search(2);
-    println!("{states} states, {ends} ends");
-    assert!(ends > 0);
+#[ignore = "a minute of processor time"]
+fn in_all_interleavings_of_three_hosts_and_three_faults_the_same_holds() {
+    assert!(search(3).0 > 500_000);
 }
