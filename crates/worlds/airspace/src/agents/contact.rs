@@ -1,6 +1,6 @@
 //! Knowledge of airplanes about each other when messages get lost.
 
-use super::party::Unsound;
+use super::party::{Unsound, are_places};
 use crate::flight::{Air, Levels, Point, Pose, Prediction, distance_m};
 use crate::objective::Options;
 use crate::shield::{Flyer, Side};
@@ -100,11 +100,10 @@ impl Beacon {
     pub(crate) fn check(&self, top_m_s: f64) -> Result<(), Unsound> {
         let Self { pose: Pose { at: [x, y], heading_rad }, goal, v_m_s, levels, .. } = self;
         let places = [*x, *y, *heading_rad].into_iter().chain(goal.iter().flatten().copied());
-        let are_finite = places.into_iter().all(f64::is_finite);
         let is_flown = 0.0 < *v_m_s && *v_m_s <= top_m_s;
         let Levels { low_m, high_m } = levels;
-        let is_level = low_m.is_finite() && high_m.is_finite() && low_m <= high_m;
-        Unsound::Number.unless(are_finite && is_flown && is_level)
+        let is_level = low_m <= high_m && are_places([*low_m, *high_m]);
+        Unsound::Number.unless(are_places(places) && is_flown && is_level)
     }
 }
 

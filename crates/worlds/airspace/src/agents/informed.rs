@@ -5,7 +5,7 @@ use super::Conclusion;
 use super::contact::Beacon;
 use super::link::{self, Most};
 use super::own_ship::OwnShip;
-use super::party::Unsound;
+use super::party::{Unsound, are_places};
 use crate::flight::{Known, Point, Prediction};
 use crate::objective::{Options, couple, own_costs};
 use serde::{Deserialize, Serialize};
@@ -314,8 +314,8 @@ impl link::Agent for Agent {
                 let is_short = mission.len() <= filed.most_way_points;
                 Unsound::Length.unless(is_short && *next as usize <= mission.len())?;
                 Unsound::Plan.unless(*orders as usize <= filed.orders)?;
-                let mut numbers = mission.as_flattened().iter().chain([altitude_m]);
-                Unsound::Number.unless(numbers.all(|v| v.is_finite()))
+                let told_m = mission.as_flattened().iter().chain([altitude_m]);
+                Unsound::Number.unless(are_places(told_m.copied()))
             }
             Message::Samples { round, change, samples } => {
                 let Estimator::Sampled { block, .. } = self.own.settings().estimator else {

@@ -3,7 +3,7 @@
 
 use super::link::{self, Most};
 use super::own_ship::Filed;
-use super::party::Unsound;
+use super::party::{Unsound, are_places};
 use crate::baseline::mvp::Resolving;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
@@ -68,7 +68,7 @@ impl link::Agent for Agent {
         let Filed { most_way_points, orders, .. } = self.start.filed[from];
         let is_filed = intent.next as usize <= most_way_points && intent.orders as usize <= orders;
         Unsound::Plan.unless(is_filed)?;
-        Unsound::Number.unless(intent.altitude_m.is_finite())?;
+        Unsound::Number.unless(are_places([intent.altitude_m]))?;
         intent.resolving.check(self.start.airplanes)
     }
 

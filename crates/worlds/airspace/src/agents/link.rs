@@ -113,6 +113,7 @@ pub struct Radio {
 pub struct Endpoint<A> {
     agent: A,
     radio: Radio,
+    most: Most,
     /// Its messages so far, serialized, by number.
     said: Vec<Draft>,
     others: Vec<Other>,
@@ -171,6 +172,7 @@ impl<A: Agent> Endpoint<A> {
     pub fn new(agent: A, radio: Radio) -> Self {
         let others = vec![Other::default(); radio.group.len()];
         Self {
+            most: agent.most(),
             agent,
             radio,
             said: Vec::new(),
@@ -208,7 +210,7 @@ impl<A: Agent> Endpoint<A> {
         let (wired, rest) = read.map_err(|_| Unsound::Form)?;
         Unsound::Form.unless(rest.is_empty())?;
         if let Wired::Said(number, message) = &wired {
-            Unsound::Round.unless(*number < self.agent.most().messages)?;
+            Unsound::Round.unless(*number < self.most.messages)?;
             self.agent.check(from, message)?;
         }
         Ok(wired)
@@ -279,7 +281,7 @@ impl<A: Agent + Send> Party for Endpoint<A> {
             return;
         }
         self.quiet_since = tick;
-        let waited = (tick - self.began) as f64;
+        let waited = tick.saturating_sub(self.began) as f64;
         let has_time = waited < self.agent.waits_until() * self.radio.ticks as f64;
         for j in self.agent.awaits() {
             let Patience { tries, first_tries, .. } = self.radio.patience;
@@ -313,7 +315,7 @@ impl<A: Agent + Send> Party for Endpoint<A> {
 
     fn most_bytes(&self) -> usize {
         // Its number and kind come before it.
-        self.agent.most().bytes + 16
+        self.most.bytes + 16
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::Decided;
 use super::contact::{Beacon, Contact, Contacts};
-use super::party::Unsound;
+use super::party::{Unsound, are_places};
 use crate::flight::{Action, Air, Known, Model, Point, Pose, Prediction};
 use crate::intruder::Intruder;
 use crate::objective::{Objective, Options};
@@ -78,6 +78,33 @@ impl Briefing {
         )
     }
 
+    /// Returns the `k`-th uniform number in [0, 1) of an airplane's stream, which all can draw.
+    pub(super) fn uniform(&self, place: usize, k: u64) -> f64 {
+        purpose::sample(&self.streams, self.ids[place], self.now, k)
+    }
+
+    /// Returns the decision of an airplane's player after some rounds, of which the last `calm` were
+    /// calm; none, if it has not learned anything.
+    pub(super) fn decided(
+        &self,
+        place: usize,
+        player: &Player,
+        (rounds, calm): (u32, u32),
+    ) -> Option<Decided> {
+        let Settings { estimator, choice, stop, .. } = self.settings;
+        let drawn = match estimator {
+            Estimator::Exact => 0,
+            Estimator::Sampled { block, .. } => u64::from(rounds) * block as u64,
+        };
+        (!player.expected().is_empty()).then(|| Decided {
+            chosen: player.choose(choice, self.uniform(place, drawn)),
+            expected: player.expected().to_vec(),
+            rounds,
+            converged: calm >= stop.calm_rounds,
+            chances: player.q.clone(),
+        })
+    }
+
     /// Checks a beacon of the airplane at a place.
     ///
     /// # Errors
@@ -99,7 +126,7 @@ impl Briefing {
         ways.iter().try_for_each(|way| {
             let is_whole = way.points.len() == self.air.timing.horizon;
             Unsound::Length.unless(is_whole && way.counted <= way.points.len())?;
-            Unsound::Number.unless(way.points.as_flattened().iter().all(|v| v.is_finite()))
+            Unsound::Number.unless(are_places(way.points.as_flattened().iter().copied()))
         })
     }
 
@@ -149,7 +176,7 @@ impl OwnShip {
     }
 
     pub(super) fn uniform(&self, k: u64) -> f64 {
-        purpose::sample(&self.briefing.streams, self.known.slot, self.briefing.now, k)
+        self.briefing.uniform(self.me, k)
     }
 
     /// Returns the next `block` samples of a player after `drawn`.
@@ -160,18 +187,7 @@ impl OwnShip {
     /// Returns the decision of a player of samples or of distributions after some rounds, of which
     /// the last `calm` were calm; none, if it has not learned anything.
     pub(super) fn decided(&self, player: &Player, rounds: u32, calm: u32) -> Option<Decided> {
-        let Settings { estimator, choice, stop, .. } = *self.settings();
-        let drawn = match estimator {
-            Estimator::Exact => 0,
-            Estimator::Sampled { block, .. } => u64::from(rounds) * block as u64,
-        };
-        (!player.expected().is_empty()).then(|| Decided {
-            chosen: player.choose(choice, self.uniform(drawn)),
-            expected: player.expected().to_vec(),
-            rounds,
-            converged: calm >= stop.calm_rounds,
-            chances: player.q.clone(),
-        })
+        self.briefing.decided(self.me, player, (rounds, calm))
     }
 
     /// Returns whether another one was heard lately, or is met for the first time.

@@ -63,7 +63,7 @@ pub enum Unsound {
     Kind,
     /// A list in it has another length than it must have.
     Length,
-    /// A number in it is not finite, or out of its bounds.
+    /// A number in it is out of its bounds, or none at all.
     Number,
     /// It is about an airplane that is not in the group.
     Airplane,
@@ -72,6 +72,15 @@ pub enum Unsound {
     /// It tells an airplane to be where nobody sees it, or to be able to do what its filed plan does not
     /// say.
     Plan,
+}
+
+/// Largest number of meters that anybody tells: beyond it, distances and their squares lose all sense.
+const FARTHEST_M: f64 = 1e15;
+
+/// Returns whether coordinates and altitudes in meters are such that one can compute with them.
+pub(super) fn are_places(told_m: impl IntoIterator<Item = f64>) -> bool {
+    // Nothing compares with what is no number.
+    told_m.into_iter().all(|m| m.abs() <= FARTHEST_M)
 }
 
 impl Unsound {

@@ -38,8 +38,17 @@ impl<'a, T: Transport> Faulty<'a, T> {
         state: Option<&'a AirspaceState>,
         (now, schedule): (Cycle, Schedule),
     ) -> Self {
-        let (network, streams, starts_s) =
-            (world.network.as_ref(), world.streams, world.starts_s(now));
+        let faults = (world.network.as_ref(), world.streams);
+        Self::with(inner, faults, state, (world.starts_s(now), schedule))
+    }
+
+    /// Returns the same with some faults, in a cycle that starts `starts_s` seconds after the start of the run.
+    pub(super) fn with(
+        inner: T,
+        (network, streams): (Option<&'a Network>, Streams),
+        state: Option<&'a AirspaceState>,
+        (starts_s, schedule): (f64, Schedule),
+    ) -> Self {
         Self { inner, network, streams, state, schedule, starts_s, free_at: BTreeMap::new() }
     }
 

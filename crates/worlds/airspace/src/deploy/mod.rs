@@ -25,6 +25,8 @@ mod silence;
 
 pub use ether::Ether;
 pub(crate) use group::flown;
+#[cfg(test)]
+pub(crate) use group::fly_all;
 pub use kind::Deployment;
 pub(crate) use kind::refuses;
 

@@ -7,16 +7,17 @@ use super::schedule::{Schedule, patience};
 use super::sight::Sight;
 use super::talks::{Came, Speaker, optimizes, proposes, tells};
 use crate::agents::contact::{Contacts, note};
+use crate::agents::exchange::Agreed;
 use crate::agents::intent::Intent;
 use crate::agents::network::Traffic;
 use crate::agents::packet::{Packet, Refusal, Refused, TalkId, Topic, digest, open};
-use crate::agents::{Ended, Frame, Party, Radio, Talk};
+use crate::agents::{Conclusion, Ended, Frame, Party, Radio, Talk};
 use crate::avoid::Beset;
 use crate::decide::{Considered, Manner, alone, as_decided, by_velocity};
 use crate::events::{Event, EventKind};
 use crate::flight::Known;
 use crate::world::AirspaceWorld;
-use sidestep_kernel::{Cycle, EntityId};
+use sidestep_kernel::EntityId;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -123,22 +124,6 @@ impl Pilot {
         self.settle(schedule.begins);
     }
 
-    /// Starts a cycle whose optimization was made elsewhere.
-    pub(crate) fn begin_told(
-        &mut self,
-        sight: Sight,
-        schedule: Schedule,
-        ended: Ended<crate::agents::Conclusion>,
-        traffic: Traffic,
-    ) {
-        self.take_up(sight, schedule);
-        let Ended { outcome, unheard, late } = ended;
-        self.conclude(Ended { outcome: outcome.map(Came::Decided), unheard, late });
-        if let Some(turn) = &mut self.turn {
-            turn.control.deciding = traffic;
-        }
-    }
-
     fn take_up(&mut self, sight: Sight, schedule: Schedule) {
         assert_eq!(sight.own.id, self.id, "the sight is that of another airplane");
         if let Some(turn) = self.turn.take()
@@ -230,9 +215,10 @@ impl Pilot {
         self.turn.as_ref().is_some_and(|turn| matches!(turn.stage, Stage::Over))
     }
 
-    /// Returns what it considers in the present cycle.
-    pub(crate) fn considered(&self) -> Considered {
-        self.turn.as_ref().map(|turn| turn.considered.clone()).unwrap_or_default()
+    /// Returns what it does in the present cycle, and what it has considered; `None` before that is decided.
+    pub(crate) fn into_outcome(mut self) -> Option<(Control, Considered)> {
+        let control = self.control()?;
+        Some((control, self.turn.take()?.considered))
     }
 
     /// Returns its knowledge of others.
@@ -282,7 +268,11 @@ impl Pilot {
                     if talk.is_done() || tick >= talk.frame().ends =>
                 {
                     let ended = talk.end();
-                    let ticks = tick.min(talk.frame().ends) - talk.frame().begins;
+                    // Where nothing is lost, messages take no time that counts.
+                    let ticks = match self.world.network {
+                        Some(_) => tick.min(talk.frame().ends).saturating_sub(talk.frame().begins),
+                        None => 0,
+                    };
                     turn.note_traffic(ticks);
                     self.conclude(ended);
                 }
@@ -388,66 +378,58 @@ impl Pilot {
     /// Ends the talk that it is in, and draws the conclusion from it.
     fn conclude(&mut self, ended: Ended<Came>) {
         let Some(turn) = &mut self.turn else { return };
-        let stage = std::mem::replace(&mut turn.stage, Stage::Decided);
         if self.world.network.is_some() {
             turn.note_end(&self.world, &ended, &self.memory.contacts);
         }
-        let cycle = turn.sight.cycle;
-        let known = turn.sight.own.known();
-        match (ended.outcome, stage) {
-            (Some(Came::Told(told)), Stage::Deciding(talk)) => {
+        match std::mem::replace(&mut turn.stage, Stage::Decided) {
+            Stage::Deciding(talk) => {
                 self.keep_past(talk);
-                self.react(&told);
-            }
-            (Some(Came::Agreed(agreed)), Stage::Shielding(talk, allowed)) => {
-                if agreed.held_back {
-                    turn.control.events.push(Event::of(cycle, EventKind::HeldBack, self.id));
+                match ended.outcome {
+                    Some(Came::Told(told)) => self.react(&told),
+                    Some(Came::Decided(conclusion)) => self.is_optimized(Some(conclusion)),
+                    _ => self.is_optimized(None),
                 }
-                turn.control.course = turn.considered.course(agreed.decision, &allowed);
-                self.memory.contacts = agreed.contacts;
+            }
+            Stage::Shielding(talk, allowed) => {
                 self.keep_past(talk);
-                self.is_over();
+                self.is_shielded(ended.outcome, &allowed);
             }
-            (None, Stage::Shielding(talk, _)) => {
-                // Without an agreement it no longer knows where any other airplane is.
-                self.memory.contacts = Contacts::new();
-                self.keep_past(talk);
-                self.is_over();
-            }
-            (outcome, stage) => {
-                let conclusion = match outcome {
-                    Some(Came::Decided(conclusion)) => Some(conclusion),
-                    _ => None,
-                };
-                if let Stage::Deciding(talk) = stage {
-                    self.keep_past(talk);
-                }
-                self.is_optimized(conclusion, known, cycle);
-            }
+            Stage::Decided | Stage::Over => {}
         }
     }
 
-    /// Notes the outcome of an optimization.
-    fn is_optimized(
-        &mut self,
-        conclusion: Option<crate::agents::Conclusion>,
-        known: Known,
-        cycle: Cycle,
-    ) {
+    /// Notes what has come of the shield's exchange, in which it has proposed the ways that were `allowed`.
+    fn is_shielded(&mut self, came: Option<Came>, allowed: &[usize]) {
         let Some(turn) = &mut self.turn else { return };
-        let (mut decided, mut beacons) = (None, Vec::new());
-        if let Some(conclusion) = conclusion {
-            (decided, beacons) = (conclusion.decided, conclusion.beacons);
-        }
+        self.memory.contacts = match came {
+            Some(Came::Agreed(Agreed { decision, held_back, contacts })) => {
+                if held_back {
+                    let event = Event::of(turn.sight.cycle, EventKind::HeldBack, self.id);
+                    turn.control.events.push(event);
+                }
+                turn.control.course = turn.considered.course(decision, allowed);
+                contacts
+            }
+            // Without an agreement it no longer knows where any other airplane is.
+            _ => Contacts::new(),
+        };
+        self.is_over();
+    }
+
+    /// Notes the outcome of an optimization; none if time was up before there was any.
+    fn is_optimized(&mut self, conclusion: Option<Conclusion>) {
+        let Some(turn) = &mut self.turn else { return };
+        let (decided, beacons) =
+            conclusion.map_or_else(Default::default, |came| (came.decided, came.beacons));
         turn.control.optimized = Some(Optimized::of(decided.as_ref()));
         if self.world.network.is_some() {
             for (beacon, &id) in beacons.into_iter().zip(&*turn.members) {
                 if let Some(beacon) = beacon {
-                    note(&mut self.memory.contacts, id, beacon, cycle);
+                    note(&mut self.memory.contacts, id, beacon, turn.sight.cycle);
                 }
             }
         }
-        let considered = as_decided(&self.world, known, decided);
+        let considered = as_decided(&self.world, turn.sight.own.known(), decided);
         self.is_decided(considered);
     }
 

@@ -28,7 +28,7 @@ pub(super) fn brief(world: &AirspaceWorld, sight: &Sight) -> Arc<Briefing> {
 }
 
 /// Returns the knowledge of an airplane's agent; `contacts` hold what it has heard of others before.
-pub(crate) fn own_ship(world: &AirspaceWorld, sight: &Sight, contacts: &Contacts) -> OwnShip {
+pub(super) fn own_ship(world: &AirspaceWorld, sight: &Sight, contacts: &Contacts) -> OwnShip {
     let (briefing, known) = (brief(world, sight), sight.own.known());
     let (beacon, mission) = (beacon(world, known), world.stage(known.slot, known.orders).mission);
     let me = sight.me();

@@ -36,8 +36,9 @@ mod tests;
 
 pub use crate::agents::packet::{Packet, Refusal, Refused, TalkId, Topic};
 pub use aboard::Pilot;
-pub(crate) use briefing::own_ship;
 pub use control::{Control, Course, Memory, Optimized};
 pub use fleet::Fleet;
-pub(crate) use schedule::{Schedule, patience};
+pub(crate) use schedule::Schedule;
+#[cfg(test)]
+pub(crate) use schedule::patience;
 pub use sight::{Own, Sight, Sighted};

@@ -31,9 +31,9 @@ impl Schedule {
         let long = network.deadline_ticks();
         Self {
             begins: tick,
-            decided_by: tick + long,
-            shield_from: tick + long + 1,
-            ends: tick + 2 * long + 1,
+            decided_by: tick.saturating_add(long),
+            shield_from: tick.saturating_add(long + 1),
+            ends: tick.saturating_add(2 * long + 1),
         }
     }
 

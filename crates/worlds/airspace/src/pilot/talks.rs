@@ -3,6 +3,7 @@
 use super::briefing::{filed, own_ship, scene};
 use super::sight::Sight;
 use crate::agents::contact::Contacts;
+use crate::agents::coordinator::Host;
 use crate::agents::exchange::{self, Agreed};
 use crate::agents::intent::{self, Intent};
 use crate::agents::{
@@ -106,6 +107,10 @@ pub(super) fn optimizes(
 ) -> Box<Speaker> {
     let own = own_ship(world, sight, contacts);
     match (world.deployment, world.settings.estimator) {
+        (Deployment::Pim | Deployment::HierarchicalPim, _) => {
+            let is_hierarchy = world.deployment == Deployment::HierarchicalPim;
+            Box::new(Any(Host::new(own, is_hierarchy, radio)))
+        }
         (Deployment::Team, Estimator::Sampled { block, ageing }) => {
             endpoint(sampling::Agent::new(own, block, ageing), radio)
         }

@@ -2,7 +2,7 @@
 
 use super::Proposal;
 use crate::agents::contact::Beacon;
-use crate::agents::party::Unsound;
+use crate::agents::party::{Unsound, are_places};
 use crate::flight::Air;
 use crate::shield::{Certainty, Flyer, Way};
 use sidestep_kernel::stream::philox4x32;
@@ -10,6 +10,8 @@ use sidestep_kernel::{Cycle, EntityId};
 
 /// Number of cycles after which airplanes take turns.
 const TURN_CYCLES: Cycle = 12;
+/// Bound on headings in radians that anybody tells.
+const FARTHEST_RAD: f64 = 1e6;
 
 /// An airplane as others see it, and as they know it from its filed plan.
 #[derive(Debug, Clone)]
@@ -72,8 +74,8 @@ impl Scene {
     pub(super) fn admits(&self, place: usize, proposal: &Proposal) -> Result<(), Unsound> {
         let Proposal { beacon, held, named, ways, .. } = proposal;
         self.seen[place].admits(beacon)?;
-        let [x, y] = held.at;
-        Unsound::Number.unless([x, y, held.heading_rad].iter().all(|v| v.is_finite()))?;
+        let is_held = held.heading_rad.abs() < FARTHEST_RAD && are_places(held.at);
+        Unsound::Number.unless(is_held)?;
         let are_known = named.iter().all(|&id| (id as usize) < self.airplanes);
         Unsound::Airplane.unless(are_known && rises(named))?;
         Unsound::Length.unless(ways.len() <= self.seen[place].most_ways)?;
