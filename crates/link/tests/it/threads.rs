@@ -8,7 +8,7 @@ use sidestep_link::wire::{Party, Wire};
 use sidestep_link::words::{Clock, Topology};
 
 /// Deployments in which each airplane has a program of its own.
-const DEPLOYMENTS: [&str; 2] = ["team", "compact-team"];
+const DEPLOYMENTS: [&str; 4] = ["team", "compact-team", "pim", "hierarchical-pim"];
 
 const BAD_NETWORK: &str = "network = { loss = 0.1, duplication = 0.1, max_delay_s = 0.003, \
     bursts = { loss = 0.8, lasts_s = 3, every_s = 20 }, range_m = 2500, \
