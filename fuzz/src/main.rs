@@ -15,17 +15,22 @@ use sidestep::kernel::checkpoint;
 use sidestep::learn::{effector, sensor};
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
+use sidestep::worlds::airspace::agents::contact::Contacts;
+use sidestep::worlds::airspace::agents::packet::{Draft, open};
+use sidestep::worlds::airspace::pilot::{Fleet, Packet, Pilot, Sight};
+use sidestep::worlds::airspace::{AirspaceWorld, airspace_run};
 use sidestep_record::sweep::read_journal;
 use sidestep_record::{McapRun, RunView, read_table};
 use sidestep_server::protocol::Edit;
 use std::fs;
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 /// A reader of text or bytes, by its name. A folder of the same name in `seeds` has inputs to begin with.
 type Target = (&'static str, fn(&[u8]));
 
-const TARGETS: [Target; 29] = [
+const TARGETS: [Target; 30] = [
     ("scenario", |data| text(data, scenario)),
     ("override", |data| text(data, overridden)),
     ("edit", |data| text(data, edited)),
@@ -54,6 +59,7 @@ const TARGETS: [Target; 29] = [
     ("manifest", |data| drop(RunView::open(&run_folder(data)))),
     ("mcap", |data| drop(McapRun::open(&file("f.mcap", data)))),
     ("request", |data| text(data, |t| drop(sidestep_server::decode(t)))),
+    ("packets", packets),
     ("parquet", |data| drop(read_table(&folder_of(&file("f.parquet", data)), "f", ..))),
 ];
 
@@ -174,6 +180,89 @@ fn mrclam_folder(data: &[u8]) -> PathBuf {
         file(&format!("{name}.dat"), inside.split("% ").next().unwrap_or_default().as_bytes());
     }
     SCRATCH.clone()
+}
+
+/// Settings of airplanes that talk, with every kind of message.
+const TALKS: [&str; 7] = [
+    "deployment = \"team\"",
+    "deployment = \"compact-team\"",
+    "deployment = \"team\"\npreset = \"paper\"",
+    "deployment = \"compact-team\"\npreset = \"paper\"",
+    "deployment = \"pim\"",
+    "deployment = \"team\"\nmethod = \"mvp\"",
+    "deployment = \"hierarchical-pim\"\npreset = \"paper\"\nnetwork = { loss = 0.1 }",
+];
+
+/// Lets three pilots talk, on a network that does what the data says: the first byte chooses the settings, and then
+/// each four bytes are a step: a packet arrives as it is, or changed with a right checksum, or damaged, or time passes.
+fn packets(data: &[u8]) {
+    static FLEETS: LazyLock<Vec<(Arc<AirspaceWorld>, Vec<Sight>)>> = LazyLock::new(|| {
+        let fleet = |talk: &&str| {
+            let text = format!(
+                "format = 1\nworld = \"airspace\"\n[airspace]\n{talk}\nmax_rounds = 3\n\
+                 [airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 2600.0\n"
+            );
+            let run = airspace_run(&Source::new("f", text, ""), 1).expect("our own scenario");
+            (run.world().clone(), run.sights())
+        };
+        TALKS.iter().map(fleet).collect()
+    });
+    let Some((&which, steps)) = data.split_first() else { return };
+    let (world, sights) = &FLEETS[usize::from(which) % FLEETS.len()];
+    let mut pilots: Vec<Pilot> =
+        (0..3).map(|id| Pilot::new(world.clone(), id, Contacts::new())).collect();
+    let (mut due, mut tick) = (VecDeque::new(), 0);
+    for (pilot, sight) in pilots.iter_mut().zip(sights) {
+        pilot.begin(sight.clone(), tick);
+    }
+    for step in steps.as_chunks::<4>().0 {
+        for pilot in &mut pilots {
+            for Packet { to, payload, .. } in pilot.take_packets() {
+                let others = (0..3).filter(|&id| id != pilot.id() && to.is_none_or(|to| to == id));
+                due.extend(others.map(|other| (pilot.id(), other, payload.clone())));
+            }
+        }
+        tick += 1;
+        arrive(world, &mut pilots, &mut due, tick, *step);
+    }
+}
+
+/// Carries out a step of the network.
+fn arrive(
+    world: &AirspaceWorld,
+    pilots: &mut [Pilot],
+    due: &mut VecDeque<(u32, u32, Vec<u8>)>,
+    tick: u64,
+    [kind, place, high, change]: [u8; 4],
+) {
+    if kind % 4 == 3 {
+        let next = pilots.iter().filter_map(Pilot::next_timer).min().unwrap_or(tick);
+        return pilots.iter_mut().for_each(|pilot| pilot.on_timer(next.max(tick)));
+    }
+    let Some((from, to, payload)) = due.pop_front() else { return };
+    let at = usize::from(place) | usize::from(high) << 8;
+    let mut bytes = payload.clone();
+    match (kind % 4, open(&payload, world.fingerprint)) {
+        (1, Ok((seal, message))) => {
+            let mut message = message.to_vec();
+            let at = at % message.len().max(1);
+            match message.get_mut(at) {
+                Some(byte) if change > 0 => *byte ^= change,
+                _ => message.truncate(at),
+            }
+            bytes = Draft::of_bytes(&message).sealed(&seal);
+        }
+        (2, _) => {
+            let at = at % bytes.len();
+            bytes[at] ^= change;
+        }
+        _ => {}
+    }
+    pilots[to as usize].on_packet(from, &bytes, tick);
+    if kind & 4 > 0 {
+        // It is told the real thing, too, or again.
+        pilots[to as usize].on_packet(from, &payload, tick);
+    }
 }
 
 fn run_folder(data: &[u8]) -> PathBuf {

@@ -17,10 +17,11 @@ use crate::source::Role;
 const KNOWN: &str = include_str!("../circles.txt");
 
 /// Folders whose code may name threads; tests may too.
-const THREADS: [&str; 4] = ["crates/kernel", "crates/session", "crates/server", "crates/cli"];
+const THREADS: [&str; 5] =
+    ["crates/kernel", "crates/session", "crates/server", "crates/link", "crates/cli"];
 
 /// Packages that only some crates may depend on, with the folders of those crates.
-const RESERVED: [(&str, &[&str]); 8] = [
+const RESERVED: [(&str, &[&str]); 9] = [
     ("parquet", &["crates/record"]),
     ("mcap", &["crates/record", "crates/import"]),
     ("foxglove", &["crates/record"]),
@@ -28,14 +29,16 @@ const RESERVED: [(&str, &[&str]); 8] = [
     ("clap", &["crates/cli"]),
     ("pyo3", &["python"]),
     ("axum", &["crates/server"]),
-    ("tokio", &["crates/server", "crates/link"]),
+    // The session names it for its features alone, so that all share what is compiled.
+    ("tokio", &["crates/server", "crates/session"]),
+    ("zenoh", &["crates/link"]),
 ];
 
 /// Folder of the crates of worlds.
 const WORLDS: &str = "crates/worlds";
 
 /// Crates that know no world, not even through another crate.
-const WITHOUT_WORLDS: [&str; 11] = [
+const WITHOUT_WORLDS: [&str; 10] = [
     "crates/document",
     "crates/kernel",
     "crates/record",
@@ -46,7 +49,6 @@ const WITHOUT_WORLDS: [&str; 11] = [
     "crates/statistics",
     "crates/collectives",
     "crates/map",
-    "crates/link",
 ];
 
 /// Crates that drive runs of any world: the list of worlds is handed to them, and their code names none.

@@ -6,6 +6,7 @@
 //! watch.rs     progress and Ctrl-C for sessions  progress.rs     progress bars
 //! report.rs    a run's summary as text           pages.rs        documents as files
 //! exit.rs      exit codes and failures           console.rs      standard output and error
+//! link.rs      the program of fleets             fleet_table.rs  its nodes as a table
 //! ```
 //!
 //! The crate `sidestep-session` drives the runs.
@@ -17,7 +18,9 @@ mod args;
 mod commands;
 mod console;
 mod exit;
+mod fleet_table;
 mod interrupt;
+mod link;
 mod pages;
 mod plan;
 mod progress;

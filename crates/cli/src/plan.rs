@@ -76,7 +76,8 @@ impl ScenarioArgs {
         problems(worlds(), &self.file, &self.all_overrides())
     }
 
-    fn all_overrides(&self) -> Vec<String> {
+    /// Returns all overrides, as `key=value`.
+    pub(crate) fn all_overrides(&self) -> Vec<String> {
         let mut all = self.changes.settings();
         all.extend(self.changes.seed.map(|seed| format!("seed={seed}")));
         all

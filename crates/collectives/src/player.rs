@@ -73,6 +73,23 @@ impl Player {
         }
     }
 
+    /// Returns whether it can be a player with this number of strategies: one that comes from
+    /// elsewhere, such as over a network, may be anything.
+    pub fn is_of(&self, strategies: usize) -> bool {
+        let Self { q, temperature, sums, counts, expected } = self;
+        let is_distribution = q.iter().all(|p| (0.0..=1.0).contains(p))
+            && (q.iter().sum::<f64>() - 1.0).abs() < 1e-6;
+        let is_known = expected.is_empty() || expected.len() == strategies;
+        let are_finite = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
+        [q.len(), sums.len(), counts.len()] == [strategies; 3]
+            && is_known
+            && is_distribution
+            && (0.0..f64::INFINITY).contains(temperature)
+            && counts.iter().all(|count| (0.0..f64::INFINITY).contains(count))
+            && are_finite(sums)
+            && are_finite(expected)
+    }
+
     /// Returns the strategy that the uniform number `u` in [0, 1) selects under `q`.
     pub fn draw(&self, u: f64) -> usize {
         let mut cumulated = 0.0;

@@ -1,7 +1,9 @@
 //! The one simulation: a world, its state, the engine, and the rows to record.
 
 use crate::checkpoint::{self, CheckpointError, Header};
-use crate::control::{self, CellsMut, OrderBook, OrderError, OrderRow, Orders, Team, Teams};
+use crate::control::{
+    self, CellsMut, ControlBook, ControlRow, OrderBook, OrderError, OrderRow, Orders, Team, Teams,
+};
 use crate::cycle::{Observer, PhaseTimes, Scratches};
 use crate::digest::Digest;
 use crate::engine::Engine;
@@ -9,7 +11,7 @@ use crate::interrupt::Interrupt;
 use crate::plan::{Effort, GroupSizes, Plan};
 use crate::ports::{Buffer, RecordError, Recorder, RowBuffer, SystemClock, TableSchema};
 use crate::simulation::Simulation;
-use crate::units::Cycle;
+use crate::units::{Cycle, EntityId};
 use crate::view::{Frame, Inspection, Look, PlaceRows, Scenery, Who};
 use crate::words::{Lines, Said};
 use crate::world::{Decides, World};
@@ -36,10 +38,14 @@ pub struct Run<W: World> {
     teams: Arc<Teams>,
     /// Orders that are given as the run comes by,
     ahead: OrderBook,
+    /// controls likewise,
+    controls: ControlBook,
     /// and the cycle for which that was done last.
     obeyed: Option<Cycle>,
     /// Orders that were given and wait to be recorded.
     given: RowBuffer<OrderRow>,
+    /// Controls that were handed over and wait to be recorded.
+    handed: RowBuffer<ControlRow>,
 }
 
 impl<W: World> Run<W> {
@@ -72,8 +78,10 @@ impl<W: World> Run<W> {
             records,
             teams,
             ahead,
+            controls: ControlBook::default(),
             obeyed: None,
             given,
+            handed: RowBuffer::default(),
         }
     }
 
@@ -143,7 +151,7 @@ impl<W: World> Run<W> {
     fn room(&self) -> u64 {
         let room = self.world.room(&self.state, &self.books, self.cycle);
         // Orders come from outside of cycles, so one more never makes it worse.
-        if self.given.is_full() { room.min(1) } else { room }
+        if self.given.is_full() || self.handed.is_full() { room.min(1) } else { room }
     }
 
     /// Runs up to `cycles` cycles in which no order is ahead.
@@ -200,7 +208,7 @@ impl<W: World> Run<W> {
         })
     }
 
-    /// Gives the orders that are ahead for the present cycle.
+    /// Gives the orders that are ahead for the present cycle, and hands over the controls.
     fn obey(&mut self) {
         if self.obeyed.replace(self.cycle) == Some(self.cycle) {
             return;
@@ -210,6 +218,21 @@ impl<W: World> Run<W> {
             self.give(&orders).expect("`follow` has checked it");
         }
         self.ahead = ahead;
+        let controls = std::mem::take(&mut self.controls);
+        if let Some(handed) = controls.of(self.cycle) {
+            // What can no longer be done is not done. Then the run comes out otherwise, and its digest says so.
+            let taken = self.hand_over(handed);
+            if taken.is_err() {
+                let _ = self.hand_over(&[]);
+            }
+        }
+        self.controls = controls;
+    }
+
+    /// Returns the first cycle after the present one before which something is given or handed over.
+    fn next_given(&self) -> Option<Cycle> {
+        let orders = self.ahead.next_after(self.cycle);
+        orders.into_iter().chain(self.controls.next_after(self.cycle)).min()
     }
 
     /// Sets up all workers for gathering the rows and events that are now wanted.
@@ -285,7 +308,7 @@ impl<W: World> Simulation for Run<W> {
         let mut done = 0;
         while done < cycles {
             self.obey();
-            let next = self.ahead.next_after(self.cycle);
+            let next = self.next_given();
             let wanted = next.map_or(cycles - done, |next| (next - self.cycle).min(cycles - done));
             let made = self.stretch(wanted);
             done += made;
@@ -324,12 +347,16 @@ impl<W: World> Simulation for Run<W> {
         if self.teams.take_orders() {
             self.given.begin(Some(control::table(self.teams.order_names().to_vec())));
         }
+        if self.world.keeps_controls(&self.books) {
+            self.handed.begin(Some(control::controls_table()));
+        }
         self.prepare();
     }
 
     fn schemas(&self) -> Vec<TableSchema> {
         let mut schemas = self.world.schemas(&self.books);
         schemas.extend(self.given.schema());
+        schemas.extend(self.handed.schema());
         schemas
     }
 
@@ -341,11 +368,10 @@ impl<W: World> Simulation for Run<W> {
         }
         self.gather();
         self.world.record(&mut self.state, &mut self.books, self.cycle, recorder)?;
-        match self.given.take() {
-            None => Ok(()),
-            // Its table follows those of the world.
-            Some(block) => recorder.append(self.world.schemas(&self.books).len(), &block),
-        }
+        // These tables follow those of the world.
+        let blocks = [self.given.take(), self.handed.take()].into_iter().flatten();
+        let mut tables = self.world.schemas(&self.books).len()..;
+        blocks.zip(&mut tables).try_for_each(|(block, table)| recorder.append(table, &block))
     }
 
     fn scenery(&self) -> Scenery {
@@ -393,6 +419,21 @@ impl<W: World> Simulation for Run<W> {
         orders.iter().try_for_each(|(_, orders)| self.examine(&orders))?;
         (self.ahead, self.obeyed) = (orders, None);
         Ok(())
+    }
+
+    fn hand_over(&mut self, controls: &[(EntityId, Vec<u8>)]) -> Result<(), OrderError> {
+        if self.records && !self.handed.is_kept() {
+            let cause = "it is recorded, and its controls are not, so nobody could compute it again; set \
+                         record.controls = true";
+            return Err(OrderError::NobodyOutside { cause: cause.into() });
+        }
+        self.world.hand_over(&mut self.state, self.cycle, controls)?;
+        self.handed.extend(control::rows_of(self.cycle, controls));
+        Ok(())
+    }
+
+    fn retrace(&mut self, controls: ControlBook) {
+        (self.controls, self.obeyed) = (controls, None);
     }
 
     fn place_rows(&self) -> Vec<PlaceRows> {

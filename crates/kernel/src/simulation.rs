@@ -1,13 +1,13 @@
 //! The object-safe face of a run, through which the command, a server or a binding uses any world.
 
 use crate::checkpoint::CheckpointError;
-use crate::control::{CellsMut, OrderBook, OrderError, Orders, Team, Teams};
+use crate::control::{CellsMut, ControlBook, OrderBook, OrderError, Orders, Team, Teams};
 use crate::cycle::PhaseTimes;
 use crate::digest::Digest;
 use crate::interrupt::Interrupt;
 use crate::plan::Plan;
 use crate::ports::{RecordError, Recorder, TableSchema};
-use crate::units::Cycle;
+use crate::units::{Cycle, EntityId};
 use crate::view::{Frame, Inspection, Look, PlaceRows, Scenery, Who};
 use crate::words::{Lines, Said};
 use crate::world::Decides;
@@ -128,6 +128,23 @@ pub trait Simulation: Any + Send {
     fn follow(&mut self, orders: OrderBook) -> Result<(), OrderError> {
         orders.iter().try_for_each(|(_, orders)| Teams::default().check(&orders))
     }
+
+    /// Hands over what agents do in the cycle that comes next, because they decide outside of the run, each as its
+    /// world's message. An agent that is missing does what is safe. In later cycles agents decide as ever, unless
+    /// that is called again.
+    ///
+    /// # Errors
+    /// When no agents of this world decide outside, or one does what cannot be done; when the run is recorded without
+    /// its controls, and could not be computed again.
+    fn hand_over(&mut self, _: &[(EntityId, Vec<u8>)]) -> Result<(), OrderError> {
+        let cause = format!("agents of the world {} decide in the run alone", self.world());
+        Err(OrderError::NobodyOutside { cause })
+    }
+
+    /// Hands over these controls again, each before its cycle, whenever the run comes by there: also after
+    /// [`Simulation::restore`]. They take the place of those of an earlier call. One that no longer can be carried
+    /// out counts as missing, and the state tells that it did.
+    fn retrace(&mut self, _: ControlBook) {}
 
     /// The recorded tables and columns that hold the places of bodies.
     fn place_rows(&self) -> Vec<PlaceRows>;

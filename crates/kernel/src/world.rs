@@ -8,11 +8,11 @@
 
 use crate::checkpoint::CheckpointError;
 use crate::conflict::Groups;
-use crate::control::{CellsMut, Order, Teams};
+use crate::control::{CellsMut, Order, OrderError, Teams};
 use crate::digest::Digest;
 use crate::plan::Effort;
 use crate::ports::{Clock, RecordError, Recorder, TableSchema};
-use crate::units::{Cycle, Slot};
+use crate::units::{Cycle, EntityId, Slot};
 use crate::view::{Frame, Inspection, Look, PlaceRows, Scenery, Who};
 use crate::words::{Lines, Said};
 use serde::Serialize;
@@ -223,6 +223,26 @@ pub trait World: Phases<State: Send> + Send + 'static {
 
     /// Notes an order for the next turn of its agent. It was checked.
     fn order(&self, _: &mut Self::State, _: &Order<'_>) {}
+
+    /// Notes what agents do in cycle `now`, of which nothing was noted yet: they have decided outside of the run. An
+    /// agent that is missing has said nothing.
+    ///
+    /// # Errors
+    /// When somebody decides in the run, or does what cannot be done; nothing is noted then.
+    fn hand_over(
+        &self,
+        _: &mut Self::State,
+        _now: Cycle,
+        _: &[(EntityId, Vec<u8>)],
+    ) -> Result<(), OrderError> {
+        let cause = format!("agents of the world {} decide in the run alone", Self::NAME);
+        Err(OrderError::NobodyOutside { cause })
+    }
+
+    /// Whether a recorded run keeps what is handed over.
+    fn keeps_controls(&self, _: &Self::Books) -> bool {
+        false
+    }
 
     /// Writes what the agents of a team observe in cycle `now` of the frozen state; there is one room
     /// for each of [`crate::control::Team::observed`], and each is as large as it must be.

@@ -12,7 +12,7 @@
 //! sweep/        many runs of one scenario              summary.rs    the results of a run
 //! live/         viewers that watch and steer           beat.rs       when a cycle is due
 //! watcher.rs    progress, and whether to go on         identity.rs   the build that made a run
-//! attend.rs     work that its caller looks after
+//! attend.rs     work that its caller looks after fleet.rs      the job of agents as processes
 //! ```
 //!
 //! Nothing here knows a terminal, the options of a command, or a world: functions that need the
@@ -41,6 +41,7 @@ mod summary;
 mod watcher;
 
 pub mod export;
+pub mod fleet;
 pub mod report;
 pub mod sweep;
 

@@ -1,30 +1,48 @@
-//! The recorded orders of a run that was decided from outside.
+//! The recorded orders and controls of a run that was decided from outside.
 
-use sidestep::kernel::control::OrderReader;
+use sidestep::kernel::control::{ControlReader, OrderReader};
+use sidestep::kernel::ports::{TableSchema, Values};
 use sidestep::kernel::{InputError, Simulation};
 use sidestep_record::{for_each_block, tables};
 use std::path::Path;
 
-/// Lets a run follow the orders that its folder has, so that it comes out as it was recorded.
+/// Lets a run follow the orders and the controls that its folder has, so that it comes out as it was recorded.
 ///
 /// # Errors
 /// When they cannot be read, or no longer be obeyed.
 pub(crate) fn follow_recorded(run: &mut dyn Simulation, folder: &Path) -> Result<(), InputError> {
-    if !tables(folder)?.iter().any(|name| name == OrderReader::TABLE) {
-        return Ok(());
+    let mut orders = OrderReader::default();
+    if read(folder, OrderReader::TABLE, |schema, columns| orders.read(schema, columns))? {
+        run.follow(orders.into_book()).map_err(|error| {
+            let place = folder.join(OrderReader::TABLE).display().to_string();
+            let remedy = "the recording was changed, or another program made it: run it again";
+            InputError::new(place, error.to_string(), remedy)
+        })?;
     }
-    let place = || folder.join(OrderReader::TABLE).display().to_string();
-    let mut reader = OrderReader::default();
-    for_each_block(folder, OrderReader::TABLE, .., |block| {
-        reader.read(&block.schema, &block.columns).ok_or_else(|| {
+    let mut controls = ControlReader::default();
+    if read(folder, ControlReader::TABLE, |schema, columns| controls.read(schema, columns))? {
+        run.retrace(controls.into_book());
+    }
+    Ok(())
+}
+
+/// Reads a table of a folder block by block. Returns whether it is there.
+fn read(
+    folder: &Path,
+    table: &str,
+    mut take: impl FnMut(&TableSchema, &[Values]) -> Option<()>,
+) -> Result<bool, InputError> {
+    if !tables(folder)?.iter().any(|name| name == table) {
+        return Ok(false);
+    }
+    for_each_block(folder, table, .., |block| {
+        take(&block.schema, &block.columns).ok_or_else(|| {
             let remedy = "copy the folder again from its source, or run the scenario again";
-            InputError::new(place(), "the table has other columns than orders have", remedy)
+            let cause = format!("the table has other columns or rows than {table} have");
+            InputError::new(folder.join(table).display(), cause, remedy)
         })
     })?;
-    run.follow(reader.into_book()).map_err(|error| {
-        let remedy = "the recording was changed, or another program made it: run it again";
-        InputError::new(place(), error.to_string(), remedy)
-    })
+    Ok(true)
 }
 
 /// Returns whether a run folder has any orders.

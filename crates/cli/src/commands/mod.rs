@@ -9,11 +9,13 @@ mod exact;
 mod export;
 mod finish;
 mod fk;
+mod fleet;
 mod ik;
 mod learn;
 mod man;
 mod map;
 mod new;
+mod node;
 mod replay;
 mod report;
 mod reproduce;
@@ -31,6 +33,7 @@ use clap::Subcommand;
 pub(crate) const GROUPS: &[(&str, &[&str])] = &[
     ("Prepare", &["new", "check", "schema", "map", "learn"]),
     ("Run and look at it", &["run", "studio", "resume", "replay", "report", "export"]),
+    ("Fly on a network", &["fleet", "node"]),
     ("Study", &["sweep", "compare", "exact", "reproduce"]),
     ("Robot arms", &["fk", "ik"]),
     ("This command", &["completions", "man"]),
@@ -43,6 +46,10 @@ pub(crate) enum Command {
     Run(run::RunArgs),
     /// Watch, steer, replay and edit in the browser
     Studio(studio::StudioArgs),
+    /// Fly a scenario with a process for each airplane
+    Fleet(Box<fleet::FleetArgs>),
+    /// Fly one airplane of a fleet from this machine
+    Node(Box<node::NodeArgs>),
     /// Validate a scenario and describe it, without running it
     Check(check::CheckArgs),
     /// Create a commented scenario as a starting point
@@ -87,6 +94,8 @@ pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, F
     match command {
         Command::Run(args) => run::run(&args, *console),
         Command::Studio(args) => studio::studio(&args, *console),
+        Command::Fleet(args) => fleet::fleet(&args, *console),
+        Command::Node(args) => node::node(&args, *console),
         Command::Check(args) => check::check(&args, *console),
         Command::New(args) => new::new(&args, *console),
         Command::Schema(args) => schema::schema(&args, *console),

@@ -49,7 +49,12 @@ fn run_all(page: &Path) -> usize {
     }
     let binaries = Path::new(BINARY).parent().expect("a folder").display();
     let path = format!("{binaries}:{}", std::env::var("PATH").unwrap_or_default());
-    let all = commands(&std::fs::read_to_string(page).expect("the page"));
+    let mut all = commands(&std::fs::read_to_string(page).expect("the page"));
+    // They need a program that not everybody builds; what reads their folders goes with them.
+    let is_of_fleets = |line: &String| line.starts_with("sidestep fleet");
+    if all.iter().any(is_of_fleets) && !crate::fleet::is_there() {
+        all.truncate(all.iter().position(is_of_fleets).unwrap_or(0));
+    }
     for line in &all {
         let mut shell = Command::new("sh");
         shell.args(["-c", line]).current_dir(place.path()).env("PATH", &path);

@@ -7,7 +7,7 @@ fn every_command_has_help_with_examples() {
     let place = Place::new();
     for command in [
         "run", "check", "new", "map", "learn", "exact", "fk", "ik", "resume", "replay", "export",
-        "sweep", "report",
+        "sweep", "report", "fleet", "node",
     ] {
         let help = place.run(&[command, "--help"]);
         assert_eq!(help.code(), 0);
@@ -29,7 +29,7 @@ fn wide(text: &str) -> Option<&str> {
 fn no_line_of_help_is_wider_than_80_columns_where_there_is_no_terminal() {
     let place = Place::new();
     let all = "run check new map learn exact fk ik resume replay export sweep compare report schema \
-               completions man reproduce studio";
+               completions man reproduce studio fleet node";
     for command in all.split_whitespace() {
         let help = place.run(&[command, "--help"]).out();
         assert_eq!(wide(&help), None, "{command}");
@@ -150,11 +150,17 @@ fn help_of_help_is_help() {
 #[test]
 fn commands_are_listed_by_what_people_do() {
     let help = Place::new().run(&["--help"]).out();
-    let places: Vec<usize> =
-        ["Prepare:", "Run and look at it:", "Study:", "Robot arms:", "Options:"]
-            .iter()
-            .map(|group| help.find(group).unwrap_or_else(|| panic!("{group} in {help}")))
-            .collect();
+    let places: Vec<usize> = [
+        "Prepare:",
+        "Run and look at it:",
+        "Fly on a network:",
+        "Study:",
+        "Robot arms:",
+        "Options:",
+    ]
+    .iter()
+    .map(|group| help.find(group).unwrap_or_else(|| panic!("{group} in {help}")))
+    .collect();
     assert!(places.is_sorted(), "{help}");
     assert!(!help.contains('\u{1b}'), "no colors where nobody asks for them");
 }

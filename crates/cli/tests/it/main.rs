@@ -13,6 +13,7 @@ mod disk;
 mod exact;
 mod export;
 mod fk;
+mod fleet;
 mod foxglove;
 mod help;
 mod ik;

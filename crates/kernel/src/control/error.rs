@@ -56,6 +56,20 @@ pub enum OrderError {
         /// The values that there may be.
         expected: String,
     },
+    /// What agents do was handed over to a run whose agents decide in it.
+    #[error("in this run nobody decides outside: {cause}")]
+    NobodyOutside {
+        /// The reason, and what would help.
+        cause: String,
+    },
+    /// What an agent does cannot be done.
+    #[error("the control of {who} is refused: {cause}")]
+    Control {
+        /// The agent.
+        who: String,
+        /// The reason, and what would be right.
+        cause: String,
+    },
     /// An order that makes no sense to the world.
     #[error("the order `{order}` to {who} cannot be obeyed: {cause}")]
     Senseless {

@@ -7,19 +7,30 @@
 //! follow(OrderBook)                       the same orders again, each before its cycle
 //! ```
 //!
+//! Or agents decide elsewhere altogether, each with a program of its own; what they then do in a cycle is a message
+//! that only their world understands:
+//!
+//! ```text
+//! hand_over(agents, bytes)                checked, noted in the state, recorded in the table `controls`
+//! retrace(ControlBook)                    the same again, each before its cycle
+//! ```
+//!
 //! An order is part of the state as soon as it is given: a checkpoint has it, and so has the digest. A run
-//! that was decided from outside is therefore a function of its scenario, its seed and its table `orders`.
+//! that was decided from outside is therefore a function of its scenario, its seed and its tables `orders` and `controls`.
 
 mod book;
 mod error;
+mod handed;
 mod rows;
 mod space;
 mod team;
 
 pub use book::OrderBook;
 pub use error::OrderError;
+pub use handed::{ControlBook, ControlReader};
 pub use rows::OrderReader;
 pub use space::{Bounds, CellsMut, Space};
 pub use team::{Order, Orders, Team, Teams};
 
 pub(crate) use book::{OrderRow, table};
+pub(crate) use handed::{ControlRow, controls_table, rows_of};

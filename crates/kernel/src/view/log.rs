@@ -101,6 +101,8 @@ happenings! {
     BeyondBound = "beyond-bound",
     /// A body can be reached by one that minds nobody; the value is their distance.
     Intruder = "intruder",
+    /// A body stays on what is safe, because whoever decides for it has said nothing in time.
+    Absent = "absent",
     /// A part has objected to a motion; the value is how far it could have gone.
     Veto = "veto",
     /// A part is inside something; the value is the depth.

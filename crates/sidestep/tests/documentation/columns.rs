@@ -47,6 +47,10 @@ const EXTERNAL: [(&str, &str); 3] = [
     ),
 ];
 
+/// A scenario whose airplanes may be flown from outside.
+const FLOWN: &str = "[airspace]\ndeployment = \"team\"\n[airspace.generator]\nkind = \"superconflict\"\nn = 2\n\
+                     [record]\ncontrols = true\n";
+
 fn started(world: &str, scenario: &str) -> Box<dyn Simulation> {
     let text = format!("format = 1\nworld = \"{world}\"\n{scenario}");
     let source = Source::new(world, &text, root());
@@ -111,11 +115,12 @@ fn the_chapter_of_columns_has_the_tables_that_a_run_declares() {
     for (world, scenario) in SCENARIOS {
         compare(&format!("tables of {world}"), &rendered(&started(world, scenario).schemas()));
     }
-    let orders = |(world, scenario)| {
+    let only = |table: &str, (world, scenario)| {
         let schemas = started(world, scenario).schemas();
-        rendered(&schemas.into_iter().filter(|schema| schema.name == "orders").collect::<Vec<_>>())
+        rendered(&schemas.into_iter().filter(|schema| schema.name == table).collect::<Vec<_>>())
     };
-    let of_worlds = EXTERNAL.map(orders);
+    compare("tables of controls", &only("controls", ("airspace", FLOWN)));
+    let of_worlds = EXTERNAL.map(|external| only("orders", external));
     compare("tables of orders", &of_worlds[0]);
     assert!(of_worlds.iter().all(|one| *one == of_worlds[0]), "{of_worlds:?}");
 }

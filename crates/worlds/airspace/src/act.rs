@@ -1,21 +1,33 @@
 //! *Act*: the airplanes of a group decide together and fly for `dt`.
+//!
+//! ```text
+//! begin            airplanes come in, orders are carried out
+//! Sight            what each perceives                            pilot/sight.rs
+//!   -> Control     what each does: one process for all of them (direct.rs), their pilots (deploy/),
+//!                  or somebody outside of the run (pilot/fleet.rs)
+//! obey             the controls are booked                        obey.rs, protect.rs
+//! step_all         all fly                                        step.rs
+//! ```
 
 mod approaches;
-mod avoid;
+mod direct;
 mod entry;
 mod errors;
 mod flight;
+mod obey;
 mod orders;
 mod protect;
 mod step;
 
 use super::Turn;
-use super::decide::{straight_way, wanted};
-use super::flight::Known;
+use super::decide::{Considered, straight_way};
+use super::deploy::{self, Deployment};
 use super::intruder::Intruder;
-use super::perceive::{intruders, known};
+use super::perceive::intruders;
+use super::pilot::{Control, Own};
 use super::shield::Way;
 use flight::{Course, Flight};
+use obey::obey;
 use sidestep_kernel::Slot;
 
 /// Lets a group decide, the shield filter, and all fly, together with those on recorded ways.
@@ -73,26 +85,26 @@ pub(super) fn begin(turn: &mut Turn<'_>, group: &[Slot]) -> Vec<Slot> {
     flown
 }
 
-/// Returns the ways of the airplanes that the method flies.
+/// Returns the ways of the airplanes that the method flies: as those aboard decide, or as somebody has said
+/// who decides outside of the run.
 fn ways(turn: &mut Turn<'_>, flown: &[Slot], intruders: &[Intruder]) -> Vec<Way> {
-    let Turn { world, state, now, clock, .. } = *turn;
-    let group: Vec<Known> = flown.iter().map(|&slot| known(world, state, now, slot)).collect();
-    let began_ns = clock.thread_cpu_ns();
-    let mut contacts = state.take_contacts(flown);
-    if let Some(notes) = &mut turn.scratch.notes {
-        notes.begin(&group, intruders, &contacts);
-    }
-    let candidates = wanted(turn, &group, intruders, &mut contacts);
-    turn.scratch.decide_ns += clock.thread_cpu_ns() - began_ns;
-    if let Some(notes) = &mut turn.scratch.notes {
-        notes.ways = notes.own(&candidates).cloned().unwrap_or_default();
-    }
-    let ways: Vec<Way> = if world.shield {
-        protect::shielded(turn, flown, candidates, intruders, &mut contacts)
+    let Turn { world, state, now, .. } = *turn;
+    let own: Vec<Own> = flown.iter().map(|&slot| Own::of(turn, slot)).collect();
+    let contacts = turn.scratch.notes.as_ref().map(|notes| state.contacts(notes.slot));
+    let (controls, considered): (Vec<Option<Control>>, Vec<Considered>) = if state.is_handed(now) {
+        (state.take_handed(flown), vec![Considered::default(); flown.len()])
     } else {
-        candidates.into_iter().map(|ways| ways.into_iter().next().unwrap_or_default()).collect()
+        let all = match world.deployment {
+            Deployment::Direct => direct::decided(turn, &own, intruders),
+            _ => deploy::flown(turn, flown, intruders),
+        };
+        all.into_iter().map(|(control, considered)| (Some(control), considered)).unzip()
     };
-    state.put_contacts(flown, contacts);
+    if let Some(notes) = &mut turn.scratch.notes {
+        notes.contacts = contacts.unwrap_or_default();
+        notes.decided(world, &own, intruders, (&controls, &considered));
+    }
+    let ways = obey(turn, &own, intruders, controls);
     if let Some(notes) = &mut turn.scratch.notes {
         notes.flown = notes.own(&ways).cloned();
     }

@@ -6,17 +6,17 @@ mod wishes;
 
 use super::Turn;
 use super::agents::Decided;
-use super::agents::contact::Contacts;
 use super::agents::network::Traffic;
-use super::deploy::{self, Deployment};
-use super::events::{Event, EventKind};
+use super::baseline::mvp::Resolving;
 use super::flight::{Action, Known};
 use super::intruder::Intruder;
 use super::memory::group_takes_bytes;
 use super::objective::{Options, game};
 use super::perceive::known;
+use super::pilot::Course;
 use super::purpose;
-use super::shield::Way;
+use super::shield::{Decision, Way};
+use super::wish::Wish;
 use super::world::{AirspaceWorld, Method};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::optimize;
@@ -63,29 +63,109 @@ impl Effort {
     }
 }
 
-/// Returns the ways that each airplane of a group may fly in the next `dt`, the wanted one first.
-pub(super) fn wanted(
-    turn: &mut Turn<'_>,
+/// What an airplane considers in a cycle.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Considered {
+    /// Its actions in the order in which it wants them; none by methods that give a heading.
+    pub(super) actions: Vec<Action>,
+    /// The different ways of the next `dt` that it may fly, the wanted one first.
+    pub(super) ways: Vec<Way>,
+    /// The optimizer's decision.
+    pub(super) decided: Option<Decided>,
+}
+
+impl Considered {
+    fn of(world: &AirspaceWorld, known: Known, actions: Vec<Action>) -> Self {
+        Self { ways: wishes::ways(world, known, &actions), actions, decided: None }
+    }
+
+    fn of_ways(ways: Vec<Way>) -> Self {
+        Self { ways, ..Self::default() }
+    }
+
+    /// Returns the course that follows from the shield's decision about those of its ways that were `allowed`.
+    pub(super) fn course(&self, decision: Decision, allowed: &[usize]) -> Course {
+        match decision.candidate.map(|k| allowed[k]) {
+            Some(wish) => Course::Way {
+                wish: wish as u32,
+                way: self.ways[wish].clone(),
+                side: decision.fallback,
+            },
+            None => Course::Orbit,
+        }
+    }
+}
+
+/// The way in which airplanes of a group find what they want.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Manner {
+    /// Each alone.
+    Alone,
+    /// By optimizing together.
+    Optimizing,
+    /// Each by the places and goals of all.
+    Reacting,
+    /// Each alone, because the group takes too much memory to be optimized.
+    TooMany,
+}
+
+impl Manner {
+    /// Returns the manner of a group.
+    pub(super) fn of(world: &AirspaceWorld, group: &[Known], intruders: &[Intruder]) -> Self {
+        let is_alone = group.is_empty() || group.len() + intruders.len() < 2;
+        match world.method {
+            _ if Self::reacts(world) => Self::Reacting,
+            Method::Pc if is_alone => Self::Alone,
+            Method::Pc if group_takes_bytes(world, group) > world.group_bytes => Self::TooMany,
+            Method::Pc => Self::Optimizing,
+            _ => Self::Alone,
+        }
+    }
+
+    /// Returns whether the method gives headings by the places and goals of all.
+    pub(super) fn reacts(world: &AirspaceWorld) -> bool {
+        matches!(world.method, Method::Mvp | Method::Orca)
+    }
+}
+
+/// Returns what an airplane wants that decides alone: its way-point, or what was ordered of it.
+pub(super) fn alone(world: &AirspaceWorld, known: Known, wish: Option<&Wish>) -> Considered {
+    match world.method {
+        Method::External => external::as_ordered(world, known, wish),
+        _ => Considered::of(world, known, straight(world, known)),
+    }
+}
+
+/// Returns what an airplane wants by probability collectives: the chosen action first, then the others by
+/// the cost that the optimizer expects of them.
+pub(super) fn as_decided(
+    world: &AirspaceWorld,
+    known: Known,
+    decided: Option<Decided>,
+) -> Considered {
+    let actions = match &decided {
+        Some(decided) => wishes::by_cost(world, known, decided),
+        // No decision reached it, so it flies straight on.
+        None => straight(world, known),
+    };
+    Considered { decided, ..Considered::of(world, known, actions) }
+}
+
+/// Returns what the airplanes of a group want by the world's method, if that gives them headings.
+/// `memory` are the conflicts that they resolve.
+pub(super) fn by_velocity(
+    world: &AirspaceWorld,
     group: &[Known],
     intruders: &[Intruder],
-    contacts: &mut [Contacts],
-) -> Vec<Vec<Way>> {
-    let world = turn.world;
-    match world.method {
-        Method::Mvp | Method::Orca => return velocity::by_velocity(turn, group, intruders),
-        Method::External => return external::as_ordered(turn, group),
-        Method::Pc | Method::None => {}
-    }
-    let wishes = match world.method {
-        _ if group.len() + intruders.len() < 2 => all_straight(world, group),
-        _ if group.is_empty() => Vec::new(),
-        Method::Pc => optimized(turn, group, intruders, contacts),
-        _ => all_straight(world, group),
-    };
-    if let Some(notes) = &mut turn.scratch.notes {
-        notes.wishes = notes.own(&wishes).cloned().unwrap_or_default();
-    }
-    group.iter().zip(wishes).map(|(known, wishes)| wishes::ways(world, *known, &wishes)).collect()
+    memory: &mut [Resolving],
+) -> Vec<Considered> {
+    let ways = velocity::by_velocity(world, group, intruders, memory);
+    ways.into_iter().map(Considered::of_ways).collect()
+}
+
+/// Returns all the different ways of the next `dt` that the actions of an airplane lead.
+pub(super) fn possible(world: &AirspaceWorld, known: Known) -> Vec<Way> {
+    wishes::ways(world, known, world.actions_of(known.slot))
 }
 
 /// Returns the way straight to its next way-point of an airplane that minds nobody.
@@ -94,48 +174,6 @@ pub(super) fn straight_way(turn: &Turn<'_>, slot: Slot) -> Way {
     let known = known(world, state, now, slot);
     let wishes = straight(world, known);
     wishes::ways(world, known, &wishes[..1]).swap_remove(0)
-}
-
-fn all_straight(world: &AirspaceWorld, group: &[Known]) -> Vec<Vec<Action>> {
-    group.iter().map(|known| straight(world, *known)).collect()
-}
-
-/// Returns the wishes by probability collectives: the chosen action first, then the others by the
-/// cost that the optimizer expects of them.
-fn optimized(
-    turn: &mut Turn<'_>,
-    group: &[Known],
-    intruders: &[Intruder],
-    contacts: &mut [Contacts],
-) -> Vec<Vec<Action>> {
-    let &mut Turn { world, now, .. } = turn;
-    if group_takes_bytes(world, group) > world.group_bytes {
-        let event = Event::of(now, EventKind::GroupTooLarge, group[0].slot);
-        turn.scratch.events.push(event.with(group.len() as f64));
-        return all_straight(world, group);
-    }
-    let (decided, traffic) = match world.deployment {
-        Deployment::Direct => (direct(world, group, intruders, now), Traffic::default()),
-        _ => deploy::optimized(turn, group, intruders, contacts),
-    };
-    if let Some(notes) = &mut turn.scratch.notes {
-        (notes.decided, notes.talk) = (notes.own(&decided).cloned().flatten(), traffic);
-    }
-    let first = decided.iter().flatten().next();
-    turn.scratch.optimizations.push(Optimization {
-        cycle: now,
-        airplane: group[0].slot,
-        airplanes: group.len() as u32,
-        rounds: first.map_or(0, |decided| decided.rounds),
-        converged: first.is_some() && decided.iter().flatten().all(|d| d.converged),
-        traffic,
-    });
-    let ranked = |(decided, known): (&Option<Decided>, &Known)| match decided {
-        Some(decided) => wishes::by_cost(world, *known, decided),
-        // No decision reached it, so it flies straight on.
-        None => straight(world, *known),
-    };
-    decided.iter().zip(group).map(ranked).collect()
 }
 
 /// Lets one process decide for all.

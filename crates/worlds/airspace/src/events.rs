@@ -33,6 +33,8 @@ pub enum EventKind {
     /// Whatever an airplane flies in this `dt`, another one that minds nobody can reach it; the
     /// value is their distance in meters.
     Intruder,
+    /// An airplane that is decided outside of the run stays on its orbit, because no control of it came in time.
+    Absent,
 }
 
 /// The quantity that the value of an event measures.
@@ -64,12 +66,12 @@ impl EventKind {
             Self::LossOfSeparation | Self::Intruder => Some(Measure::Distance),
             Self::Arrival => Some(Measure::Delay),
             Self::Override | Self::GroupTooLarge | Self::BeyondBound => Some(Measure::Number),
-            Self::Orbit | Self::Unheard | Self::Deadline | Self::HeldBack => None,
+            Self::Orbit | Self::Unheard | Self::Deadline | Self::HeldBack | Self::Absent => None,
         }
     }
 
     /// All kinds.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::LossOfSeparation,
         Self::Arrival,
         Self::Override,
@@ -80,6 +82,7 @@ impl EventKind {
         Self::GroupTooLarge,
         Self::BeyondBound,
         Self::Intruder,
+        Self::Absent,
     ];
 
     /// Returns the kind that it is for viewers, which know no world.
@@ -95,6 +98,7 @@ impl EventKind {
             Self::GroupTooLarge => Happening::GroupTooLarge,
             Self::BeyondBound => Happening::BeyondBound,
             Self::Intruder => Happening::Intruder,
+            Self::Absent => Happening::Absent,
         }
     }
 
@@ -111,6 +115,7 @@ impl EventKind {
             Self::GroupTooLarge => "group-too-large",
             Self::BeyondBound => "beyond-bound",
             Self::Intruder => "intruder",
+            Self::Absent => "absent",
         }
     }
 }

@@ -5,10 +5,11 @@
 //! anywhere in a circle that grows at its greatest speed.
 
 use crate::flight::{Levels, Point};
+use serde::{Deserialize, Serialize};
 use sidestep_kernel::Slot;
 
 /// An intruder as all of a group see it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Intruder {
     /// The airplane.
     pub(crate) slot: Slot,

@@ -8,13 +8,15 @@
 //! scenario.rs, flight_plan.rs, generate.rs -> world.rs (immutable), state.rs (cells)
 //! perceive.rs -> join.rs -> decide.rs -> act.rs                            one cycle of dt
 //! flight/: motion, orders, tracks       objective.rs: what is minimized    behind it
-//! shield/: what is safe for ever        agents/, deploy/: who decides, over which network
+//! shield/: what is safe for ever        agents/: programs aboard, and what they say to each other
+//! pilot/: an airplane from what it sees to what it does   deploy/: pilots on a network in memory
 //! intruder.rs: airplanes that mind nobody    outside.rs, wish.rs: decisions from outside
 //! baseline/: other methods              metrics.rs: the sums of a run
 //! ```
 
 mod act;
 pub mod agents;
+mod avoid;
 pub mod baseline;
 pub mod bundle;
 mod decide;
@@ -35,6 +37,7 @@ mod notes;
 pub mod objective;
 mod outside;
 mod perceive;
+pub mod pilot;
 mod purpose;
 mod rows;
 mod run;

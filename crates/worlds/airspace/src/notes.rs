@@ -3,10 +3,13 @@
 use crate::agents::Decided;
 use crate::agents::contact::Contacts;
 use crate::agents::network::Traffic;
+use crate::decide::Considered;
 use crate::events::Event;
 use crate::flight::{Action, Known};
 use crate::intruder::Intruder;
+use crate::pilot::{Control, Course, Own};
 use crate::shield::{Decision, Flyer, Plan, Side, Way};
+use crate::world::AirspaceWorld;
 use sidestep_kernel::{EntityId, Slot};
 
 /// Notes for somebody who asks; no run makes any.
@@ -43,11 +46,32 @@ pub(crate) struct Notes {
 }
 
 impl Notes {
-    /// Notes what a group knows before it decides.
-    pub(crate) fn begin(&mut self, group: &[Known], intruders: &[Intruder], contacts: &[Contacts]) {
-        if let Some(me) = self.place(group.iter().map(|known| known.slot)) {
-            self.contacts.clone_from(&contacts[me]);
-            (self.group, self.intruders) = (group.to_vec(), intruders.to_vec());
+    /// Notes what a group knows, has considered and has decided.
+    pub(crate) fn decided(
+        &mut self,
+        world: &AirspaceWorld,
+        own: &[Own],
+        intruders: &[Intruder],
+        (controls, considered): (&[Option<Control>], &[Considered]),
+    ) {
+        let Some(me) = self.place(own.iter().map(|own| own.id)) else { return };
+        self.group = own.iter().map(Own::known).collect();
+        self.intruders = intruders.to_vec();
+        let Considered { actions, ways, decided } = considered[me].clone();
+        (self.wishes, self.ways, self.decided) = (actions, ways, decided);
+        for control in controls.iter().flatten() {
+            self.talk.add_beside(control.deciding);
+            self.exchanged.add_beside(control.shielding);
+        }
+        if world.shield {
+            let flyers: Vec<Flyer> = own.iter().map(|own| own.flyer(world)).collect();
+            let wishes: Vec<&[Way]> = considered.iter().map(|one| &one.ways[..]).collect();
+            let decision = |(flyer, control): (&Flyer, &Option<Control>)| {
+                let course = control.as_ref().map_or(&Course::Orbit, |control| &control.course);
+                course.decision(flyer.fallback)
+            };
+            let decisions: Vec<Decision> = flyers.iter().zip(controls).map(decision).collect();
+            self.shielded((me, &flyers), &wishes, &decisions, world.timing.dtau_s);
         }
     }
 
@@ -62,14 +86,13 @@ impl Notes {
     }
 
     /// Notes what the shield decided, and because of whom it refused the first wish.
-    pub(crate) fn shielded(
+    fn shielded(
         &mut self,
-        flyers: &[Flyer],
-        wishes: &[Vec<Way>],
+        (me, flyers): (usize, &[Flyer]),
+        wishes: &[&[Way]],
         decisions: &[Decision],
         dtau_s: f64,
     ) {
-        let Some(me) = self.place(flyers.iter().map(|flyer| flyer.id)) else { return };
         self.flyer = Some(flyers[me].clone());
         self.decision = Some(decisions[me]);
         let Some(wish) = wishes[me].first().filter(|_| decisions[me].candidate != Some(0)) else {

@@ -117,7 +117,7 @@ impl AirspaceWorld {
     /// Calls `look` with what each group perceives in cycle `now`: its airplanes that decide, and those
     /// that mind nobody. The cycle is begun on a copy of the state, since orders that are due and
     /// airplanes that come in change what is perceived.
-    fn perceived(
+    pub(super) fn perceived(
         &self,
         state: &AirspaceState,
         now: Cycle,

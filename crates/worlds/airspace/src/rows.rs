@@ -99,6 +99,11 @@ impl Rows {
         Self { record, ..Self::default() }
     }
 
+    /// Whether controls from outside of the run are to be kept.
+    pub(super) fn keep_controls(&self) -> bool {
+        self.record.controls
+    }
+
     /// Starts to keep rows.
     pub(super) fn begin(&mut self, world: &AirspaceWorld) {
         self.flown.begin(self.record.trajectories.then(|| trajectories(&callsigns(world))));

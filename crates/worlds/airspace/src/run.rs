@@ -10,7 +10,7 @@ use super::world::AirspaceWorld;
 use super::{Scratch, view, words};
 use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
-use sidestep_kernel::control::{CellsMut, Order, Teams};
+use sidestep_kernel::control::{CellsMut, Order, OrderError, Teams};
 use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
 use sidestep_kernel::view::{Frame, Inspection, Log, Look, PlaceRows, Scenery, Who};
 use sidestep_kernel::words::{Lines, Said};
@@ -208,6 +208,19 @@ impl World for AirspaceWorld {
 
     fn order(&self, state: &mut AirspaceState, order: &Order<'_>) {
         self.note_order(state, order);
+    }
+
+    fn hand_over(
+        &self,
+        state: &mut AirspaceState,
+        now: Cycle,
+        controls: &[(EntityId, Vec<u8>)],
+    ) -> Result<(), OrderError> {
+        self.note_controls(state, now, controls)
+    }
+
+    fn keeps_controls(&self, books: &Books) -> bool {
+        books.rows.keep_controls()
     }
 
     fn observe(&self, state: &AirspaceState, now: Cycle, team: usize, room: &mut [CellsMut<'_>]) {

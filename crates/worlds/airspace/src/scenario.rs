@@ -6,6 +6,7 @@ mod network;
 mod settings;
 mod values;
 
+use super::agents::packet::fingerprint;
 use super::deploy::Deployment;
 use super::flight::Airplane;
 use super::flight_plan::AirplaneSection;
@@ -135,13 +136,21 @@ pub struct RecordSection {
     pub events: bool,
     /// A row per optimization.
     pub optimizations: bool,
+    /// The controls of airplanes whose pilots are outside of the run, so that it can be computed again.
+    pub controls: bool,
     /// Number of cycles between two checkpoints; 0 for none.
     pub checkpoint_every: u64,
 }
 
 impl Default for RecordSection {
     fn default() -> Self {
-        Self { trajectories: true, events: true, optimizations: true, checkpoint_every: 1000 }
+        Self {
+            trajectories: true,
+            events: true,
+            optimizations: true,
+            controls: false,
+            checkpoint_every: 1000,
+        }
     }
 }
 
@@ -197,7 +206,9 @@ impl Compiled {
         if is_drawn || self.world.disturbance.position_m > 0.0 {
             return Compiler::again(&self.recipe, seed, &self.world).compile();
         }
-        let world = Arc::new(AirspaceWorld { streams, ..(*self.world).clone() });
+        let fingerprint = fingerprint(&self.recipe.source.text, seed);
+        let world = AirspaceWorld { streams, fingerprint, ..(*self.world).clone() };
+        let world = Arc::new(world);
         Ok(Self { world, seed, ..self.clone() })
     }
 
@@ -224,6 +235,7 @@ impl Compiled {
             named: self.too_close.clone(),
             held: Vec::new(),
             wishes: Vec::new(),
+            handed: None,
         }
     }
 }

@@ -6,13 +6,15 @@ mod snapshot;
 use super::agents::contact::Contacts;
 use super::baseline::mvp::Resolving;
 use super::flight::{Pose, Stage};
+use super::pilot::{Control, Memory};
 use super::shield::{Named, Side};
 use super::wish::Wish;
 use super::world::{AirspaceWorld, Method};
 use neighborhood::Neighborhood;
 use sidestep_kernel::column::Shared;
-use sidestep_kernel::{Cycle, EntityId, Slot};
+use sidestep_kernel::{Cycle, EntityId, Slot, math};
 pub use snapshot::{AirplaneRecord, PairRecord, Snapshot};
+use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 /// Marks an airplane that has not arrived yet.
@@ -47,7 +49,14 @@ pub struct AirspaceState {
     turn_rates_rad_s: Box<[Shared<f64>]>,
     /// The wish that was ordered of each airplane; empty unless airplanes are decided from outside.
     wishes: Box<[Mutex<Option<Wish>>]>,
+    /// The cycle for which controls were handed over, or [`NEVER`].
+    handed_for: Shared<u64>,
+    /// These controls.
+    handed: Mutex<BTreeMap<EntityId, Control>>,
 }
+
+/// Stands for no cycle.
+const NEVER: Cycle = Cycle::MAX;
 
 /// One airplane's share of the state.
 #[derive(Debug, Default)]
@@ -188,6 +197,14 @@ fn remembered<T: Clone + Default>(n: usize, saved: &[T]) -> Box<[Mutex<T>]> {
 }
 
 impl AirspaceState {
+    /// Returns the distance between two airplanes in meters, heights included.
+    pub(crate) fn apart_m(&self, [a, b]: [EntityId; 2]) -> f64 {
+        let [a, b] = [a, b].map(|id| &self.airplanes[id as usize]);
+        let ([ax, ay], [bx, by]) = (a.pose().at, b.pose().at);
+        let level_m = math::hypot(ax - bx, ay - by);
+        math::hypot(level_m, a.altitude_m.get() - b.altitude_m.get())
+    }
+
     /// Returns the state that a snapshot describes.
     pub(super) fn restore(world: &AirspaceWorld, snapshot: &Snapshot) -> Self {
         let n = snapshot.airplanes.len();
@@ -210,6 +227,8 @@ impl AirspaceState {
         }
         let is_external = world.method == Method::External;
         let wishes = remembered(if is_external { n } else { 0 }, &snapshot.wishes);
+        let (handed_for, handed) = (Shared::default(), Mutex::default());
+        handed_for.set(NEVER);
         let state = Self {
             airplanes,
             neighborhood,
@@ -219,7 +238,12 @@ impl AirspaceState {
             held,
             turn_rates_rad_s,
             wishes,
+            handed_for,
+            handed,
         };
+        if let Some(handed) = &snapshot.handed {
+            state.hand_over(snapshot.cycle, handed.clone());
+        }
         let held = snapshot.held.iter().copied();
         let held = held.chain(snapshot.airplanes.iter().skip(snapshot.held.len()).map(|a| a.pose));
         (0..).zip(held).for_each(|(slot, pose)| state.set_held(slot, pose));
@@ -268,29 +292,48 @@ impl AirspaceState {
         *named = named.iter().copied().filter(|&other| stays(other)).collect();
     }
 
-    /// Takes out the knowledge that the airplanes of a group have of others.
-    pub(super) fn take_contacts(&self, group: &[Slot]) -> Vec<Contacts> {
-        take(&self.contacts, group)
+    /// Takes out what the airplanes of a group remember.
+    pub(super) fn take_memories(&self, group: &[Slot]) -> Vec<Memory> {
+        let both = take(&self.contacts, group).into_iter().zip(take(&self.resolving, group));
+        both.map(|(contacts, resolving)| Memory { contacts, resolving }).collect()
     }
 
-    /// Puts the knowledge back.
-    pub(super) fn put_contacts(&self, group: &[Slot], known: Vec<Contacts>) {
-        put(&self.contacts, group, known);
+    /// Puts back what an airplane remembers.
+    pub(super) fn put_memory(&self, slot: Slot, Memory { contacts, resolving }: Memory) {
+        put(&self.contacts, &[slot], vec![contacts]);
+        put(&self.resolving, &[slot], vec![resolving]);
     }
 
-    /// Takes out the conflicts that the airplanes of a group resolve.
-    pub(super) fn take_resolving(&self, group: &[Slot]) -> Vec<Resolving> {
-        take(&self.resolving, group)
+    /// Returns the knowledge that an airplane has of others.
+    pub(super) fn contacts(&self, slot: Slot) -> Contacts {
+        self.contacts.get(slot as usize).map(|all| held(all).clone()).unwrap_or_default()
     }
 
-    /// Puts the conflicts back.
-    pub(super) fn put_resolving(&self, group: &[Slot], resolving: Vec<Resolving>) {
-        put(&self.resolving, group, resolving);
+    /// Stores what airplanes do in a cycle, because they have decided outside of the run.
+    pub(super) fn hand_over(&self, cycle: Cycle, controls: Vec<Control>) {
+        *held(&self.handed) = controls.into_iter().map(|one| (one.id, one)).collect();
+        self.handed_for.set(cycle);
     }
 
-    /// Takes out the wishes that were ordered of the airplanes of a group.
-    pub(super) fn take_wishes(&self, group: &[Slot]) -> Vec<Option<Wish>> {
-        take(&self.wishes, group)
+    /// Returns whether it was handed over what airplanes do in a cycle.
+    pub(super) fn is_handed(&self, cycle: Cycle) -> bool {
+        self.handed_for.get() == cycle
+    }
+
+    /// Takes out what the airplanes of a group were said to do.
+    pub(super) fn take_handed(&self, group: &[Slot]) -> Vec<Option<Control>> {
+        let mut handed = held(&self.handed);
+        group.iter().map(|slot| handed.remove(slot)).collect()
+    }
+
+    /// Returns the wish that was ordered of an airplane, if there is one.
+    pub(super) fn wish(&self, slot: Slot) -> Option<Wish> {
+        self.wishes.get(slot as usize).and_then(|wish| held(wish).clone())
+    }
+
+    /// Drops the wishes that were ordered of the airplanes of a group: they have decided.
+    pub(super) fn drop_wishes(&self, group: &[Slot]) {
+        take(&self.wishes, group);
     }
 
     /// Stores the wish that was ordered of an airplane, in place of any other.
@@ -328,9 +371,11 @@ impl AirspaceState {
         });
         let named = named.collect();
         let wishes = self.wishes.iter().map(|wish| held(wish).clone()).collect();
+        let handed = || held(&self.handed).values().cloned().collect();
+        let handed = self.is_handed(cycle).then(handed);
         let held = (0..self.held.len() as Slot).map(|slot| self.held(slot)).collect();
         let airplanes = self.airplanes.iter().zip(&self.turn_rates_rad_s).map(record).collect();
-        Snapshot { cycle, airplanes, contacts, resolving, named, held, wishes }
+        Snapshot { cycle, airplanes, contacts, resolving, named, held, wishes, handed }
     }
 
     /// Returns whether an airplane is there in a cycle: it has appeared and has not arrived.

@@ -159,6 +159,9 @@ pub(super) fn entry(event: &Event) -> Entry {
         EventKind::Intruder => {
             (Level::Warning, format!("can be reached by airplane/{other}, now {value:.0} m away"))
         }
+        EventKind::Absent => {
+            (Level::Warning, "stays on its orbit: no control of it came in time".into())
+        }
     };
     let airplane = |id| (Kind::Airplane, id, None);
     Entry {

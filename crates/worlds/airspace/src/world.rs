@@ -111,6 +111,8 @@ pub struct AirspaceWorld {
     pub disturbance: Disturbance,
     /// Bounds on those errors for which the shield allows.
     pub bounds: Bounds,
+    /// Digest of the scenario's text and seed, by which those who talk know that they are of one scenario.
+    pub fingerprint: u64,
     pub(crate) streams: Streams,
     /// Actions of each airplane.
     pub(crate) actions: Arc<Vec<Vec<Action>>>,
@@ -257,6 +259,16 @@ impl AirspaceWorld {
             Some(track) if track.ends_s() <= joins_s => track.ends_s(),
             _ => joins_s + self.alone_s[i],
         }
+    }
+
+    /// Returns whether an airplane's radio is dead in a cycle.
+    pub(crate) fn is_silent(&self, id: EntityId, cycle: Cycle) -> bool {
+        self.network.as_ref().is_some_and(|network| network.is_silent(id, self.starts_s(cycle)))
+    }
+
+    /// Returns whether airplanes remember the conflicts that they resolve.
+    pub(crate) fn is_resolving(&self) -> bool {
+        self.method == Method::Mvp
     }
 
     /// Returns when a cycle starts, in seconds after the start of the run.

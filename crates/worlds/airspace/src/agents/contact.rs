@@ -1,5 +1,6 @@
 //! Knowledge of airplanes about each other when messages get lost.
 
+use super::party::{Unsound, are_places};
 use crate::flight::{Air, Levels, Point, Pose, Prediction, distance_m};
 use crate::objective::Options;
 use crate::shield::{Flyer, Side};
@@ -90,6 +91,19 @@ impl Beacon {
             separation_m: flyer.separation_m,
             levels: flyer.levels,
         }
+    }
+
+    /// Checks its numbers; `top_m_s` is the greatest speed of the airplane.
+    ///
+    /// # Errors
+    /// When they cannot be those of an airplane.
+    pub(crate) fn check(&self, top_m_s: f64) -> Result<(), Unsound> {
+        let Self { pose: Pose { at: [x, y], heading_rad }, goal, v_m_s, levels, .. } = self;
+        let places = [*x, *y, *heading_rad].into_iter().chain(goal.iter().flatten().copied());
+        let is_flown = 0.0 < *v_m_s && *v_m_s <= top_m_s;
+        let Levels { low_m, high_m } = levels;
+        let is_level = low_m <= high_m && are_places([*low_m, *high_m]);
+        Unsound::Number.unless(are_places(places) && is_flown && is_level)
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! On a network that loses nothing, all airplanes send all others their place, their stored
 //! fallback and the ways they would fly; all know the same, filter the same, and compute the same
-//! plans.
+//! plans, to the bit ([`Certainty::Sure`]). Nobody sends anything else.
 //!
 //! On one that loses messages no airplane can be sure what others know. So plans must stay safe
 //! whichever of them are flown, and no airplane flies one that others may not know:
@@ -47,8 +47,10 @@
 mod scene;
 
 use super::contact::{Beacon, Contact, Contacts, Orbiting, Planned, note};
-use super::link;
-use crate::shield::{Certainty, Decision, Flyer, Plan, Side, Way, filter};
+use super::link::{self, Most};
+use super::party::Unsound;
+use crate::flight::Pose;
+use crate::shield::{Certainty, Decision, Flyer, Named, Plan, Side, Way, filter};
 pub use scene::{Scene, Seen};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
@@ -62,14 +64,16 @@ pub enum Message {
     /// The way it will fly if all agree, and the side to which it turns then; `None` for its
     /// fallback.
     Plan(Option<(Way, Side)>),
-    /// Places of the airplanes whose plans it accepts.
-    Accepts(Vec<u16>),
+    /// Ids of the airplanes whose plans it accepts, rising.
+    Accepts(Vec<EntityId>),
 }
 
 /// Place of an airplane, and the ways it would fly.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Proposal {
     beacon: Beacon,
+    /// Its pose on the stored orbit, as all see it.
+    held: Pose,
     fallback: Side,
     named: Vec<EntityId>,
     rank: u64,
@@ -81,6 +85,7 @@ impl Proposal {
     pub fn new(flyer: &Flyer, ways: &[Way]) -> Self {
         Self {
             beacon: Beacon::of(flyer),
+            held: flyer.held,
             fallback: flyer.fallback,
             named: flyer.named.to_vec(),
             rank: flyer.rank,
@@ -95,7 +100,7 @@ struct Member {
     proposal: Option<Proposal>,
     /// Its plan, when it is known; `Some(None)` stands for its fallback.
     plan: Option<Option<(Way, Side)>>,
-    accepts: Option<Vec<u16>>,
+    accepts: Option<Vec<EntityId>>,
     gone: bool,
 }
 
@@ -173,11 +178,11 @@ impl Agent {
     }
 
     fn flyer_of(&self, place: usize, proposal: &Proposal) -> Flyer {
-        let Proposal { beacon, fallback, named, rank, .. } = proposal;
+        let Proposal { beacon, held, fallback, named, rank, .. } = proposal;
         Flyer {
             id: self.id(place),
             pose: beacon.pose,
-            held: beacon.pose,
+            held: *held,
             v_m_s: beacon.v_m_s,
             omega_max_rad_s: beacon.omega_max_rad_s,
             orbit_rad_s: beacon.orbit_rad_s,
@@ -193,7 +198,7 @@ impl Agent {
 
     /// Returns all orbits that an unheard airplane may be on.
     fn possible(&self, place: usize) -> Vec<Flyer> {
-        let Seen { flyer, orbits } = &self.scene.seen[place];
+        let Seen { flyer, orbits, .. } = &self.scene.seen[place];
         if *orbits {
             return vec![flyer.clone()];
         }
@@ -219,6 +224,7 @@ impl Agent {
         let mut said = Vec::new();
         while link::Agent::awaits(self).is_empty() {
             match self.stage() {
+                Stage::Proposals if self.scene.certainty == Certainty::Sure => self.be_sure(),
                 Stage::Proposals => said.push(self.plan()),
                 Stage::Plans => said.push(self.accept()),
                 Stage::Consent => self.agree(),
@@ -228,8 +234,16 @@ impl Agent {
         said
     }
 
-    /// Computes plans for all, and sends its own.
-    fn plan(&mut self) -> Message {
+    /// Computes plans for all, as all others do from the same proposals, and will fly its own.
+    fn be_sure(&mut self) {
+        let decision = self.filtered();
+        self.decision = Some(decision);
+        let contacts = self.contacts.clone();
+        self.agreed = Some(Agreed { decision, held_back: false, contacts });
+    }
+
+    /// Computes plans for all, and returns its own.
+    fn filtered(&self) -> Decision {
         let mut flyers = Vec::new();
         let mut candidates = Vec::new();
         let mut mine = 0;
@@ -243,13 +257,31 @@ impl Agent {
                 candidates.push(proposal.ways.clone());
             } else {
                 // An unheard airplane takes part on every orbit it may be on, without a choice.
-                let possible = self.possible(place);
+                let mut possible = self.possible(place);
+                let named = self.named_with(place);
+                possible.iter_mut().for_each(|flyer| flyer.named = named.clone());
                 candidates.extend(possible.iter().map(|_| Vec::new()));
                 flyers.extend(possible);
             }
         }
         let frame = (self.steps(), self.dtau_s());
-        let decision = filter(&flyers, &candidates, frame, Certainty::Mixable)[mine];
+        filter(&flyers, &candidates, frame, self.scene.certainty)[mine]
+    }
+
+    /// Returns those with which an unheard airplane is named, as far as they say so themselves.
+    fn named_with(&self, place: usize) -> Named {
+        let id = self.id(place);
+        let names = |other: &usize| match &self.members[*other].proposal {
+            _ if *other == self.me => self.flyer.named.contains(&id),
+            Some(proposal) => proposal.named.contains(&id),
+            None => false,
+        };
+        (0..self.size()).filter(names).map(|other| self.id(other)).collect()
+    }
+
+    /// Computes its plan, and sends it.
+    fn plan(&mut self) -> Message {
+        let decision = self.filtered();
         self.decision = Some(decision);
         let way = decision.candidate.map(|k| (self.own.ways[k].clone(), decision.fallback));
         // Its fallback needs no consent, because all others keep apart from it anyway.
@@ -279,9 +311,11 @@ impl Agent {
             else {
                 continue;
             };
+            // One that plans what it has not proposed is not to be believed.
+            let is_proposed = plan.as_ref().is_none_or(|(way, _)| proposal.ways.contains(way));
             let theirs = self.plan_of(self.flyer_of(place, proposal), plan);
-            if mine.iter().all(|plan| plan.is_compatible(&theirs)) {
-                accepts.push(place as u16);
+            if is_proposed && mine.iter().all(|plan| plan.is_compatible(&theirs)) {
+                accepts.push(self.id(place));
             }
         }
         self.members[self.me].accepts = Some(accepts.clone());
@@ -302,7 +336,7 @@ impl Agent {
     /// Returns whether a member has agreed to this airplane's plan.
     fn agrees(&self, place: usize) -> bool {
         let accepts = self.members[place].accepts.as_ref();
-        accepts.is_some_and(|accepted| accepted.contains(&(self.me as u16)))
+        accepts.is_some_and(|accepted| accepted.contains(&self.id(self.me)))
     }
 
     /// Returns whether a member was present and not heard in the exchange before.
@@ -369,6 +403,20 @@ impl link::Agent for Agent {
         said
     }
 
+    fn check(&self, from: usize, message: &Message) -> Result<(), Unsound> {
+        match message {
+            Message::Proposal(proposal) => self.scene.admits(from, proposal),
+            Message::Plan(plan) => {
+                plan.iter().try_for_each(|(way, _)| self.scene.admits_way(from, way))
+            }
+            Message::Accepts(accepted) => self.scene.admits_members(accepted),
+        }
+    }
+
+    fn most(&self) -> Most {
+        Most { bytes: self.scene.most_bytes(), messages: 3 }
+    }
+
     fn on_message(&mut self, from: usize, message: Message) -> Vec<Message> {
         let has_planned = self.decision.is_some();
         let has_accepted = self.members[self.me].accepts.is_some();
@@ -422,6 +470,10 @@ impl link::Agent for Agent {
         if self.agreed.is_none() {
             self.agree();
         }
+    }
+
+    fn is_done(&self) -> bool {
+        self.agreed.is_some()
     }
 
     fn outcome(&self) -> Option<Agreed> {

@@ -1,9 +1,11 @@
 //! Agents that first send each other all their possible ways, and then only the results of using
 //! them: numbers of samples, or distributions.
 
+use super::Conclusion;
 use super::contact::Beacon;
+use super::link::{self, Most};
 use super::own_ship::OwnShip;
-use super::{Conclusion, link};
+use super::party::{Unsound, are_places};
 use crate::flight::{Known, Point, Prediction};
 use crate::objective::{Options, couple, own_costs};
 use serde::{Deserialize, Serialize};
@@ -295,7 +297,62 @@ impl link::Agent for Agent {
         said
     }
 
+    fn check(&self, from: usize, message: &Message) -> Result<(), Unsound> {
+        let briefing = &*self.own.briefing;
+        let filed = &briefing.filed[from];
+        let actions = filed.actions.len();
+        match message {
+            Message::Ways { beacon, ways } => {
+                Unsound::Kind.unless(!self.by_model)?;
+                briefing.admits(from, beacon)?;
+                briefing.admits_ways(ways, actions)
+            }
+            Message::Model { beacon, next, mission, airplane, orders, altitude_m } => {
+                Unsound::Kind.unless(self.by_model)?;
+                Unsound::Airplane.unless(*airplane == briefing.ids[from])?;
+                briefing.admits(from, beacon)?;
+                let is_short = mission.len() <= filed.most_way_points;
+                Unsound::Length.unless(is_short && *next as usize <= mission.len())?;
+                Unsound::Plan.unless(*orders as usize <= filed.orders)?;
+                let told_m = mission.as_flattened().iter().chain([altitude_m]);
+                Unsound::Number.unless(are_places(told_m.copied()))
+            }
+            Message::Samples { round, change, samples } => {
+                let Estimator::Sampled { block, .. } = self.own.settings().estimator else {
+                    return Err(Unsound::Kind);
+                };
+                briefing.admits_round(*round, *change)?;
+                Unsound::Length.unless(samples.len() == block)?;
+                Unsound::Number.unless(samples.iter().all(|&x| usize::from(x) < actions))
+            }
+            Message::Distribution { round, change, q } => {
+                Unsound::Kind.unless(self.is_exact())?;
+                briefing.admits_round(*round, *change)?;
+                Unsound::Length.unless(q.len() == actions)?;
+                let is_share = |p: &f64| (0.0..=1.0).contains(p);
+                let is_whole = (q.iter().sum::<f64>() - 1.0).abs() < 1e-6;
+                Unsound::Number.unless(is_whole && q.iter().all(is_share))
+            }
+        }
+    }
+
+    fn most(&self) -> Most {
+        let briefing = &*self.own.briefing;
+        let (actions, rounds) = (briefing.most_actions(), self.own.settings().stop.max_rounds);
+        let block = match self.own.settings().estimator {
+            Estimator::Exact => 0,
+            Estimator::Sampled { block, .. } => block,
+        };
+        let ways = if self.by_model { 0 } else { actions };
+        let bytes = briefing.most_bytes(ways) + 8 * actions + 3 * block;
+        // Its ways or its model, and a message for each round.
+        Most { bytes, messages: rounds.saturating_add(2) }
+    }
+
     fn on_message(&mut self, from: usize, message: Message) -> Vec<Message> {
+        if self.decided.is_some() {
+            return Vec::new();
+        }
         let member = &mut self.members[from];
         match message {
             Message::Ways { beacon, ways } => {
@@ -355,6 +412,10 @@ impl link::Agent for Agent {
 
     fn at_deadline(&mut self) {
         self.decide();
+    }
+
+    fn is_done(&self) -> bool {
+        self.decided.is_some()
     }
 
     fn outcome(&self) -> Option<Conclusion> {

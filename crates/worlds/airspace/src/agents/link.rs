@@ -7,14 +7,15 @@
 //! that was not heard in the talk before is asked less often. So nobody waits for ever, and a loss
 //! costs time instead of agreement.
 //!
-//! Endpoints and agents are state machines without a clock or a network of their own: the tick and
-//! the [`Transport`] are handed in.
+//! Endpoints and agents are state machines without a clock or a network of their own: ticks and
+//! messages are handed in, and messages are taken out.
 
-use super::network::{Patience, Traffic};
+use super::network::Patience;
+use super::packet::{Draft, HEADER_BYTES};
+use super::party::{Concludes, Outgoing, Party, Unsound};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
-use sidestep_kernel::ports::{Envelope, Transport};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -28,6 +29,15 @@ pub trait Agent {
 
     /// Returns its messages before it has heard anything.
     fn start(&mut self) -> Vec<Self::Message>;
+
+    /// Checks a message of agent `from`: whatever it says, [`Self::on_message`] is to make sense of it.
+    ///
+    /// # Errors
+    /// When it says what cannot be.
+    fn check(&self, from: usize, message: &Self::Message) -> Result<(), Unsound>;
+
+    /// Returns the largest number of bytes of a message, and of messages of one agent in a talk.
+    fn most(&self) -> Most;
 
     /// Takes a message of agent `from`, and returns its own messages in response. Messages come in
     /// any order, each once.
@@ -54,13 +64,25 @@ pub trait Agent {
     /// Ends because time is up, with the best outcome from what it knows.
     fn at_deadline(&mut self);
 
+    /// Returns whether it has come to its outcome.
+    fn is_done(&self) -> bool;
+
     /// Returns its outcome, if it has one.
     fn outcome(&self) -> Option<Self::Outcome>;
 }
 
-/// A packet on the wire.
+/// Bounds on what an agent may be sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Most {
+    /// Largest number of bytes of a message.
+    pub bytes: usize,
+    /// Largest number of messages of one agent in a talk.
+    pub messages: u32,
+}
+
+/// A message on the wire.
 #[derive(Debug, Serialize, Deserialize)]
-enum Packet<M> {
+enum Wired<M> {
     /// A message, with its number among the sender's.
     Said(u32, M),
     /// "Send again all your messages from this number on."
@@ -69,13 +91,6 @@ enum Packet<M> {
     Wait,
     /// "I have not sent more than that, and shall not."
     Done,
-}
-
-/// A packet on its way out, to one other or to all.
-#[derive(Debug)]
-struct Outgoing {
-    to: Option<usize>,
-    payload: Vec<u8>,
 }
 
 /// Settings of an endpoint.
@@ -98,17 +113,17 @@ pub struct Radio {
 pub struct Endpoint<A> {
     agent: A,
     radio: Radio,
+    most: Most,
     /// Its messages so far, serialized, by number.
-    said: Vec<Vec<u8>>,
+    said: Vec<Draft>,
     others: Vec<Other>,
+    /// Messages that wait to be sent.
+    out: Vec<Outgoing>,
     began: u64,
     quiet_since: u64,
     /// Size of the largest packet that it has sent or heard, in bytes.
     largest: usize,
     late: bool,
-    /// Number of packets sent so far, which distinguishes those of one tick.
-    sent: u32,
-    traffic: Traffic,
 }
 
 /// An endpoint's knowledge of another one.
@@ -136,7 +151,7 @@ impl Other {
     }
 }
 
-/// Returns a packet in the form in which it travels.
+/// Returns a message in the form in which it travels.
 pub(crate) fn bytes_of<M: Serialize>(message: &M) -> Vec<u8> {
     postcard::to_stdvec(message).expect("messages are plain data")
 }
@@ -157,146 +172,66 @@ impl<A: Agent> Endpoint<A> {
     pub fn new(agent: A, radio: Radio) -> Self {
         let others = vec![Other::default(); radio.group.len()];
         Self {
+            most: agent.most(),
             agent,
             radio,
             said: Vec::new(),
             others,
+            out: Vec::new(),
             began: 0,
             quiet_since: 0,
             largest: 0,
             late: false,
-            sent: 0,
-            traffic: Traffic::default(),
         }
     }
 
-    /// Sends the messages that the agent has before it hears anything.
-    pub fn start(&mut self, transport: &mut dyn Transport, tick: u64) {
-        (self.began, self.quiet_since) = (tick, tick);
-        let first = self.agent.start();
-        let said = self.say(first);
-        if self.radio.is_silent {
-            self.is_alone();
-        }
-        self.send(transport, tick, said);
+    /// Says something to one other.
+    fn tell(&mut self, to: usize, message: Draft) {
+        self.send(Some(self.radio.group[to]), message);
     }
 
-    /// Takes the packets that have arrived by a tick, and sends the agent's responses.
-    pub fn step(&mut self, transport: &mut dyn Transport, tick: u64) {
-        for envelope in transport.receive(self.radio.group[self.radio.me], tick) {
-            let sender = self.radio.group.binary_search(&envelope.sender);
-            // Senders outside the group are ignored.
-            let Some(from) = sender.ok().filter(|_| !self.radio.is_silent) else { continue };
-            let said = self.on_packet(from, &envelope.payload, tick);
-            self.send(transport, tick, said);
-        }
-        let said = self.on_timer(tick);
-        self.send(transport, tick, said);
+    fn send(&mut self, to: Option<EntityId>, message: Draft) {
+        self.largest = self.largest.max(message.len());
+        self.out.push(Outgoing { to, message });
     }
 
-    /// Hands packets to the network, and counts them.
-    fn send(&mut self, transport: &mut dyn Transport, tick: u64, said: Vec<Outgoing>) {
-        let Radio { group, me, is_silent, .. } = &self.radio;
-        for Outgoing { to, payload } in said.into_iter().filter(|_| !is_silent) {
-            let receivers: Vec<usize> = match to {
-                Some(place) => vec![place],
-                None => (0..group.len()).filter(|place| place != me).collect(),
-            };
-            self.traffic.count(receivers.len(), payload.len());
-            self.largest = self.largest.max(payload.len());
-            for place in receivers {
-                transport.send(Envelope {
-                    cycle: tick,
-                    sender: group[*me],
-                    sequence: self.sent,
-                    receiver: group[place],
-                    payload: payload.clone(),
-                });
-            }
-            self.sent += 1;
-        }
-    }
-
-    fn say(&mut self, messages: Vec<A::Message>) -> Vec<Outgoing> {
-        let mut out = Vec::with_capacity(messages.len());
+    /// Says something to all others.
+    fn say(&mut self, messages: Vec<A::Message>) {
         for message in messages {
-            let payload = bytes_of(&Packet::Said(self.said.len() as u32, message));
-            self.said.push(payload.clone());
-            out.push(Outgoing { to: None, payload });
-        }
-        out
-    }
-
-    /// Takes a packet. One that cannot be read counts as lost.
-    fn on_packet(&mut self, from: usize, bytes: &[u8], tick: u64) -> Vec<Outgoing> {
-        let Ok(packet) = postcard::from_bytes::<Packet<A::Message>>(bytes) else {
-            return Vec::new();
-        };
-        (self.others[from].unanswered, self.others[from].is_there) = (0, true);
-        self.largest = self.largest.max(bytes.len());
-        match packet {
-            Packet::Said(number, message) if self.others[from].takes(number) => {
-                self.quiet_since = tick;
-                let said = self.agent.on_message(from, message);
-                self.say(said)
-            }
-            Packet::Said(..) | Packet::Wait => Vec::new(),
-            Packet::Ask(number) => self.answer(from, number),
-            // This answers a question for missing messages, so all of them have come.
-            Packet::Done => self.go_on_without(from, true),
+            let message = Draft::of(&Wired::Said(self.said.len() as u32, message));
+            self.said.push(message.clone());
+            self.send(None, message);
         }
     }
 
-    fn answer(&self, to: usize, from_number: u32) -> Vec<Outgoing> {
-        let missing = self.said.get(from_number as usize..).unwrap_or_default();
-        let again = |payload: &Vec<u8>| Outgoing { to: Some(to), payload: payload.clone() };
-        if !missing.is_empty() {
-            return missing.iter().map(again).collect();
+    /// Reads a message of another one.
+    fn read(&self, from: usize, bytes: &[u8]) -> Result<Wired<A::Message>, Unsound> {
+        let read = postcard::take_from_bytes::<Wired<A::Message>>(bytes);
+        let (wired, rest) = read.map_err(|_| Unsound::Form)?;
+        Unsound::Form.unless(rest.is_empty())?;
+        if let Wired::Said(number, message) = &wired {
+            Unsound::Round.unless(*number < self.most.messages)?;
+            self.agent.check(from, message)?;
         }
-        let nothing = if self.is_done() { Packet::<A::Message>::Done } else { Packet::Wait };
-        vec![again(&bytes_of(&nothing))]
+        Ok(wired)
     }
 
-    fn go_on_without(&mut self, other: usize, is_settled: bool) -> Vec<Outgoing> {
-        if self.others[other].gone {
-            return Vec::new();
+    fn answer(&mut self, to: usize, from_number: u32) {
+        let missing = self.said.get(from_number as usize..).unwrap_or_default().to_vec();
+        if missing.is_empty() {
+            let nothing =
+                if self.agent.is_done() { Wired::<A::Message>::Done } else { Wired::Wait };
+            self.tell(to, Draft::of(&nothing));
         }
-        self.others[other].gone = true;
-        let said = self.agent.without(other, is_settled);
-        self.say(said)
+        missing.into_iter().for_each(|message| self.tell(to, message));
     }
 
-    /// Asks those that it waits for, if it has waited long enough, and gives up those that never
-    /// answer.
-    fn on_timer(&mut self, tick: u64) -> Vec<Outgoing> {
-        if self.next_timer().is_none_or(|due| due > tick) {
-            return Vec::new();
+    fn go_on_without(&mut self, other: usize, is_settled: bool) {
+        if !self.others[other].gone {
+            self.others[other].gone = true;
+            let said = self.agent.without(other, is_settled);
+            self.say(said);
         }
-        self.quiet_since = tick;
-        let mut out = Vec::new();
-        let waited = (tick - self.began) as f64;
-        let has_time = waited < self.agent.waits_until() * self.radio.ticks as f64;
-        for j in self.agent.awaits() {
-            let Patience { tries, first_tries, .. } = self.radio.patience;
-            let is_expected = self.others[j].is_there || self.agent.expects(j);
-            let tries = if is_expected { tries } else { first_tries };
-            let other = &mut self.others[j];
-            if other.unanswered < tries && has_time {
-                other.unanswered += 1;
-                let payload = bytes_of(&Packet::<A::Message>::Ask(other.next));
-                out.push(Outgoing { to: Some(j), payload });
-            } else {
-                other.unheard = true;
-                out.extend(self.go_on_without(j, false));
-            }
-        }
-        out
-    }
-
-    /// Returns the tick in which its patience ends.
-    pub fn next_timer(&self) -> Option<u64> {
-        let ticks = self.radio.patience.ticks_for(self.largest);
-        (!self.is_done()).then(|| self.quiet_since.saturating_add(ticks))
     }
 
     /// Ends the talk of an airplane that nobody hears and that hears nobody.
@@ -307,19 +242,87 @@ impl<A: Agent> Endpoint<A> {
             self.go_on_without(j, false);
         }
     }
+}
 
-    /// Returns whether its agent has ended.
-    pub fn is_done(&self) -> bool {
-        self.agent.outcome().is_some()
+impl<A: Agent + Send> Party for Endpoint<A> {
+    fn start(&mut self, tick: u64) {
+        (self.began, self.quiet_since) = (tick, tick);
+        let first = self.agent.start();
+        self.say(first);
+        if self.radio.is_silent {
+            self.is_alone();
+        }
     }
 
-    /// Returns the count of its messages so far.
-    pub fn traffic(&self) -> Traffic {
-        self.traffic
+    fn on_message(&mut self, from: EntityId, bytes: &[u8], tick: u64) -> Result<(), Unsound> {
+        let place = self.radio.group.binary_search(&from).map_err(|_| Unsound::Airplane)?;
+        Unsound::Airplane.unless(place != self.radio.me)?;
+        let wired = self.read(place, bytes)?;
+        (self.others[place].unanswered, self.others[place].is_there) = (0, true);
+        self.largest = self.largest.max(HEADER_BYTES + bytes.len());
+        match wired {
+            Wired::Said(number, message) if self.others[place].takes(number) => {
+                self.quiet_since = tick;
+                let said = self.agent.on_message(place, message);
+                self.say(said);
+            }
+            Wired::Said(..) | Wired::Wait => {}
+            Wired::Ask(number) => self.answer(place, number),
+            // This answers a question for missing messages, so all of them have come.
+            Wired::Done => self.go_on_without(place, true),
+        }
+        Ok(())
     }
 
-    /// Returns the end of the talk.
-    pub fn end(mut self) -> Ended<A::Outcome> {
+    /// Asks those that it waits for, if it has waited long enough, and gives up those that never
+    /// answer.
+    fn on_timer(&mut self, tick: u64) {
+        if self.next_timer().is_none_or(|due| due > tick) {
+            return;
+        }
+        self.quiet_since = tick;
+        let waited = tick.saturating_sub(self.began) as f64;
+        let has_time = waited < self.agent.waits_until() * self.radio.ticks as f64;
+        for j in self.agent.awaits() {
+            let Patience { tries, first_tries, .. } = self.radio.patience;
+            let is_expected = self.others[j].is_there || self.agent.expects(j);
+            let tries = if is_expected { tries } else { first_tries };
+            let other = &mut self.others[j];
+            if other.unanswered < tries && has_time {
+                other.unanswered += 1;
+                let question = Draft::of(&Wired::<A::Message>::Ask(other.next));
+                self.tell(j, question);
+            } else {
+                other.unheard = true;
+                self.go_on_without(j, false);
+            }
+        }
+    }
+
+    /// Returns the tick in which its patience ends.
+    fn next_timer(&self) -> Option<u64> {
+        let ticks = self.radio.patience.ticks_for(self.largest);
+        (!self.is_done()).then(|| self.quiet_since.saturating_add(ticks))
+    }
+
+    fn is_done(&self) -> bool {
+        self.agent.is_done()
+    }
+
+    fn take_messages(&mut self) -> Vec<Outgoing> {
+        std::mem::take(&mut self.out)
+    }
+
+    fn most_bytes(&self) -> usize {
+        // Its number and kind come before it.
+        self.most.bytes + 16
+    }
+}
+
+impl<A: Agent + Send> Concludes for Endpoint<A> {
+    type Outcome = A::Outcome;
+
+    fn end(&mut self) -> Ended<A::Outcome> {
         if !self.is_done() {
             self.late = true;
             self.agent.at_deadline();

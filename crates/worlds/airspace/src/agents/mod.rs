@@ -2,16 +2,18 @@
 //!
 //! An agent owns its knowledge of its airplane and of others ([`OwnShip`]), the knowledge that all
 //! share ([`Briefing`]), and its part of the optimization. It is a state machine: messages in,
-//! messages out. An [`Endpoint`] is an agent together with the code that makes its messages arrive;
-//! it is stepped with any [`Transport`](sidestep_kernel::ports::Transport), in memory or between
-//! processes.
+//! messages out. An [`Endpoint`] is an agent together with the code that makes its messages arrive,
+//! a [`Party`] to a talk; a [`Talk`] makes packets of what it says, and lets through to it only what is
+//! sound. Which network carries the packets, in memory or between processes, none of them knows.
 //!
 //! | Module | What it does |
 //! |---|---|
 //! | [`sampling`] | the paper's Algorithm 1: samples, predicts, and shares both |
 //! | [`informed`] | sends all its possible ways once, and then only samples or distributions |
 //! | [`coordinator`] | migrates from airplane to airplane, and decides for all |
+//! | [`intent`] | tells what nobody can see, once, for methods that find headings |
 //! | [`exchange`] | the shield: whether plans are safe together |
+//! | [`packet`] | the bytes around every message, and what is dropped |
 //!
 //! No agent waits for ever: one that is not heard is presumed where it was last heard
 //! ([`contact`]).
@@ -20,16 +22,21 @@ pub mod contact;
 pub mod coordinator;
 pub mod exchange;
 pub mod informed;
+pub mod intent;
 mod link;
 pub mod network;
 mod own_ship;
+pub mod packet;
+mod party;
 pub mod sampling;
+mod talk;
 
 use contact::Beacon;
-pub(crate) use link::bytes_of;
-pub use link::{Agent, Ended, Endpoint, Radio};
+pub use link::{Agent, Ended, Endpoint, Most, Radio};
 pub use own_ship::{Briefing, Filed, OwnShip};
+pub use party::{Concludes, Outgoing, Party, Unsound};
 use serde::{Deserialize, Serialize};
+pub use talk::{Frame, Talk};
 
 /// Outcome of the optimization for an airplane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

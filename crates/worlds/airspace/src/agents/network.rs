@@ -32,6 +32,13 @@ impl Traffic {
         self.ticks += other.ticks;
     }
 
+    /// Adds the counts of the same talk by another one who took part in it.
+    pub(crate) fn add_beside(&mut self, other: Self) {
+        let ticks = self.ticks.max(other.ticks);
+        self.add(other);
+        self.ticks = ticks;
+    }
+
     /// Counts a message to `receivers` others.
     pub(crate) fn count(&mut self, receivers: usize, bytes: usize) {
         self.messages += receivers as u64;

@@ -2,7 +2,8 @@
 
 use super::Decided;
 use super::contact::{Beacon, Contact, Contacts};
-use crate::flight::{Action, Air, Known, Model, Point};
+use super::party::{Unsound, are_places};
+use crate::flight::{Action, Air, Known, Model, Point, Pose, Prediction};
 use crate::intruder::Intruder;
 use crate::objective::{Objective, Options};
 use crate::purpose;
@@ -20,6 +21,8 @@ pub struct Briefing {
     pub ids: Arc<[EntityId]>,
     /// The flights of the group as filed, in the order of the ids.
     pub filed: Vec<Filed>,
+    /// Where all see the airplanes of the group, in the order of the ids.
+    pub poses: Vec<Pose>,
     /// The air that all fly through.
     pub air: Air,
     /// The objective that is minimized.
@@ -43,6 +46,12 @@ pub struct Filed {
     pub actions: Vec<Action>,
     /// The knowledge that all others have of it before they have heard it.
     pub contact: Contact,
+    /// Its greatest speed in meters per second.
+    pub top_m_s: f64,
+    /// Largest number of way-points that it is to reach, whatever it is ordered.
+    pub most_way_points: usize,
+    /// Number of orders that it will be given.
+    pub orders: usize,
 }
 
 impl Briefing {
@@ -67,6 +76,78 @@ impl Briefing {
             &self.objective,
             self.air.timing.dtau_s,
         )
+    }
+
+    /// Returns the `k`-th uniform number in [0, 1) of an airplane's stream, which all can draw.
+    pub(super) fn uniform(&self, place: usize, k: u64) -> f64 {
+        purpose::sample(&self.streams, self.ids[place], self.now, k)
+    }
+
+    /// Returns the decision of an airplane's player after some rounds, of which the last `calm` were
+    /// calm; none, if it has not learned anything.
+    pub(super) fn decided(
+        &self,
+        place: usize,
+        player: &Player,
+        (rounds, calm): (u32, u32),
+    ) -> Option<Decided> {
+        let Settings { estimator, choice, stop, .. } = self.settings;
+        let drawn = match estimator {
+            Estimator::Exact => 0,
+            Estimator::Sampled { block, .. } => u64::from(rounds) * block as u64,
+        };
+        (!player.expected().is_empty()).then(|| Decided {
+            chosen: player.choose(choice, self.uniform(place, drawn)),
+            expected: player.expected().to_vec(),
+            rounds,
+            converged: calm >= stop.calm_rounds,
+            chances: player.q.clone(),
+        })
+    }
+
+    /// Checks a beacon of the airplane at a place.
+    ///
+    /// # Errors
+    /// When it is not where all see it, or cannot fly like that.
+    pub(super) fn admits(&self, place: usize, beacon: &Beacon) -> Result<(), Unsound> {
+        let Filed { contact: Contact { beacon: filed, .. }, top_m_s, .. } = &self.filed[place];
+        let model = |b: &Beacon| [b.omega_max_rad_s, b.orbit_rad_s, b.separation_m];
+        let is_filed = model(beacon) == model(filed) && beacon.pose == self.poses[place];
+        Unsound::Plan.unless(is_filed)?;
+        beacon.check(*top_m_s)
+    }
+
+    /// Checks some predicted ways.
+    ///
+    /// # Errors
+    /// When they are not `expected` ones of whole horizons.
+    pub(super) fn admits_ways(&self, ways: &[Prediction], expected: usize) -> Result<(), Unsound> {
+        Unsound::Length.unless(ways.len() == expected)?;
+        ways.iter().try_for_each(|way| {
+            let is_whole = way.points.len() == self.air.timing.horizon;
+            Unsound::Length.unless(is_whole && way.counted <= way.points.len())?;
+            Unsound::Number.unless(are_places(way.points.as_flattened().iter().copied()))
+        })
+    }
+
+    /// Checks how far somebody's probabilities have moved in a round: infinitely far before the first.
+    ///
+    /// # Errors
+    /// When there is no such round, or a distance is no number.
+    pub(super) fn admits_round(&self, round: u32, change: f64) -> Result<(), Unsound> {
+        Unsound::Round.unless(round <= self.settings.stop.max_rounds)?;
+        Unsound::Number.unless(change >= 0.0)
+    }
+
+    /// Returns the largest number of bytes of a message with this number of predicted ways.
+    pub(super) fn most_bytes(&self, ways: usize) -> usize {
+        let way_points = self.filed.iter().map(|filed| filed.most_way_points).max().unwrap_or(0);
+        512 + ways * (16 * self.air.timing.horizon + 20) + 16 * way_points
+    }
+
+    /// Returns the largest number of actions of any airplane of the group.
+    pub(super) fn most_actions(&self) -> usize {
+        self.filed.iter().map(|filed| filed.actions.len()).max().unwrap_or(0)
     }
 }
 
@@ -95,7 +176,7 @@ impl OwnShip {
     }
 
     pub(super) fn uniform(&self, k: u64) -> f64 {
-        purpose::sample(&self.briefing.streams, self.known.slot, self.briefing.now, k)
+        self.briefing.uniform(self.me, k)
     }
 
     /// Returns the next `block` samples of a player after `drawn`.
@@ -106,18 +187,7 @@ impl OwnShip {
     /// Returns the decision of a player of samples or of distributions after some rounds, of which
     /// the last `calm` were calm; none, if it has not learned anything.
     pub(super) fn decided(&self, player: &Player, rounds: u32, calm: u32) -> Option<Decided> {
-        let Settings { estimator, choice, stop, .. } = *self.settings();
-        let drawn = match estimator {
-            Estimator::Exact => 0,
-            Estimator::Sampled { block, .. } => u64::from(rounds) * block as u64,
-        };
-        (!player.expected().is_empty()).then(|| Decided {
-            chosen: player.choose(choice, self.uniform(drawn)),
-            expected: player.expected().to_vec(),
-            rounds,
-            converged: calm >= stop.calm_rounds,
-            chances: player.q.clone(),
-        })
+        self.briefing.decided(self.me, player, (rounds, calm))
     }
 
     /// Returns whether another one was heard lately, or is met for the first time.

@@ -1,8 +1,10 @@
 //! The paper's Algorithm 1: an agent per airplane that samples, predicts, and shares both.
 
+use super::Conclusion;
 use super::contact::Beacon;
+use super::link::{self, Most};
 use super::own_ship::OwnShip;
-use super::{Conclusion, link};
+use super::party::Unsound;
 use crate::flight::{Levels, Prediction};
 use crate::objective::{Options, own_costs};
 use serde::{Deserialize, Serialize};
@@ -216,7 +218,34 @@ impl link::Agent for Agent {
         said
     }
 
+    fn check(&self, from: usize, message: &Message) -> Result<(), Unsound> {
+        let briefing = &*self.own.briefing;
+        match message {
+            Message::Predictions { round, change, beacon, ways } => {
+                briefing.admits_round(*round, *change)?;
+                briefing.admits(from, beacon)?;
+                briefing.admits_ways(ways, self.block)
+            }
+            Message::Costs { round, costs } => {
+                briefing.admits_round(*round, 0.0)?;
+                Unsound::Length.unless(costs.len() == self.block)?;
+                // Large ones are taken, but not those whose sum is none.
+                Unsound::Number.unless(costs.iter().all(|cost| (0.0..1e60).contains(cost)))
+            }
+        }
+    }
+
+    fn most(&self) -> Most {
+        let bytes = self.own.briefing.most_bytes(self.block) + 8 * self.block;
+        // The ways of its samples and their costs in each round.
+        let rounds = self.own.settings().stop.max_rounds;
+        Most { bytes, messages: rounds.saturating_add(1).saturating_mul(2) }
+    }
+
     fn on_message(&mut self, from: usize, message: Message) -> Vec<Message> {
+        if self.decided.is_some() {
+            return Vec::new();
+        }
         let member = &mut self.members[from];
         match message {
             Message::Predictions { round, change, beacon, ways } => {
@@ -263,6 +292,10 @@ impl link::Agent for Agent {
 
     fn at_deadline(&mut self) {
         self.decide();
+    }
+
+    fn is_done(&self) -> bool {
+        self.decided.is_some()
     }
 
     fn outcome(&self) -> Option<Conclusion> {

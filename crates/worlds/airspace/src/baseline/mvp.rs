@@ -31,6 +31,18 @@ pub struct Resolving {
     heading_rad: f64,
 }
 
+impl Resolving {
+    /// The others, by rising slot.
+    pub(crate) fn with(&self) -> &[Slot] {
+        &self.with
+    }
+
+    /// The heading that resolves the conflicts with them, in radians.
+    pub(crate) fn heading_rad(&self) -> f64 {
+        self.heading_rad
+    }
+}
+
 /// A closest approach that two airplanes will have, or have had, if both fly straight on.
 struct Closest {
     /// The other's place then, seen from the airplane.

@@ -5,13 +5,12 @@
 //! step by step, each airplane as the method tells it to.
 
 use super::wishes::{by_turn, ways};
-use crate::Turn;
 use crate::baseline::{Moving, mvp, orca};
 use crate::flight::{Known, Pose, Stage};
 use crate::intruder::Intruder;
 use crate::shield::Way;
 use crate::world::{AirspaceWorld, Method};
-use sidestep_kernel::{Slot, math};
+use sidestep_kernel::math;
 
 /// Length in meters of the way ahead that stands for a heading.
 const AHEAD_M: f64 = 1e3;
@@ -19,25 +18,22 @@ const AHEAD_M: f64 = 1e3;
 /// Returns the ways that each airplane of a group may fly in the next `dt`: the one that the method
 /// wants, and then the others by how little they differ from it.
 pub(super) fn by_velocity(
-    turn: &Turn<'_>,
+    world: &AirspaceWorld,
     group: &[Known],
     intruders: &[Intruder],
+    memory: &mut [mvp::Resolving],
 ) -> Vec<Vec<Way>> {
-    let &Turn { world, state, .. } = turn;
-    let slots: Vec<Slot> = group.iter().map(|known| known.slot).collect();
-    let mut memory = state.take_resolving(&slots);
     let mut ahead = group.to_vec();
     let mut wanted = vec![Way::default(); group.len()];
     for k in 0..world.timing.points_per_dt() {
         let seconds = k as f64 * world.timing.dtau_s;
         let intruding: Vec<Moving> =
             intruders.iter().map(|one| intruding(world, one, seconds)).collect();
-        let headings = headings(world, &ahead, &intruding, &mut memory);
+        let headings = headings(world, &ahead, &intruding, memory);
         for ((known, way), heading_rad) in ahead.iter_mut().zip(&mut wanted).zip(headings) {
             way.omegas_rad_s.push(step(world, known, heading_rad));
         }
     }
-    state.put_resolving(&slots, memory);
     group.iter().zip(wanted).map(|(known, way)| beside(world, *known, way)).collect()
 }
 

@@ -1,199 +1,118 @@
-//! Agents of a group on a network in memory, which can lose, delay, double and reorder messages,
-//! cut links, and silence an airplane.
+//! Stations on a network, driven until all are done.
 //!
-//! Time on it passes in ticks: a message takes one, or more when it is delayed. Every draw depends
-//! on sender, receiver and tick, never on the order in which agents are visited.
+//! Time passes in ticks. A station does what is due when a packet comes or its time has come; all that happens
+//! between is skipped.
 
-use crate::agents::network::{Network, Patience, Traffic};
-use crate::agents::{Agent, Ended, Endpoint, Radio};
-use crate::purpose;
-use crate::state::AirspaceState;
-use crate::world::AirspaceWorld;
-use sidestep_kernel::distr::Chance;
-use sidestep_kernel::interrupt;
-use sidestep_kernel::math;
-use sidestep_kernel::ports::{Envelope, MemoryTransport, Transport};
-use sidestep_kernel::stream::Streams;
-use sidestep_kernel::{Cycle, EntityId};
-use std::collections::BTreeMap;
-use std::sync::Arc;
+use crate::agents::packet::Packet;
+use crate::pilot::Pilot;
+use sidestep_kernel::ports::{Envelope, Transport};
+use sidestep_kernel::{EntityId, interrupt};
 
-/// Patience of agents that wait for each other as long as it takes.
-const FOR_EVER: Patience =
-    Patience { ticks: u64::MAX, bits_per_tick: f64::INFINITY, tries: 1, first_tries: 1 };
+/// A program aboard an airplane, on a network that carries its packets.
+pub(super) trait Station {
+    /// Its airplane.
+    fn id(&self) -> EntityId;
 
-/// The topics of a `dt`, one after the other: each has ticks of its own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Topic {
-    /// The optimization.
-    Optimization,
-    /// The shield's exchange, which checks that the decisions are safe.
-    Shield,
+    /// Those that it talks with, itself among them.
+    fn group(&self) -> &[EntityId];
+
+    /// Takes a packet.
+    fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64);
+
+    /// Does what is due by a tick.
+    fn on_timer(&mut self, tick: u64);
+
+    /// Returns the tick in which something is due.
+    fn next_timer(&self) -> Option<u64>;
+
+    /// Takes out the packets that wait to be sent.
+    fn take_packets(&mut self) -> Vec<Packet>;
 }
 
-/// A network for one talk of a group.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Talk<'a> {
-    /// Faults of the network; with `None` it loses nothing, and agents wait as long as it takes.
-    pub(super) network: Option<&'a Network>,
-    /// Places of the airplanes; without them, all reach all.
-    pub(super) state: Option<&'a AirspaceState>,
-    pub(super) streams: Streams,
-    pub(super) topic: Topic,
-    pub(super) now: Cycle,
-    pub(super) at_s: f64,
-}
-
-impl<'a> Talk<'a> {
-    /// Returns the talk of a group in a cycle.
-    pub(super) fn new(
-        world: &'a AirspaceWorld,
-        state: &'a AirspaceState,
-        topic: Topic,
-        now: Cycle,
-    ) -> Self {
-        let (network, streams, at_s) = (world.network.as_ref(), world.streams, world.starts_s(now));
-        Self { network, state: Some(state), streams, topic, now, at_s }
+impl Station for Pilot {
+    fn id(&self) -> EntityId {
+        Pilot::id(self)
     }
 
-    /// Returns the tick in which the talk starts, and the one in which it ends at the latest.
-    pub(super) fn ticks(&self) -> (u64, u64) {
-        let Some(network) = self.network else { return (0, u64::MAX) };
-        let long = network.deadline_ticks();
-        let talk = 2 * self.now + self.topic as u64;
-        (talk * (long + 1), talk * (long + 1) + long)
+    fn group(&self) -> &[EntityId] {
+        Pilot::group(self)
     }
 
-    /// Returns whether an airplane's radio is dead during the talk.
-    pub(super) fn is_silent(&self, id: EntityId) -> bool {
-        self.network.is_some_and(|network| network.is_silent(id, self.at_s))
+    fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
+        Pilot::on_packet(self, from, bytes, tick);
     }
 
-    /// Returns how agents that do not answer are asked again; `None` where nothing is lost.
-    pub(super) fn patience(&self) -> Option<Patience> {
-        self.network.map(|network| match self.topic {
-            Topic::Optimization => network.short_patience(),
-            Topic::Shield => network.patience(),
-        })
+    fn on_timer(&mut self, tick: u64) {
+        Pilot::on_timer(self, tick);
     }
 
-    /// Returns an empty network with the faults of the scenario.
-    pub(super) fn transport(&self) -> Carrier<'a> {
-        let faults = self.network.map(Network::faults).unwrap_or_default();
-        let memory = MemoryTransport::new(self.streams, purpose::NETWORK, faults);
-        Carrier { memory, talk: *self, free_at: BTreeMap::new() }
+    fn next_timer(&self) -> Option<u64> {
+        Pilot::next_timer(self)
     }
 
-    /// Returns the time of a tick, in seconds after the start of the run: the optimization starts
-    /// with the cycle, and the shield's exchange when the optimization has to be over.
-    fn time_s(&self, network: &Network, tick: u64) -> f64 {
-        let before_s = if self.topic == Topic::Shield { network.deadline_s } else { 0.0 };
-        self.at_s + before_s + (tick - self.ticks().0) as f64 * network.latency_s
-    }
-
-    /// Returns the distance between two airplanes in meters, heights included.
-    fn apart_m(&self, [a, b]: [EntityId; 2]) -> f64 {
-        let Some(state) = self.state else { return 0.0 };
-        let [a, b] = [a, b].map(|id| &state.airplanes[id as usize]);
-        let ([ax, ay], [bx, by]) = (a.pose().at, b.pose().at);
-        let level_m = math::hypot(ax - bx, ay - by);
-        math::hypot(level_m, a.altitude_m.get() - b.altitude_m.get())
-    }
-
-    /// Returns whether the link of a message lets it through: it is not cut, within range, and not
-    /// in a burst that takes the message.
-    fn lets_through(&self, envelope: &Envelope) -> bool {
-        let Some(network) = self.network else { return true };
-        let &Envelope { cycle: tick, sender, receiver, sequence, .. } = envelope;
-        let (link, at_s) = ([sender, receiver], self.time_s(network, tick));
-        if !network.carries(link, at_s) || self.apart_m(link) > network.range_m {
-            return false;
-        }
-        let Some(bursts) = &network.bursts else { return true };
-        let words = self.streams.pair(sender, receiver, tick, purpose::BURST_LOSS, sequence);
-        !(Chance::new(bursts.loss).happens(words[0]) && bursts.is_on(&self.streams, link, at_s))
+    fn take_packets(&mut self) -> Vec<Packet> {
+        Pilot::take_packets(self)
     }
 }
 
-/// A network in memory, some of whose links may be cut.
-#[derive(Debug)]
-pub(super) struct Carrier<'a> {
-    memory: MemoryTransport,
-    talk: Talk<'a>,
-    /// Tick from which on each way of a link is free, where messages of some size take time.
-    free_at: BTreeMap<[EntityId; 2], f64>,
-}
-
-impl Carrier<'_> {
-    /// Returns the tick in which all of a message is on its way: its link carries one after the
-    /// other.
-    fn is_out_at(&mut self, envelope: &Envelope) -> u64 {
-        let bits_per_tick = self.talk.network.map_or(f64::INFINITY, Network::bits_per_tick);
-        if bits_per_tick == f64::INFINITY {
-            return envelope.cycle;
-        }
-        let free_at = self.free_at.entry([envelope.sender, envelope.receiver]).or_default();
-        let bits = 8.0 * envelope.payload.len() as f64;
-        *free_at = free_at.max(envelope.cycle as f64) + bits / bits_per_tick;
-        free_at.floor() as u64
-    }
-}
-
-impl Transport for Carrier<'_> {
-    fn send(&mut self, mut envelope: Envelope) {
-        let is_carried = self.talk.lets_through(&envelope);
-        // What is lost on the way takes its time on the link all the same.
-        envelope.cycle = self.is_out_at(&envelope);
-        if is_carried {
-            self.memory.send(envelope);
-        }
-    }
-
-    fn receive(&mut self, receiver: EntityId, now: Cycle) -> Vec<Envelope> {
-        self.memory.receive(receiver, now)
-    }
-}
-
-/// Lets agents talk until all are done or time is up; `agents[i]` is the agent of `ids[i]`.
-pub(super) fn run<A: Agent>(
-    talk: &Talk<'_>,
-    ids: &Arc<[EntityId]>,
-    agents: Vec<A>,
-) -> (Vec<Ended<A::Outcome>>, Traffic) {
-    let (begin, end) = talk.ticks();
-    let mut transport = talk.transport();
-    let radio = |me: usize| Radio {
-        group: ids.clone(),
-        me,
-        patience: talk.patience().unwrap_or(FOR_EVER),
-        ticks: end - begin,
-        is_silent: talk.is_silent(ids[me]),
-    };
-    let endpoint = |(me, agent)| Endpoint::new(agent, radio(me));
-    let mut endpoints: Vec<Endpoint<A>> = agents.into_iter().enumerate().map(endpoint).collect();
-    endpoints.iter_mut().for_each(|endpoint| endpoint.start(&mut transport, begin));
-    let mut now = begin;
-    while !endpoints.iter().all(Endpoint::is_done) {
+/// Drives stations, which have started in tick `begin`, until all are done, or nothing can happen any more.
+pub(super) fn drive<S: Station>(
+    transport: &mut impl Transport,
+    stations: &mut [S],
+    begin: u64,
+    is_done: impl Fn(&S) -> bool,
+) {
+    stations.iter_mut().for_each(|station| send(transport, station, begin));
+    while !stations.iter().all(&is_done) {
         interrupt::look();
-        let timers = endpoints.iter().filter_map(Endpoint::next_timer);
-        let next = timers.chain(transport.memory.next_arrival()).min().unwrap_or(end);
-        now = next.min(end);
-        if now == end {
-            break;
-        }
-        endpoints.iter_mut().for_each(|endpoint| endpoint.step(&mut transport, next));
+        let timers = stations.iter().filter_map(Station::next_timer);
+        let next = timers.chain(transport.next_arrival()).min();
+        // A time that never comes is none.
+        let Some(now) = next.filter(|now| *now < u64::MAX) else { return };
+        stations.iter_mut().for_each(|station| step(transport, station, now));
     }
-    let mut traffic = Traffic { ticks: now - begin, ..Traffic::default() };
-    endpoints.iter().for_each(|endpoint| traffic.add(endpoint.traffic()));
-    (endpoints.into_iter().map(Endpoint::end).collect(), traffic)
+}
+
+/// Hands a station the packets that have reached it by a tick, and sends what it answers.
+fn step<S: Station>(transport: &mut impl Transport, station: &mut S, now: u64) {
+    for Envelope { sender, payload, .. } in transport.receive(station.id(), now) {
+        station.on_packet(sender, &payload, now);
+        send(transport, station, now);
+    }
+    station.on_timer(now);
+    send(transport, station, now);
+}
+
+/// Sends what waits to be sent.
+fn send<S: Station>(transport: &mut impl Transport, station: &mut S, now: u64) {
+    let sender = station.id();
+    for Packet { to, sequence, payload } in station.take_packets() {
+        let mut to_one = |receiver: EntityId, payload: Vec<u8>| {
+            transport.send(Envelope { cycle: now, sender, sequence, receiver, payload });
+        };
+        match to {
+            Some(receiver) => to_one(receiver, payload),
+            None => {
+                let others = station.group().iter().filter(|&&id| id != sender);
+                others.for_each(|&receiver| to_one(receiver, payload.clone()));
+            }
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::faulty::Faulty;
     use super::*;
-    use crate::agents::network::Silence;
+    use crate::agents::network::{Network, Silence};
+    use crate::agents::{Agent, Concludes, Ended, Endpoint, Frame, Most, Radio, Talk, Unsound};
+    use crate::pilot::{Schedule, TalkId, Topic, patience};
+    use crate::purpose;
     use proptest::prelude::*;
     use sidestep_kernel::Seed;
+    use sidestep_kernel::ports::MemoryTransport;
+    use sidestep_kernel::stream::Streams;
+    use std::sync::Arc;
 
     /// Sends a number in each of some rounds, and adds up the numbers of all; one that is given up
     /// counts 1000 from then on.
@@ -238,6 +157,14 @@ mod tests {
             vec![(0, self.number())]
         }
 
+        fn check(&self, _: usize, (round, _): &Self::Message) -> Result<(), Unsound> {
+            Unsound::Round.unless(*round < self.rounds)
+        }
+
+        fn most(&self) -> Most {
+            Most { bytes: 16, messages: self.rounds }
+        }
+
         fn on_message(
             &mut self,
             from: usize,
@@ -266,14 +193,64 @@ mod tests {
             self.is_over = true;
         }
 
+        fn is_done(&self) -> bool {
+            self.is_over || self.round == self.rounds
+        }
+
         fn outcome(&self) -> Option<u64> {
-            (self.is_over || self.round == self.rounds).then_some(self.sum)
+            self.is_done().then_some(self.sum)
         }
     }
 
-    fn talk(network: Option<&Network>, seed: u64) -> Talk<'_> {
-        let streams = Streams::new(Seed(seed));
-        Talk { network, state: None, streams, topic: Topic::Optimization, now: 3, at_s: 15.0 }
+    /// An agent that talks until it is done.
+    struct Alone {
+        talk: Talk<dyn Concludes<Outcome = u64>>,
+        out: Vec<Packet>,
+        ended: Option<Ended<u64>>,
+    }
+
+    impl Alone {
+        fn settle(&mut self, tick: u64) {
+            if self.ended.is_none() && (self.talk.is_done() || tick >= self.talk.frame().ends) {
+                self.ended = Some(self.talk.end());
+            }
+        }
+    }
+
+    impl Station for Alone {
+        fn id(&self) -> EntityId {
+            self.talk.frame().me
+        }
+
+        fn group(&self) -> &[EntityId] {
+            &self.talk.frame().members
+        }
+
+        fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
+            self.settle(tick);
+            if !self.talk.frame().is_silent {
+                let (_, message) = crate::agents::packet::open(bytes, 0).expect("a packet");
+                self.talk.hear(from, message, tick, &mut self.out).expect("a message");
+            }
+            self.settle(tick);
+        }
+
+        fn on_timer(&mut self, tick: u64) {
+            self.settle(tick);
+            if self.ended.is_none() {
+                self.talk.on_timer(tick, &mut self.out);
+            }
+            self.settle(tick);
+        }
+
+        fn next_timer(&self) -> Option<u64> {
+            let ends = self.talk.frame().ends;
+            self.ended.is_none().then(|| self.talk.next_timer().map_or(ends, |due| due.min(ends)))
+        }
+
+        fn take_packets(&mut self) -> Vec<Packet> {
+            std::mem::take(&mut self.out)
+        }
     }
 
     fn network(loss: f64, max_delay_s: f64, silences: Vec<Silence>) -> Network {
@@ -293,10 +270,37 @@ mod tests {
         }
     }
 
+    /// Lets agents talk in cycle 3.
     fn sums(network: Option<&Network>, seed: u64, group: usize, rounds: u32) -> Vec<Ended<u64>> {
-        let ids: Arc<[u32]> = (0..group as u32).map(|id| 3 * id).collect();
-        let agents = (0..group).map(|me| Adder::new(me, group, rounds)).collect();
-        run(&talk(network, seed), &ids, agents).0
+        let members: Arc<[u32]> = (0..group as u32).map(|id| 3 * id).collect();
+        let (schedule, streams) = (Schedule::of_cycle(3, network), Streams::new(Seed(seed)));
+        let (begins, ends) = schedule.of(Topic::Decision, schedule.begins);
+        let station = |me: usize| {
+            let id = members[me];
+            let is_silent = network.is_some_and(|network| network.is_silent(id, 15.0));
+            let (ticks, patience) = (ends - begins, patience(network, Topic::Decision));
+            let radio = Radio { group: members.clone(), me, patience, ticks, is_silent };
+            let frame = Frame {
+                id: TalkId::new(3, Topic::Decision, &members),
+                members: members.clone(),
+                me: id,
+                fingerprint: 0,
+                begins,
+                ends,
+                is_silent,
+            };
+            let party = Box::new(Endpoint::new(Adder::new(me, group, rounds), radio));
+            let mut talk: Talk<dyn Concludes<Outcome = u64>> = Talk::new(frame, party);
+            let mut out = Vec::new();
+            talk.start(begins, &mut out);
+            Alone { talk, out, ended: None }
+        };
+        let mut stations: Vec<Alone> = (0..group).map(station).collect();
+        let faults = network.map(Network::faults).unwrap_or_default();
+        let memory = MemoryTransport::new(streams, purpose::NETWORK, faults);
+        let mut faulty = Faulty::with(memory, (network, streams), None, (15.0, schedule));
+        drive(&mut faulty, &mut stations, begins, |station| station.ended.is_some());
+        stations.into_iter().map(|station| station.ended.expect("all end")).collect()
     }
 
     proptest! {

@@ -11,47 +11,24 @@
 //!   integrated mechanism) and reads an airplane's model only while it is there.
 //! - `hierarchical-pim`: a coordinator for each part of the group, and one above them.
 //!
-//! [`crate::agents`] are the programs aboard; a deployment builds those of a group and a network in
-//! memory for them, and drives them (`drive.rs`). The shield's data goes over the same network
-//! (`shield.rs`).
+//! The programs aboard are [`crate::agents`], and a [`Pilot`](crate::pilot::Pilot) goes with them through the
+//! talks of a cycle. Here those of a group are run over a network in memory (`group.rs`) that has the
+//! faults of the scenario (`faulty.rs`), by a loop that knows neither (`drive.rs`).
 
 mod drive;
+mod ether;
+mod faulty;
+mod group;
 mod kind;
-mod optimization;
-mod shield;
 #[cfg(test)]
 mod silence;
 
-use super::agents::Ended;
-use super::agents::contact::Contacts;
-use super::events::{Event, EventKind};
-use super::world::AirspaceWorld;
+pub use ether::Ether;
+pub(crate) use group::flown;
+#[cfg(test)]
+pub(crate) use group::fly_all;
 pub use kind::Deployment;
 pub(crate) use kind::refuses;
-pub(crate) use optimization::optimized;
-pub use optimization::{brief, own_ship};
-pub(crate) use shield::shielded;
-use sidestep_kernel::{Cycle, EntityId};
-
-/// Notes how a talk has ended for an airplane, and which others it no longer hears.
-fn note_end<O>(
-    world: &AirspaceWorld,
-    now: Cycle,
-    end: &Ended<O>,
-    (me, ids): (usize, &[EntityId]),
-    contacts: &Contacts,
-    events: &mut Vec<Event>,
-) {
-    let heard_in = |other: &EntityId| match contacts.get(other) {
-        Some(contact) => contact.heard_in,
-        None => world.appears_in(*other as usize),
-    };
-    let lost = end.unheard.iter().map(|&place| ids[place]).filter(|id| heard_in(id) + 1 >= now);
-    events.extend(lost.map(|other| Event::of_pair(now, EventKind::Unheard, ids[me], other)));
-    if end.late {
-        events.push(Event::of(now, EventKind::Deadline, ids[me]));
-    }
-}
 
 #[cfg(test)]
 mod tests {

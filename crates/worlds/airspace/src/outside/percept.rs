@@ -168,8 +168,7 @@ fn neighbors(turn: &Turn<'_>, own: &Known, all: &[Seen]) -> Vec<Neighbor> {
     nearest.sort_unstable_by(|(a_m, a), (b_m, b)| a_m.total_cmp(b_m).then(a.slot.cmp(&b.slot)));
     nearest.truncate(MOST_NEIGHBORS);
     let named = state.named_with(own.slot);
-    // The state is a copy, so nobody misses what is taken out of it; others of the group do not ask for it.
-    let contacts = state.take_contacts(&[own.slot]).pop().unwrap_or_default();
+    let contacts = state.contacts(own.slot);
     let separation_m = world.stage(own.slot, own.orders).model.separation_m;
     let neighbor = |(_, seen): (f64, &Seen)| Neighbor {
         seen: *seen,

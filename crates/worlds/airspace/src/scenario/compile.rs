@@ -1,6 +1,7 @@
 //! From a scenario's sections to an immutable world.
 
 use super::{AirspaceFile, Compiled, Preset, Recipe};
+use crate::agents::packet::fingerprint;
 use crate::baseline::Reactive;
 use crate::deploy::refuses;
 use crate::flight::Levels;
@@ -133,6 +134,7 @@ impl<'a> Compiler<'a> {
             replay_cycles: replay.cycles,
             disturbance: self.disturbance(),
             bounds: self.bounds(),
+            fingerprint: fingerprint(&self.recipe.source.text, self.seed),
             streams,
             actions: Arc::default(),
             later: Arc::default(),

@@ -35,7 +35,7 @@
 //!
 //! By induction over `dt` no pair that is not named ever loses separation. A wind that all know
 //! moves everybody alike and changes no distance. `errors.rs` has what errors of place and heading
-//! add to `R`, and `act/avoid.rs` what holds beside airplanes that mind nobody. Each step is a
+//! add to `R`, and `avoid.rs` what holds beside airplanes that mind nobody. Each step is a
 //! property test in `tests.rs`, the whole one in `promise.rs`.
 //!
 //! Airplanes that turn at different rates orbit at one rate, which all can fly (`common_rates`).

@@ -3,6 +3,7 @@
 use crate::agents::contact::Contacts;
 use crate::baseline::mvp::Resolving;
 use crate::flight::Pose;
+use crate::pilot::Control;
 use crate::shield::Side;
 use crate::wish::Wish;
 use serde::{Deserialize, Serialize};
@@ -66,6 +67,8 @@ pub struct Snapshot {
     pub held: Vec<Pose>,
     /// The wish that was ordered of each airplane; empty unless airplanes are decided from outside.
     pub wishes: Vec<Option<Wish>>,
+    /// What airplanes do in the cycle that comes next, if that was handed over by those who decide outside.
+    pub handed: Option<Vec<Control>>,
 }
 
 impl Snapshot {
@@ -109,6 +112,10 @@ impl Snapshot {
             self.airplanes.iter().for_each(|a| hasher.u64(a.turn_rate_rad_s.to_bits()));
             let wishes = postcard::to_stdvec(&self.wishes).expect("wishes are plain data");
             wishes.iter().for_each(|&byte| hasher.u8(byte));
+        }
+        if let Some(handed) = &self.handed {
+            let handed = postcard::to_stdvec(handed).expect("controls are plain data");
+            handed.iter().for_each(|&byte| hasher.u8(byte));
         }
         hasher.finish()
     }

@@ -1,20 +1,41 @@
 //! The scene as all airplanes of a group see it before they exchange their plans.
 
+use super::Proposal;
+use crate::agents::contact::Beacon;
+use crate::agents::party::{Unsound, are_places};
 use crate::flight::Air;
-use crate::shield::Flyer;
+use crate::shield::{Certainty, Flyer, Way};
 use sidestep_kernel::stream::philox4x32;
 use sidestep_kernel::{Cycle, EntityId};
 
 /// Number of cycles after which airplanes take turns.
 const TURN_CYCLES: Cycle = 12;
+/// Bound on headings in radians that anybody tells.
+const FARTHEST_RAD: f64 = 1e6;
 
-/// An airplane as others see it.
+/// An airplane as others see it, and as they know it from its filed plan.
 #[derive(Debug, Clone)]
 pub struct Seen {
-    /// Its place, its model, and its stored fallback.
+    /// Its place, and its model. Of others, the fallback is known only where they are seen to be on it, and
+    /// neither rank nor names are.
     pub flyer: Flyer,
-    /// Whether it is seen to be on that fallback.
+    /// Whether it is seen to be on its fallback.
     pub orbits: bool,
+    /// Its greatest speed in meters per second.
+    pub top_m_s: f64,
+    /// Largest number of different ways that it can propose.
+    pub most_ways: usize,
+}
+
+impl Seen {
+    /// Checks a beacon of this airplane.
+    fn admits(&self, beacon: &Beacon) -> Result<(), Unsound> {
+        let Flyer { pose, omega_max_rad_s, orbit_rad_s, separation_m, .. } = self.flyer;
+        let told = [beacon.omega_max_rad_s, beacon.orbit_rad_s, beacon.separation_m];
+        let is_filed = told == [omega_max_rad_s, orbit_rad_s, separation_m];
+        Unsound::Plan.unless(is_filed && beacon.pose == pose)?;
+        beacon.check(self.top_m_s)
+    }
 }
 
 /// The scene as all of a group see it, and numbers on which they have agreed, before they exchange
@@ -27,6 +48,10 @@ pub struct Scene {
     pub vertical_m: f64,
     /// The present cycle.
     pub now: Cycle,
+    /// Whether all hear all, and fly what they have planned.
+    pub certainty: Certainty,
+    /// Number of all airplanes, also of those that are not in the group.
+    pub airplanes: usize,
     /// All airplanes of the group as they can be seen, by rising id.
     pub seen: Vec<Seen>,
 }
@@ -39,11 +64,50 @@ impl Scene {
     /// other's reach. Among equals all go first in turn.
     pub fn goes_first(&self, place: usize, other: usize) -> bool {
         let key = |place: usize| {
-            let Seen { flyer, orbits } = &self.seen[place];
+            let Seen { flyer, orbits, .. } = &self.seen[place];
             (*orbits, turn(flyer.id, self.now), flyer.id)
         };
         key(place) < key(other)
     }
+
+    /// Checks the proposal of the airplane at a place.
+    pub(super) fn admits(&self, place: usize, proposal: &Proposal) -> Result<(), Unsound> {
+        let Proposal { beacon, held, named, ways, .. } = proposal;
+        self.seen[place].admits(beacon)?;
+        let is_held = held.heading_rad.abs() < FARTHEST_RAD && are_places(held.at);
+        Unsound::Number.unless(is_held)?;
+        let are_known = named.iter().all(|&id| (id as usize) < self.airplanes);
+        Unsound::Airplane.unless(are_known && rises(named))?;
+        Unsound::Length.unless(ways.len() <= self.seen[place].most_ways)?;
+        ways.iter().try_for_each(|way| self.admits_way(place, way))
+    }
+
+    /// Checks a way that the airplane at a place may fly.
+    pub(super) fn admits_way(&self, place: usize, way: &Way) -> Result<(), Unsound> {
+        let most_rad_s = self.seen[place].flyer.omega_max_rad_s;
+        Unsound::Length.unless(way.omegas_rad_s.len() == self.air.timing.points_per_dt())?;
+        // Nothing compares with what is no number.
+        Unsound::Number.unless(way.omegas_rad_s.iter().all(|omega| omega.abs() <= most_rad_s))
+    }
+
+    /// Checks a list of members of the group.
+    pub(super) fn admits_members(&self, ids: &[EntityId]) -> Result<(), Unsound> {
+        let is_member =
+            |id: &EntityId| self.seen.binary_search_by_key(id, |seen| seen.flyer.id).is_ok();
+        Unsound::Airplane.unless(rises(ids) && ids.iter().all(is_member))
+    }
+
+    /// Returns the largest number of bytes of a message of the exchange.
+    pub(super) fn most_bytes(&self) -> usize {
+        let ways = self.seen.iter().map(|seen| seen.most_ways).max().unwrap_or(0);
+        let way = 8 * self.air.timing.points_per_dt() + 5;
+        256 + ways * way + 5 * self.airplanes
+    }
+}
+
+/// Returns whether ids rise, so that none stands among them twice.
+fn rises(ids: &[EntityId]) -> bool {
+    ids.windows(2).all(|pair| pair[0] < pair[1])
 }
 
 /// Returns a number by which airplanes take turns: drawn without a seed, because all have to know it,

@@ -26,7 +26,7 @@ struct Merit {
 }
 
 /// An airplane among intruders.
-pub(super) struct Beset<'a> {
+pub(crate) struct Beset<'a> {
     flyer: &'a Flyer,
     /// Intruders on its levels.
     intruders: Vec<&'a Intruder>,
@@ -34,18 +34,18 @@ pub(super) struct Beset<'a> {
 }
 
 impl<'a> Beset<'a> {
-    pub(super) fn new(flyer: &'a Flyer, all: &'a [Intruder], dtau_s: f64) -> Self {
+    pub(crate) fn new(flyer: &'a Flyer, all: &'a [Intruder], dtau_s: f64) -> Self {
         let minds = |one: &&Intruder| one.levels.meets(&flyer.levels, flyer.vertical_m);
         Self { flyer, intruders: all.iter().filter(minds).collect(), dtau_s }
     }
 
     /// Returns the ways that an airplane may fly, by their places in `wishes`: those that are better
     /// than its fallback. Ways without fault keep their order, the others follow by merit.
-    pub(super) fn allowed(&self, wishes: &[Way], fallback: &Way) -> Vec<usize> {
+    pub(crate) fn allowed(&self, wishes: &[Way], fallback: impl FnOnce() -> Way) -> Vec<usize> {
         if self.intruders.is_empty() {
             return (0..wishes.len()).collect();
         }
-        let least = self.merit(fallback);
+        let least = self.merit(&fallback());
         let faultless = Merit { is_clear: true, spare_m: 0.0 };
         let merits = wishes.iter().map(|way| self.merit(way)).enumerate();
         let mut better: Vec<(usize, Merit)> =
@@ -56,7 +56,7 @@ impl<'a> Beset<'a> {
     }
 
     /// Returns the intruders that could come too near on a way within `dt`.
-    pub(super) fn reached_by<'b>(
+    pub(crate) fn reached_by<'b>(
         &'b self,
         way: &'b Way,
     ) -> impl Iterator<Item = &'a Intruder> + 'b {

@@ -1,0 +1,169 @@
+//! The table of a fleet's nodes while they fly, in 80 columns.
+
+use crate::console::Console;
+use crate::progress::Bar;
+use sidestep_session::fleet::{FleetNow, NodeNow};
+use std::fmt::Write;
+use std::io::{IsTerminal, Write as _};
+use std::time::{Duration, Instant};
+
+/// Time between two tables where there is no terminal to draw one over the other.
+const BETWEEN: Duration = Duration::from_secs(5);
+
+/// Lines of a terminal that a table leaves free.
+const FREE_LINES: usize = 4;
+
+/// A fleet on the terminal: a table, or a bar.
+pub(crate) struct Shown {
+    console: Console,
+    is_table: bool,
+    is_terminal: bool,
+    bar: Option<Bar>,
+    /// Number of lines of the table that stands there.
+    lines: usize,
+    next: Instant,
+}
+
+impl Shown {
+    /// Shows a table, or only progress.
+    pub(crate) fn new(console: Console, is_table: bool) -> Self {
+        let is_terminal = std::io::stderr().is_terminal();
+        Self { console, is_table, is_terminal, bar: None, lines: 0, next: Instant::now() }
+    }
+
+    /// Shows the fleet as it is now.
+    pub(crate) fn show(&mut self, now: &FleetNow) {
+        if !self.is_table {
+            let new = || Bar::of_cycles(self.console, 0, now.cycles);
+            self.bar.get_or_insert_with(new).at(now.cycle);
+            return;
+        }
+        if !self.is_terminal && Instant::now() < self.next {
+            return;
+        }
+        self.next = Instant::now() + BETWEEN;
+        let height =
+            terminal_size::terminal_size().map_or(usize::MAX, |(_, height)| height.0.into());
+        let text = table(now, height.saturating_sub(FREE_LINES));
+        let mut out = std::io::stderr().lock();
+        let over = match self.lines {
+            // Up to its first line, and all below away.
+            lines if self.is_terminal && lines > 0 => format!("\x1b[{lines}F\x1b[J"),
+            _ => String::new(),
+        };
+        self.lines = text.lines().count();
+        let _ = write!(out, "{over}{text}").and_then(|()| out.flush());
+    }
+
+    /// Takes the bar away; the last table stays.
+    pub(crate) fn clear(&mut self) {
+        if let Some(bar) = self.bar.take() {
+            bar.clear();
+        }
+    }
+}
+
+/// Returns the table of a fleet in so many lines at most: nodes in trouble come first where not all fit.
+fn table(now: &FleetNow, most_lines: usize) -> String {
+    let mut nodes: Vec<&NodeNow> = now.nodes.iter().collect();
+    let room = most_lines.saturating_sub(3).max(1);
+    if nodes.len() > room {
+        nodes.sort_by_key(|node| {
+            (node.state != "gone", std::cmp::Reverse(node.late), node.airplane)
+        });
+    }
+    let mut text = heading(now);
+    text.push_str(
+        "airplane  state    epoch  heard  round   flown   late  silent   msg/s     kB/s\n",
+    );
+    for node in nodes.iter().take(room) {
+        text.push_str(&row(node, now.nodes.len()));
+    }
+    if nodes.len() > room {
+        let _ = writeln!(text, "and {} more", nodes.len() - room);
+    }
+    text
+}
+
+fn heading(now: &FleetNow) -> String {
+    if !now.has_begun {
+        let there = now.nodes.iter().filter(|node| node.state != "awaited").count();
+        return format!("{there} of {} nodes are there\n", now.nodes.len());
+    }
+    let ms = |time: Option<f64>| time.map_or("-".into(), |ms| format!("{ms}"));
+    let (p50, p99) = (ms(now.talk_p50_ms), ms(now.talk_p99_ms));
+    let late =
+        if now.late_cycles > 0 { format!(", {} late", now.late_cycles) } else { String::new() };
+    format!(
+        "cycle {} of {}{late}; talks within {p50} ms (half), {p99} ms (99 %)\n",
+        now.cycle, now.cycles
+    )
+}
+
+fn row(node: &NodeNow, all: usize) -> String {
+    let heard = format!("{}/{}", node.heard, all.saturating_sub(1));
+    let silent = node.silent_s.map_or("-".into(), |s| format!("{s:.1} s"));
+    format!(
+        "{:>8}  {:<8} {:>5}  {heard:>5}  {:>5} {:>7} {:>6} {silent:>7} {:>7.0} {:>8.1}\n",
+        node.airplane,
+        node.state.chars().take(8).collect::<String>(),
+        node.epoch,
+        node.round,
+        node.flown,
+        node.late,
+        node.packets_per_s,
+        node.bytes_per_s / 1e3,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fleet(count: u32) -> FleetNow {
+        let node = |airplane| NodeNow {
+            airplane,
+            state: if airplane == 7 { "gone" } else { "decide" }.into(),
+            epoch: 12,
+            heard: 49,
+            round: 1234,
+            flown: 123_456,
+            late: 9999,
+            packets_per_s: 99_999.0,
+            bytes_per_s: 12_345_678.9,
+            silent_s: Some(123.4),
+            ..NodeNow::default()
+        };
+        let nodes = (0..count).map(node).collect();
+        let times = (Some(0.5), Some(2000.0));
+        FleetNow {
+            cycle: 123_456,
+            cycles: 1_000_000,
+            has_begun: true,
+            late_cycles: 1234,
+            talk_p50_ms: times.0,
+            talk_p99_ms: times.1,
+            nodes,
+        }
+    }
+
+    #[test]
+    fn a_table_fits_80_columns_and_its_columns_stand_below_their_heads() {
+        let text = table(&fleet(50), usize::MAX);
+        assert_eq!(text.lines().count(), 52);
+        for line in text.lines() {
+            assert!(line.chars().count() <= 80, "{line}");
+        }
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[1].chars().count(), lines[2].chars().count(), "{text}");
+    }
+
+    #[test]
+    fn where_not_all_fit_nodes_in_trouble_come_first_and_the_others_are_counted() {
+        let text = table(&fleet(50), 10);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 10);
+        assert!(lines[2].trim_start().starts_with("7  gone"), "{text}");
+        assert_eq!(lines[9], "and 43 more");
+    }
+}

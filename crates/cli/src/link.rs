@@ -1,0 +1,188 @@
+//! The program `sidestep-link`, which alone carries the network: found, started, told what to do, and ended.
+
+use crate::exit::Failure;
+use crate::interrupt;
+use clap::Args;
+use sidestep::kernel::InputError;
+use sidestep_session::fleet::{Common, Failed, Flown, Job, PROGRAM, Tls, Told};
+use std::io::{BufRead, BufReader, Write};
+use std::path::PathBuf;
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::Duration;
+
+/// Variable with the path of the program, for who has it elsewhere.
+const VARIABLE: &str = "SIDESTEP_LINK";
+
+/// Time between two looks at whether to end.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Options of the server and of nodes.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct LinkArgs {
+    /// Seconds after which a party that is not heard is taken to be gone
+    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = seconds)]
+    lease: f64,
+
+    /// Show metrics in Prometheus' format to who asks at this address, e.g. 127.0.0.1:9100
+    #[arg(long, value_name = "HOST:PORT")]
+    metrics: Option<String>,
+
+    /// Log to standard error from this level on: off, error, warn, info, debug or trace
+    #[arg(long, value_name = "LEVEL", default_value = "warn")]
+    log: String,
+
+    /// Write each line of the log as a JSON object
+    #[arg(long)]
+    log_json: bool,
+
+    /// Certificate of the authority that has signed those of all parties (PEM)
+    #[arg(long, value_name = "FILE", requires_all = ["tls_cert", "tls_key"], help_heading = "Encryption")]
+    tls_ca: Option<PathBuf>,
+
+    /// Certificate of this party (PEM)
+    #[arg(long, value_name = "FILE", requires = "tls_ca", help_heading = "Encryption")]
+    tls_cert: Option<PathBuf>,
+
+    /// Private key of this party (PEM)
+    #[arg(long, value_name = "FILE", requires = "tls_ca", help_heading = "Encryption")]
+    tls_key: Option<PathBuf>,
+}
+
+/// Parses a time in seconds, from 0.1 to a day.
+fn seconds(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|s| (0.1..=86_400.0).contains(s));
+    number.ok_or_else(|| "give seconds from 0.1 to 86400".into())
+}
+
+impl LinkArgs {
+    /// Returns the settings for a scenario.
+    pub(crate) fn common(&self, file: PathBuf, overrides: Vec<String>) -> Common {
+        let files = (self.tls_ca.clone(), self.tls_cert.clone(), self.tls_key.clone());
+        let tls = match files {
+            (Some(authority), Some(certificate), Some(key)) => {
+                Some(Tls { authority, certificate, key })
+            }
+            // The command line gives all of them or none.
+            _ => None,
+        };
+        let build = sidestep_session::build().into();
+        Common {
+            flown: Flown { file, overrides, build },
+            tls,
+            lease_s: self.lease,
+            metrics: self.metrics.clone(),
+            json_log: self.log_json,
+            log: self.log.clone(),
+        }
+    }
+
+    /// Returns the protocol of endpoints.
+    pub(crate) fn protocol(&self) -> &'static str {
+        if self.tls_ca.is_some() { "tls" } else { "tcp" }
+    }
+}
+
+/// Returns the program: as the variable says, beside this one, or on the path.
+fn find() -> Result<PathBuf, InputError> {
+    let named = std::env::var_os(VARIABLE).map(PathBuf::from);
+    let file = format!("{PROGRAM}{}", std::env::consts::EXE_SUFFIX);
+    let beside = std::env::current_exe().ok().map(|own| own.with_file_name(&file));
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let on_path = std::env::split_paths(&path).map(|folder| folder.join(&file));
+    let found = match named {
+        Some(named) => Some(named).filter(|path| path.is_file()),
+        None => beside.into_iter().chain(on_path).find(|path| path.is_file()),
+    };
+    found.ok_or_else(|| {
+        let cause = "it is not there; it alone carries the network, so it is a program of its own";
+        let remedy = format!(
+            "get it with `cargo install --path crates/link`, or build it beside sidestep with \
+             `cargo build --release -p {PROGRAM}`; {VARIABLE} may name its path"
+        );
+        InputError::new(PROGRAM, cause, remedy)
+    })
+}
+
+/// Lets the program do a job, and hands what it tells to `take`. Ctrl-C asks it to end in good order.
+///
+/// # Errors
+/// When it is not there, cannot do it, or ends before it is done.
+pub(crate) fn run(job: &Job, mut take: impl FnMut(Told)) -> Result<(), Failure> {
+    interrupt::listen()?;
+    let mut child = start()?;
+    let told = listen(&mut child);
+    let mut stdin = child.stdin.take();
+    say(stdin.as_mut(), job);
+    let mut failed = None;
+    loop {
+        match told.recv_timeout(LOOK) {
+            Ok(Told::Failed(why)) => failed = Some(why),
+            Ok(told) => take(told),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+        if interrupt::requested() {
+            // The program ends when nobody is left who could say more.
+            drop(stdin.take());
+        }
+    }
+    let status = child.wait().map_err(|e| cannot_start(&e))?;
+    ending(status, failed)
+}
+
+fn start() -> Result<Child, Failure> {
+    let mut command = Command::new(find()?);
+    command.stdin(Stdio::piped()).stdout(Stdio::piped());
+    // Ctrl-C in a terminal comes to this process, which asks the program to end.
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
+    command.spawn().map_err(|e| cannot_start(&e))
+}
+
+fn cannot_start(error: &std::io::Error) -> Failure {
+    let remedy = format!("see whether it can be executed: {PROGRAM} --version");
+    Failure::stopped(format!("cannot start {PROGRAM}: {error}"), remedy)
+}
+
+/// Hands over the job. A program that has ended at once says why by itself.
+fn say(stdin: Option<&mut ChildStdin>, job: &Job) {
+    let mut line = serde_json::to_string(job).expect("jobs are plain data");
+    line.push('\n');
+    if let Some(stdin) = stdin {
+        let _ = stdin.write_all(line.as_bytes()).and_then(|()| stdin.flush());
+    }
+}
+
+/// Returns what the program tells, as it does.
+fn listen(child: &mut Child) -> Receiver<Told> {
+    let (sender, told) = channel();
+    let out = child.stdout.take();
+    std::thread::spawn(move || {
+        for line in
+            out.into_iter().flat_map(|out| BufReader::new(out).lines()).map_while(Result::ok)
+        {
+            if let Ok(one) = serde_json::from_str(&line)
+                && sender.send(one).is_err()
+            {
+                return;
+            }
+        }
+    });
+    told
+}
+
+fn ending(status: ExitStatus, failed: Option<Failed>) -> Result<(), Failure> {
+    match failed {
+        Some(failed) => Err(failed.into_error()),
+        None if status.success() => Ok(()),
+        None if interrupt::requested() => Err(Failure::Interrupted),
+        None => {
+            let remedy = "its nodes end by themselves; a folder of --out continues with `sidestep resume DIR`";
+            Err(Failure::stopped(
+                format!("{PROGRAM} has ended before it was done ({status})"),
+                remedy,
+            ))
+        }
+    }
+}

@@ -1,0 +1,238 @@
+//! What a fleet costs: a round of a team, a whole super-conflict beside one process, memory and bytes of nodes.
+//!
+//! Percentiles, and ratios within one run: `cargo bench -p sidestep-link`. Words choose: `round`, `conflict`, `nodes`.
+
+use sidestep::scenario::Source;
+use sidestep::worlds::WORLDS;
+use sidestep_link::wire::zenoh::{ZenohWire, hold};
+use sidestep_link::wire::{Party, Wire};
+use sidestep_link::words::{Life, Member};
+use sidestep_session::fleet::{Clock, Common, FleetJob, FleetNow, Flown, Job, Told, Topology};
+use sidestep_session::{Journey, Keep, Unwatched};
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::{Arc, Barrier};
+use std::time::{Duration, Instant};
+
+const LONG: Duration = Duration::from_secs(60);
+
+fn main() {
+    let words: Vec<String> =
+        std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
+    let is_wanted = |name: &str| words.is_empty() || words.iter().any(|word| word == name);
+    if is_wanted("round") {
+        rounds(10, 2_000);
+    }
+    if is_wanted("conflict") {
+        conflict(10);
+    }
+    if is_wanted("nodes") {
+        nodes(50, Duration::from_secs(60));
+    }
+}
+
+/// Prints the time of a round in which each of a team hears all others.
+fn rounds(team: u32, rounds: usize) {
+    let free = || hold("tcp/127.0.0.1:0").expect("a free port");
+    let server = free().endpoint;
+    let _server = ZenohWire::server(std::slice::from_ref(&server), None).expect("a server");
+    let held: Vec<_> = (0..team).map(|_| free()).collect();
+    let members: Vec<Member> = (0..)
+        .zip(&held)
+        .map(|(agent, held)| Member { agent, life: Life(0), listens: vec![held.endpoint.clone()] })
+        .collect();
+    drop(held);
+    let barrier = Arc::new(Barrier::new(team as usize));
+    let nodes: Vec<_> = (0..team)
+        .map(|agent| {
+            let (server, members, barrier) = (server.clone(), members.clone(), barrier.clone());
+            std::thread::spawn(move || {
+                let me = Party::Node(agent);
+                let wire = ZenohWire::node(me, &[server], None, LONG).expect("it answers");
+                let own = members[agent as usize].listens.iter();
+                let held = own.map(|endpoint| hold(endpoint).expect("free")).collect();
+                let mut wire = wire.listening(held);
+                wire.join(agent, &members).expect("a mesh");
+                barrier.wait();
+                meet(&mut wire, agent, team);
+                barrier.wait();
+                (0..rounds as u32)
+                    .map(|round| one_round(&mut wire, (agent, team), round + 1))
+                    .collect::<Vec<_>>()
+            })
+        })
+        .collect();
+    let times = nodes.into_iter().map(|node| node.join().expect("no panic"));
+    let mut times: Vec<Duration> = times.flatten().collect();
+    times.sort_unstable();
+    let at = |part: f64| 1e3 * times[(part * (times.len() - 1) as f64) as usize].as_secs_f64();
+    println!(
+        "one round of a team of {team}, 500 B, all hear all: p50 {:.2} ms, p99 {:.2} ms",
+        at(0.5),
+        at(0.99)
+    );
+}
+
+/// A frame of a round: its number, the sender, and as many bytes as a small message has.
+fn frame(round: u32, agent: u32) -> Vec<u8> {
+    let mut frame = [round.to_le_bytes(), agent.to_le_bytes()].concat();
+    frame.resize(500, 0);
+    frame
+}
+
+fn number(bytes: &[u8]) -> u32 {
+    u32::from_le_bytes(std::array::from_fn(|k| bytes[k]))
+}
+
+/// Says something until all others have been heard, and lets them hear it, too.
+fn meet(wire: &mut dyn Wire, agent: u32, team: u32) {
+    let mut heard = BTreeMap::new();
+    let until = Instant::now() + LONG;
+    while heard.len() + 1 < team as usize && Instant::now() < until {
+        say(wire, agent, team, 0);
+        while let Some(bytes) = wire.receive(Duration::from_millis(20)) {
+            heard.insert(number(&bytes[4..]), ());
+        }
+    }
+    assert!(heard.len() + 1 == team as usize, "not all are there");
+    say(wire, agent, team, 0);
+    std::thread::sleep(Duration::from_millis(500));
+    while wire.receive(Duration::from_millis(50)).is_some() {}
+}
+
+fn say(wire: &mut dyn Wire, agent: u32, team: u32, round: u32) {
+    let frame = frame(round, agent);
+    (0..team)
+        .filter(|other| *other != agent)
+        .for_each(|other| wire.send(Party::Node(other), &frame));
+}
+
+fn one_round(wire: &mut dyn Wire, (agent, team): (u32, u32), round: u32) -> Duration {
+    thread_local! {
+        static EARLY: std::cell::RefCell<BTreeMap<u32, u32>> = const { std::cell::RefCell::new(BTreeMap::new()) };
+    }
+    let began = Instant::now();
+    say(wire, agent, team, round);
+    EARLY.with_borrow_mut(|heard| {
+        while heard.get(&round).copied().unwrap_or(0) + 1 < team {
+            let bytes = wire.receive(LONG).expect("nothing is lost on loopback");
+            *heard.entry(number(&bytes)).or_default() += 1;
+        }
+        heard.remove(&round);
+    });
+    began.elapsed()
+}
+
+fn text(n: u32, cycles: u64) -> String {
+    format!(
+        "format = 1\nworld = \"airspace\"\nseed = 1\ncycles = {cycles}\n[airspace]\n\
+         deployment = \"compact-team\"\n[airspace.generator]\nkind = \"superconflict\"\nn = {n}\n"
+    )
+}
+
+fn job(folder: &Path, clock: Clock) -> FleetJob {
+    let build = sidestep_session::build().into();
+    let flown = Flown { file: folder.join("s.toml"), overrides: Vec::new(), build };
+    let (tls, metrics, log) = (None, None, "error".to_string());
+    FleetJob {
+        common: Common { flown, tls, lease_s: 30.0, metrics, json_log: false, log },
+        nodes: None,
+        clock,
+        topology: Topology::Mesh,
+        listen: vec!["tcp/127.0.0.1:0".into()],
+        out: None,
+        replace: false,
+        packets: false,
+    }
+}
+
+/// Flies a fleet; `look` may end it. Returns the digest, and the fleet at the end.
+fn fly(job: FleetJob, mut look: impl FnMut(&FleetNow) -> bool) -> (String, FleetNow) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sidestep-link"));
+    let mut child =
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("the program starts");
+    let mut stdin = child.stdin.take();
+    writeln!(stdin.as_mut().expect("a pipe"), "{}", serde_json::json!(Job::Fleet(job)))
+        .expect("told");
+    let mut ended = None;
+    for line in BufReader::new(child.stdout.take().expect("a pipe")).lines().map_while(Result::ok) {
+        match serde_json::from_str(&line).expect("a line that is known") {
+            Told::Fleet(now) if !look(&now) => drop(stdin.take()),
+            Told::Ended { summary, fleet, .. } => {
+                ended = Some((summary["digest"].as_str().unwrap_or_default().to_string(), fleet));
+            }
+            Told::Failed(failed) if !failed.is_interrupted => panic!("{failed:?}"),
+            _ => {}
+        }
+    }
+    child.wait().expect("it ends");
+    ended.expect("it has ended")
+}
+
+/// Prints the time of a whole super-conflict, as processes beside one process.
+fn conflict(n: u32) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = text(n, 1000);
+    std::fs::write(folder.path().join("s.toml"), &text).expect("written");
+    let source = Source::new("s.toml", &*text, "");
+    let compiled = WORLDS.compile(&source).expect("a scenario");
+    let mut ratios = Vec::new();
+    for _ in 0..3 {
+        let began = Instant::now();
+        let journey =
+            Journey::start(compiled.as_ref(), &source, 1, Keep::default(), None).expect("started");
+        let alone = journey.travel(&Unwatched).expect("flown");
+        let alone_s = began.elapsed().as_secs_f64();
+        let mut first = None;
+        let (digest, fleet) = fly(job(folder.path(), Clock::Lockstep), |now| {
+            // Processes start once, whatever the length of the flight.
+            first = first.or(now.has_begun.then(Instant::now));
+            true
+        });
+        let fleet_s = first.map_or(f64::NAN, |first| first.elapsed().as_secs_f64());
+        assert_eq!(digest, alone.digest, "the digest of one process");
+        ratios.push(fleet_s / alone_s);
+        let packets: u64 = fleet.nodes.iter().map(|node| node.packets).sum();
+        println!(
+            "a super-conflict of {n}, {} cycles: one process {alone_s:.2} s, {n} processes {fleet_s:.2} s, \
+             {packets} packets; talks p50 {:?} ms, p99 {:?} ms",
+            alone.cycles, fleet.talk_p50_ms, fleet.talk_p99_ms
+        );
+    }
+    ratios.sort_by(f64::total_cmp);
+    println!("  median of the ratios: {:.1}", ratios[1]);
+}
+
+/// Prints what many nodes take in real time: deadlines missed, memory, bytes.
+fn nodes(n: u32, flown_for: Duration) {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("s.toml"), text(n, 1_000_000)).expect("written");
+    let (mut first, mut rss_kb) = (None, Vec::new());
+    let (_, fleet) = fly(job(folder.path(), Clock::Realtime { speed: 1.0 }), |now| {
+        if now.has_begun {
+            let since = *first.get_or_insert(Instant::now());
+            rss_kb = now.nodes.iter().filter_map(|node| resident_kb(node.process?)).collect();
+            return since.elapsed() < flown_for;
+        }
+        true
+    });
+    let flown_s = flown_for.as_secs_f64();
+    let late: u64 = fleet.nodes.iter().map(|node| node.late).sum();
+    let bytes: u64 = fleet.nodes.iter().map(|node| node.bytes).sum();
+    println!(
+        "{n} nodes for {flown_s} s, {} cycles: {late} controls late, {} cycles of the server late; \
+         {:.0} bytes a node and second; memory of a node at most {:.1} MB",
+        fleet.cycle,
+        fleet.late_cycles,
+        bytes as f64 / f64::from(n) / flown_s,
+        rss_kb.iter().max().copied().unwrap_or(0) as f64 / 1e3,
+    );
+}
+
+fn resident_kb(process: u32) -> Option<u64> {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
+    line.split_whitespace().nth(1)?.parse().ok()
+}

@@ -1,0 +1,302 @@
+//! Mail of one party: notes, which may be lost, and letters, which are not, over one wire.
+
+use crate::post::Post;
+use crate::wire::{Party, Wire, WireError};
+use crate::words::{Body, Frame, Life, Member, Word};
+use sidestep::kernel::EntityId;
+use std::collections::BTreeMap;
+use std::hash::{BuildHasher, RandomState};
+use std::time::{Duration, Instant};
+
+/// Counts of a party's mail.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Frames sent.
+    pub frames: u64,
+    /// Bytes of those.
+    pub bytes: u64,
+    /// Letters that were sent again.
+    pub retries: u64,
+    /// Frames that were dropped, by reason.
+    pub dropped: BTreeMap<&'static str, u64>,
+}
+
+/// Another party, in its present life.
+#[derive(Debug)]
+struct Other {
+    life: Life,
+    post: Post,
+    /// Time at which it was heard last.
+    heard: Duration,
+}
+
+/// A word that has come.
+#[derive(Debug, PartialEq)]
+pub struct Heard {
+    /// The sender.
+    pub from: Party,
+    /// The sender's life.
+    pub life: Life,
+    /// The word.
+    pub word: Word,
+}
+
+/// A party's letters and notes to and from all others.
+pub struct Mail {
+    me: Party,
+    life: Life,
+    wire: Box<dyn Wire>,
+    began: Instant,
+    others: BTreeMap<Party, Other>,
+    counts: Counts,
+}
+
+impl Mail {
+    /// Returns the mail of a party in a new life.
+    pub fn new(me: Party, wire: Box<dyn Wire>) -> Self {
+        let began = Instant::now();
+        let (others, counts) = (BTreeMap::new(), Counts::default());
+        Self { me, life: new_life(), wire, began, others, counts }
+    }
+
+    /// Returns the party's own life.
+    pub fn life(&self) -> Life {
+        self.life
+    }
+
+    /// Returns the counts so far.
+    pub fn counts(&self) -> &Counts {
+        &self.counts
+    }
+
+    /// Whether all letters to another party have come, or it was not met.
+    pub fn has_delivered_to(&self, other: Party) -> bool {
+        self.others.get(&other).is_none_or(|other| other.post.has_delivered())
+    }
+
+    fn now(&self) -> Duration {
+        self.began.elapsed()
+    }
+
+    /// Begins to exchange letters with another party in a life of its. Letters that an earlier life has not
+    /// taken are lost with it.
+    pub fn meet(&mut self, other: Party, life: Life) {
+        if self.others.get(&other).is_none_or(|known| known.life != life) {
+            let (post, heard) = (Post::default(), self.now());
+            self.others.insert(other, Other { life, post, heard });
+        }
+    }
+
+    /// Ends the exchange with another party; what it has not taken is lost.
+    pub fn part(&mut self, other: Party) {
+        self.others.remove(&other);
+    }
+
+    /// Returns how long another party, that was met, was not heard.
+    pub fn silent_for(&self, other: Party) -> Option<Duration> {
+        let heard = self.others.get(&other)?.heard;
+        Some(self.now().saturating_sub(heard))
+    }
+
+    /// Whether all letters to all others have come.
+    pub fn has_delivered(&self) -> bool {
+        self.others.values().all(|other| other.post.has_delivered())
+    }
+
+    /// Sends a word that may be lost.
+    pub fn note(&mut self, to: Party, word: Word) {
+        let received = self.others.get_mut(&to).map_or(0, |other| other.post.received());
+        self.fly(to, received, Body::Note(word));
+    }
+
+    /// Sends a word that is repeated until it has come; lost if the other was not met.
+    pub fn letter(&mut self, to: Party, word: Word) {
+        let now = self.now();
+        let Some(other) = self.others.get_mut(&to) else {
+            self.drop_for("stranger");
+            return;
+        };
+        let number = other.post.send(word.clone(), now);
+        let received = other.post.received();
+        self.fly(to, received, Body::Letter(number, word));
+    }
+
+    fn fly(&mut self, to: Party, received: u64, body: Body) {
+        let to_life = self.others.get(&to).map(|other| other.life);
+        let frame = Frame { from: self.me, life: self.life, to_life, received, body }.encode();
+        self.counts.frames += 1;
+        self.counts.bytes += frame.len() as u64;
+        self.wire.send(to, &frame);
+    }
+
+    fn drop_for(&mut self, reason: &'static str) {
+        *self.counts.dropped.entry(reason).or_default() += 1;
+    }
+
+    /// Sends what is due: letters again, and that letters have come.
+    fn tend(&mut self) {
+        let now = self.now();
+        let is_due = |other: &Other| other.post.next_due().is_some_and(|at| at <= now);
+        let due: Vec<Party> =
+            self.others.iter().filter(|(_, other)| is_due(other)).map(|(&who, _)| who).collect();
+        for to in due {
+            let Some(other) = self.others.get_mut(&to) else { continue };
+            let due = other.post.due(now);
+            let received = other.post.received();
+            self.counts.retries += due.again.len() as u64;
+            for (number, word) in due.again {
+                self.fly(to, received, Body::Letter(number, word));
+            }
+            if due.acknowledge {
+                self.fly(to, received, Body::Received);
+            }
+        }
+    }
+
+    /// Makes the straight ways from this node to all others, where there are any.
+    ///
+    /// # Errors
+    /// When an endpoint cannot be had.
+    pub fn join(&mut self, me: EntityId, members: &[Member]) -> Result<(), WireError> {
+        self.wire.join(me, members)
+    }
+
+    /// Returns the next word that comes within some time; none if none does. Words come in the order in which
+    /// their sender has sent them, but for notes. Of parties that were not met, only notes come.
+    pub fn receive(&mut self, within: Duration) -> Option<Heard> {
+        let until = self.now().saturating_add(within);
+        loop {
+            self.tend();
+            let now = self.now();
+            let due = self.others.values().filter_map(|other| other.post.next_due()).min();
+            let wait = due.map_or(until, |due| due.min(until)).saturating_sub(now);
+            if let Some(bytes) = self.wire.receive(wait) {
+                if let Some(heard) = self.hear(&bytes) {
+                    return Some(heard);
+                }
+            } else if self.now() >= until {
+                return None;
+            }
+        }
+    }
+
+    fn hear(&mut self, bytes: &[u8]) -> Option<Heard> {
+        let frame = match Frame::decode(bytes) {
+            Ok(frame) => frame,
+            Err(reason) => {
+                self.drop_for(reason.word());
+                return None;
+            }
+        };
+        let Frame { from, life, to_life, received, body } = frame;
+        // It is to the process that was here before, whose letters had numbers of their own.
+        if to_life.is_some_and(|to| to != self.life) {
+            self.drop_for("former-life");
+            return None;
+        }
+        let now = self.now();
+        let known = self.others.get_mut(&from).filter(|other| other.life == life);
+        if let Some(other) = known {
+            other.heard = now;
+            if to_life.is_some() {
+                other.post.on_received(received, now);
+            }
+            if let Body::Letter(number, _) = body
+                && !other.post.takes(number, now)
+            {
+                self.drop_for("out-of-order");
+                return None;
+            }
+        } else if !matches!(body, Body::Note(_)) {
+            self.drop_for("stranger");
+            return None;
+        }
+        match body {
+            Body::Received => None,
+            Body::Note(word) | Body::Letter(_, word) => Some(Heard { from, life, word }),
+        }
+    }
+}
+
+/// Returns a number that no other life has.
+fn new_life() -> Life {
+    // The standard library seeds its hash maps from the system's source of randomness.
+    Life(RandomState::new().hash_one(std::process::id()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::memory::Exchange;
+
+    const SOON: Duration = Duration::from_millis(1);
+    const LATER: Duration = Duration::from_secs(20);
+
+    /// A wire that loses the first frames.
+    struct Lossy {
+        wire: Box<dyn Wire>,
+        lost: usize,
+    }
+
+    impl Wire for Lossy {
+        fn send(&mut self, to: Party, frame: &[u8]) {
+            match self.lost {
+                0 => self.wire.send(to, frame),
+                _ => self.lost -= 1,
+            }
+        }
+
+        fn receive(&mut self, within: Duration) -> Option<Vec<u8>> {
+            self.wire.receive(within)
+        }
+    }
+
+    fn mail(exchange: &Exchange, me: Party, lost: usize) -> Mail {
+        Mail::new(me, Box::new(Lossy { wire: Box::new(exchange.wire(me)), lost }))
+    }
+
+    #[test]
+    fn a_letter_whose_frame_is_lost_comes_all_the_same_and_a_note_does_not() {
+        let exchange = Exchange::default();
+        let (a, b) = (Party::Server, Party::Node(3));
+        let (mut first, mut second) = (mail(&exchange, a, 2), mail(&exchange, b, 0));
+        first.meet(b, second.life());
+        second.meet(a, first.life());
+        first.note(b, Word::Hello);
+        first.letter(b, Word::End);
+        assert_eq!(second.receive(SOON), None, "both frames were lost");
+        std::thread::scope(|scope| {
+            let sends = scope.spawn(move || {
+                while !first.has_delivered() {
+                    first.receive(SOON);
+                }
+                first.counts().retries
+            });
+            let heard = second.receive(LATER).expect("it is sent again");
+            assert_eq!((heard.from, heard.word), (a, Word::End));
+            while !sends.is_finished() {
+                assert_eq!(second.receive(SOON), None, "it comes once");
+            }
+            assert!(sends.join().expect("no panic") >= 1);
+        });
+    }
+
+    #[test]
+    fn frames_to_an_earlier_life_and_letters_of_strangers_are_dropped_and_counted() {
+        let exchange = Exchange::default();
+        let (a, b) = (Party::Server, Party::Node(3));
+        let (mut first, mut second) = (mail(&exchange, a, 0), mail(&exchange, b, 0));
+        first.meet(b, Life(17));
+        first.letter(b, Word::End);
+        assert_eq!(second.receive(SOON), None);
+        assert_eq!(second.counts().dropped["former-life"], 1);
+        let life = second.life();
+        first.meet(b, life);
+        first.letter(b, Word::End);
+        assert_eq!(second.receive(SOON), None, "it has not met the server");
+        assert_eq!(second.counts().dropped["stranger"], 1);
+        exchange.wire(Party::Node(9)).send(b, b"something else");
+        assert_eq!(second.receive(SOON), None);
+        assert_eq!(second.counts().dropped["foreign"], 1);
+    }
+}

@@ -1,0 +1,238 @@
+//! The node of an agent: it joins a fleet, and carries percepts, packets and controls between the wire and the
+//! agent's program.
+//!
+//! ```text
+//! join.rs      asks the server until it may       turn.rs    one cycle of the agent
+//! ```
+
+mod join;
+mod turn;
+
+use crate::mail::{Heard, Mail};
+use crate::ports::{Channel, Program};
+use crate::wire::{Party, WireError};
+use crate::words::{Begin, Clock, Member, Packet, Refusal, Status, Welcome, Word};
+pub use join::{Asked, join};
+use sidestep::kernel::EntityId;
+use std::time::{Duration, Instant};
+use turn::{Ends, Turn};
+
+/// Time between two reports of a node.
+const REPORT: Duration = Duration::from_millis(500);
+
+/// Time after which it looks around, at most.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Most packets that are kept for a cycle that has not begun here: those beyond are lost.
+const MOST_EARLY: usize = 100_000;
+
+/// The end of a node before the fleet's.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NodeError {
+    /// The server does not take it.
+    #[error("{}", .0.cause)]
+    Refused(Refusal),
+    /// There is no wire.
+    #[error(transparent)]
+    Wire(#[from] WireError),
+    /// The server is not there, or no longer.
+    #[error("the server was not heard for {0} s")]
+    Silence(u64),
+    /// A percept cannot be read.
+    #[error("the server has sent a percept that cannot be read: {0}")]
+    Percept(String),
+}
+
+/// A node that has joined a fleet.
+pub struct Node {
+    agent: EntityId,
+    mail: Mail,
+    program: Box<dyn Program>,
+    channel: Option<Box<dyn Channel>>,
+    clock: Clock,
+    logs_packets: bool,
+    lease: Duration,
+    members: Vec<Member>,
+    is_ready: bool,
+    turn: Option<Turn>,
+    /// Packets of a cycle that has not begun here.
+    early: Vec<(EntityId, Packet)>,
+    status: Status,
+    report_at: Instant,
+    /// Told how the node is, as often as the server.
+    looks: Box<dyn FnMut(EntityId, &Status)>,
+}
+
+impl Node {
+    /// Returns a node of an agent that may join, with its program and the faults of what it sends.
+    pub fn new(
+        agent: EntityId,
+        mail: Mail,
+        (program, channel): (Box<dyn Program>, Option<Box<dyn Channel>>),
+        welcome: &Welcome,
+        lease: Duration,
+    ) -> Self {
+        Self {
+            agent,
+            mail,
+            program,
+            channel,
+            clock: welcome.clock,
+            logs_packets: welcome.logs_packets,
+            lease,
+            members: Vec::new(),
+            is_ready: false,
+            turn: None,
+            early: Vec::new(),
+            status: Status::default(),
+            report_at: Instant::now(),
+            looks: Box::new(|_, _| {}),
+        }
+    }
+
+    /// Tells somebody else, too, how the node is, twice a second.
+    #[must_use]
+    pub fn watched(self, looks: impl FnMut(EntityId, &Status) + 'static) -> Self {
+        Self { looks: Box::new(looks), ..self }
+    }
+
+    /// Takes part in the fleet until the server ends it.
+    ///
+    /// # Errors
+    /// When the server is gone, or says what makes no sense.
+    pub fn run(mut self) -> Result<Status, NodeError> {
+        loop {
+            let wait = self.turn.as_ref().and_then(|turn| turn.wait(self.program.as_ref()));
+            if let Some(heard) = self.mail.receive(wait.unwrap_or(LOOK).min(LOOK)) {
+                if self.hear(heard)? {
+                    self.leave();
+                    return Ok(self.status);
+                }
+            }
+            self.go_on();
+            self.report();
+            let silent = self.mail.silent_for(Party::Server);
+            if silent.is_some_and(|silent| silent > self.lease) {
+                return Err(NodeError::Silence(self.lease.as_secs()));
+            }
+        }
+    }
+
+    /// Says what is left to say, and waits a little until it has come.
+    fn leave(&mut self) {
+        if let Some(turn) = &mut self.turn {
+            turn.hand_over_log(&mut self.mail);
+        }
+        self.mail.letter(Party::Server, Word::Left);
+        let until = Instant::now() + REPORT;
+        while !self.mail.has_delivered_to(Party::Server) && Instant::now() < until {
+            self.mail.receive(LOOK);
+        }
+    }
+
+    /// Takes a word. Returns whether the fleet has ended.
+    fn hear(&mut self, Heard { from, word, .. }: Heard) -> Result<bool, NodeError> {
+        match (from, word) {
+            (Party::Server, Word::End) => return Ok(true),
+            (Party::Server, Word::Roster(members)) => self.meet(members)?,
+            (Party::Server, Word::Begin(begin)) => self.begin(begin)?,
+            (Party::Server, Word::Tick(tick)) => {
+                if let Some(turn) = &mut self.turn {
+                    turn.on_tick(tick);
+                }
+            }
+            (Party::Server, Word::Close(cycle)) => {
+                if let Some(turn) = self.turn.as_mut().filter(|turn| turn.cycle() == cycle) {
+                    turn.close();
+                }
+            }
+            (Party::Node(from), Word::Packet(packet)) => self.on_packet(from, packet),
+            // `Hello` has come, which was all that it was for; others say only what is above.
+            _ => {}
+        }
+        Ok(false)
+    }
+
+    /// Begins a cycle.
+    fn begin(&mut self, begin: Begin) -> Result<(), NodeError> {
+        let begun = self.program.begin(begin.cycle, &begin.sight);
+        let first_tick = begun.map_err(NodeError::Percept)?;
+        self.status.cycle = begin.cycle;
+        let tick_s = self.channel.as_mut().map(|channel| {
+            channel.begin(begin.cycle);
+            channel.tick_s()
+        });
+        if let Some(turn) = &mut self.turn {
+            turn.hand_over_log(&mut self.mail);
+        }
+        let turn = Turn::new(begin, self.clock, tick_s, first_tick);
+        self.turn = Some(if self.logs_packets { turn.logged() } else { turn });
+        for (from, packet) in std::mem::take(&mut self.early) {
+            self.on_packet(from, packet);
+        }
+        Ok(())
+    }
+
+    /// Meets the other nodes, and finds out whether they hear it.
+    fn meet(&mut self, members: Vec<Member>) -> Result<(), NodeError> {
+        self.mail.join(self.agent, &members)?;
+        let is_new =
+            |member: &&Member| member.agent != self.agent && !self.members.contains(member);
+        for member in members.iter().filter(is_new) {
+            let party = Party::Node(member.agent);
+            self.mail.meet(party, member.life);
+            self.mail.letter(party, Word::Hello);
+        }
+        self.members = members;
+        Ok(())
+    }
+
+    fn on_packet(&mut self, from: EntityId, packet: Packet) {
+        match &mut self.turn {
+            Some(turn) if packet.cycle == turn.cycle() => turn.on_packet(from, packet),
+            // Another node may have heard of the cycle before this one.
+            turn if turn.as_ref().is_none_or(|turn| packet.cycle > turn.cycle()) => {
+                if self.early.len() < MOST_EARLY {
+                    self.early.push((from, packet));
+                }
+            }
+            // Of a talk that is over.
+            _ => {}
+        }
+    }
+
+    /// Does what can be done now.
+    fn go_on(&mut self) {
+        if !self.is_ready && !self.members.is_empty() && self.mail.has_delivered() {
+            self.is_ready = true;
+            self.mail.letter(Party::Server, Word::Ready);
+        }
+        if let Some(turn) = &mut self.turn {
+            let Self { program, channel, mail, .. } = self;
+            let channel = channel.as_deref_mut();
+            turn.go_on(&mut Ends { program: program.as_mut(), channel, mail });
+            let sent = turn.take_sent();
+            self.status.packets += sent.packets;
+            self.status.bytes += sent.bytes;
+        }
+    }
+
+    /// Tells the server how this node is, now and then.
+    fn report(&mut self) {
+        let now = Instant::now();
+        if now < self.report_at {
+            return;
+        }
+        self.report_at = now + REPORT;
+        let doing = self.program.doing();
+        let counts = self.mail.counts();
+        let dropped = counts.dropped.iter().map(|(&reason, &count)| (reason.to_string(), count));
+        self.status.doing = doing.word.into();
+        (self.status.round, self.status.epoch) = (doing.round, doing.epoch);
+        self.status.heard = self.program.heard();
+        self.status.retries = counts.retries;
+        self.status.dropped = dropped.chain(self.program.dropped()).collect();
+        (self.looks)(self.agent, &self.status);
+        self.mail.note(Party::Server, Word::Status(self.status.clone()));
+    }
+}

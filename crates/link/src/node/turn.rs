@@ -1,0 +1,284 @@
+//! One cycle of an agent at its node: packets out and in, until its control is there.
+
+use crate::mail::Mail;
+use crate::ports::{Channel, Outgoing, Program, Sent};
+use crate::wire::Party;
+use crate::words::{Begin, Clock, Control, Logged, Packet, Tick, Ticked, Word};
+use sidestep::kernel::{Cycle, EntityId};
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+/// The course of time within a cycle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Time {
+    /// None passes: packets arrive as they come, and nobody asks for any again.
+    Still,
+    /// In ticks that the server counts.
+    Counted,
+    /// By a clock that runs so many times as fast as others.
+    Running(f64),
+}
+
+/// The two ends of a turn: the agent's program, and the ways to others.
+pub(super) struct Ends<'a> {
+    pub(super) program: &'a mut dyn Program,
+    pub(super) channel: Option<&'a mut (dyn Channel + 'static)>,
+    pub(super) mail: &'a mut Mail,
+}
+
+/// A cycle of an agent.
+pub(super) struct Turn {
+    begin: Begin,
+    time: Time,
+    began: Instant,
+    first_tick: u64,
+    /// Tick of the last step.
+    tick: u64,
+    /// Duration of a tick, in seconds of the scenario.
+    tick_s: f64,
+    /// Number of its next packet.
+    sequence: u32,
+    /// Packets that have come, by the tick of their arrival.
+    arrived: BTreeMap<u64, Vec<(EntityId, Packet)>>,
+    /// Number of packets that the program has taken.
+    taken: u64,
+    /// The tick that it may go on to.
+    granted: Option<Tick>,
+    /// Packets that are delayed: by the time at which they leave, and in their order.
+    leaving: BTreeMap<(Instant, EntityId, u32), Packet>,
+    has_begun: bool,
+    is_closed: bool,
+    has_told: bool,
+    sent: Sums,
+    /// What it has sent, where all is recorded.
+    log: Option<Vec<Logged>>,
+}
+
+/// Packets and their bytes.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Sums {
+    pub(super) packets: u64,
+    pub(super) bytes: u64,
+}
+
+impl Turn {
+    /// Returns the turn that begins now; `tick_s` is how long a tick of the network takes, if there is one.
+    pub(super) fn new(begin: Begin, clock: Clock, tick_s: Option<f64>, first_tick: u64) -> Self {
+        let time = match clock {
+            Clock::Lockstep if tick_s.is_some() => Time::Counted,
+            Clock::Lockstep => Time::Still,
+            Clock::Realtime { speed } => Time::Running(speed),
+        };
+        Self {
+            begin,
+            time,
+            began: Instant::now(),
+            first_tick,
+            tick: first_tick,
+            tick_s: tick_s.unwrap_or(1e-3),
+            sequence: 0,
+            arrived: BTreeMap::new(),
+            taken: 0,
+            granted: None,
+            leaving: BTreeMap::new(),
+            has_begun: false,
+            is_closed: false,
+            has_told: false,
+            sent: Sums::default(),
+            log: None,
+        }
+    }
+
+    /// Returns the turn, which keeps what it sends.
+    pub(super) fn logged(self) -> Self {
+        Self { log: Some(Vec::new()), ..self }
+    }
+
+    /// Hands over what was sent since the last call.
+    pub(super) fn hand_over_log(&mut self, mail: &mut Mail) {
+        if let Some(log) = self.log.as_mut().filter(|log| !log.is_empty()) {
+            mail.letter(Party::Server, Word::Packets(std::mem::take(log)));
+        }
+    }
+
+    pub(super) fn cycle(&self) -> Cycle {
+        self.begin.cycle
+    }
+
+    /// Takes the count of what was sent since the last call.
+    pub(super) fn take_sent(&mut self) -> Sums {
+        std::mem::take(&mut self.sent)
+    }
+
+    pub(super) fn on_tick(&mut self, tick: Tick) {
+        self.granted = Some(tick).filter(|tick| tick.cycle == self.begin.cycle).or(self.granted);
+    }
+
+    pub(super) fn close(&mut self) {
+        self.is_closed = true;
+    }
+
+    pub(super) fn on_packet(&mut self, from: EntityId, packet: Packet) {
+        // Where time is not counted, a packet arrives when it comes.
+        let arrives = if self.time == Time::Counted { packet.arrives } else { 0 };
+        self.arrived.entry(arrives).or_default().push((from, packet));
+    }
+
+    /// Returns how long nothing is to do, unless something comes; none if that may be for ever.
+    pub(super) fn wait(&self, program: &dyn Program) -> Option<Duration> {
+        let Time::Running(speed) = self.time else { return None };
+        let leaves = self.leaving.keys().next().map(|&(at, ..)| at);
+        let timer = program.next_timer().and_then(|tick| self.instant(tick, speed));
+        let next = leaves.into_iter().chain(timer).min()?;
+        Some(next.saturating_duration_since(Instant::now()))
+    }
+
+    /// Returns the time of a tick, if a clock gets there.
+    fn instant(&self, tick: u64, speed: f64) -> Option<Instant> {
+        let ticks = tick.saturating_sub(self.first_tick) as f64;
+        let wait = Duration::try_from_secs_f64(ticks * self.tick_s / speed).ok()?;
+        self.began.checked_add(wait)
+    }
+
+    fn tick_now(&self, speed: f64) -> u64 {
+        let passed_s = self.began.elapsed().as_secs_f64() * speed;
+        // A little more, so that who waits for a tick is there when it ends.
+        self.first_tick + (passed_s / self.tick_s + 1e-6) as u64
+    }
+
+    /// Does what can be done now.
+    pub(super) fn go_on(&mut self, ends: &mut Ends<'_>) {
+        match self.time {
+            Time::Still => drop(self.step(u64::MAX, ends)),
+            Time::Counted => self.step_as_granted(ends),
+            Time::Running(speed) => {
+                self.tick = self.tick_now(speed).max(self.tick);
+                self.step(u64::MAX, ends);
+                self.let_leave(ends.mail);
+            }
+        }
+        // Where time is counted, messages are, too: until nobody has any more to say.
+        let may_tell = self.time != Time::Counted || self.is_closed;
+        if may_tell
+            && !self.has_told
+            && let Some(control) = ends.program.control()
+        {
+            self.has_told = true;
+            self.hand_over_log(ends.mail);
+            let control = Control { cycle: self.begin.cycle, control };
+            ends.mail.letter(Party::Server, Word::Control(control));
+        }
+    }
+
+    /// Goes on to the tick that the server has granted, once all packets that arrive by then are there.
+    fn step_as_granted(&mut self, ends: &mut Ends<'_>) {
+        let is_first = !std::mem::replace(&mut self.has_begun, true);
+        if !is_first {
+            let Some(tick) = self.granted else { return };
+            let due: usize =
+                self.arrived.range(..=tick.tick).map(|(_, packets)| packets.len()).sum();
+            if self.taken + (due as u64) < tick.packets {
+                return;
+            }
+            (self.granted, self.tick) = (None, tick.tick);
+        }
+        let sent = self.step(self.tick, ends);
+        let report = Ticked {
+            cycle: self.begin.cycle,
+            tick: self.tick,
+            sent,
+            timer: ends.program.next_timer(),
+            is_done: ends.program.is_done(),
+        };
+        ends.mail.letter(Party::Server, Word::Ticked(report));
+    }
+
+    /// Takes the packets that have arrived by a tick, does what is due, and sends what comes of it. Returns the
+    /// receivers of what was sent, with the ticks of arrival.
+    fn step(&mut self, by: u64, ends: &mut Ends<'_>) -> Vec<(EntityId, u64)> {
+        let later = by.checked_add(1).map(|next| self.arrived.split_off(&next));
+        let due = std::mem::replace(&mut self.arrived, later.unwrap_or_default());
+        let mut due: Vec<(EntityId, Packet)> = due.into_values().flatten().collect();
+        // As in one process, whatever the order in which they came.
+        due.sort_by_key(|(from, packet)| (packet.sent, *from, packet.sequence));
+        self.taken += due.len() as u64;
+        for (from, packet) in due {
+            ends.program.on_packet(from, &packet.payload, self.tick);
+        }
+        if self.time != Time::Still {
+            ends.program.on_timer(self.tick);
+        }
+        let mut sent = Vec::new();
+        for packet in ends.program.take_packets() {
+            self.send(packet, ends, &mut sent);
+        }
+        sent
+    }
+
+    /// Sends a packet to each of its receivers, with the faults that happen to it.
+    fn send(&mut self, packet: Outgoing, ends: &mut Ends<'_>, sent: &mut Vec<(EntityId, u64)>) {
+        let bytes = packet.payload.len();
+        // In real time the number is the sender's in the whole cycle, as all draws are for its first tick.
+        let (tick, sequence) = match self.time {
+            Time::Running(_) => (self.first_tick, self.sequence),
+            _ => (self.tick, packet.sequence),
+        };
+        self.sequence += 1;
+        for to in packet.to {
+            self.sent.packets += 1;
+            self.sent.bytes += bytes as u64;
+            let arrivals = match &mut ends.channel {
+                _ if self.begin.beyond.binary_search(&to).is_ok() => Vec::new(),
+                Some(channel) => channel.arrivals(&Sent { to, tick, sequence, bytes }),
+                None => vec![tick + 1],
+            };
+            self.note(to, (tick, sequence, bytes), &arrivals);
+            for arrives in arrivals {
+                let (cycle, payload) = (self.begin.cycle, packet.payload.clone());
+                let arrives = self.tick + (arrives - tick);
+                let packet = Packet { cycle, sent: self.tick, sequence, arrives, payload };
+                sent.push((to, arrives));
+                self.part(to, packet, ends.mail);
+            }
+        }
+    }
+
+    fn note(&mut self, to: EntityId, (tick, sequence, bytes): (u64, u32, usize), arrivals: &[u64]) {
+        let Some(log) = &mut self.log else { return };
+        let first = arrivals.iter().min();
+        log.push(Logged {
+            cycle: self.begin.cycle,
+            sent: self.tick,
+            to,
+            sequence,
+            bytes: bytes as u32,
+            copies: arrivals.len() as u32,
+            arrives: first.map_or(0, |at| self.tick + (at - tick)),
+        });
+    }
+
+    /// Lets a packet leave: at once, or after its delay.
+    fn part(&mut self, to: EntityId, packet: Packet, mail: &mut Mail) {
+        let Time::Running(speed) = self.time else {
+            // Nothing is lost here but what the scenario loses.
+            mail.letter(Party::Node(to), Word::Packet(packet));
+            return;
+        };
+        // A tick is what the real network takes.
+        let delay = (packet.arrives - packet.sent).saturating_sub(1);
+        if delay == 0 {
+            mail.note(Party::Node(to), Word::Packet(packet));
+            return;
+        }
+        let leaves = Instant::now() + Duration::from_secs_f64(delay as f64 * self.tick_s / speed);
+        self.leaving.insert((leaves, to, packet.sequence), packet);
+    }
+
+    fn let_leave(&mut self, mail: &mut Mail) {
+        let now = Instant::now();
+        while let Some(entry) = self.leaving.first_entry().filter(|entry| entry.key().0 <= now) {
+            let ((_, to, _), packet) = entry.remove_entry();
+            mail.note(Party::Node(to), Word::Packet(packet));
+        }
+    }
+}

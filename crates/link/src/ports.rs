@@ -1,0 +1,137 @@
+//! What a fleet needs of a world, and a node of its agent: both as bytes, so that any world can be flown.
+
+use crate::words::Begin;
+use sidestep::kernel::{Cycle, EntityId};
+
+/// The world of a fleet, at its server.
+pub trait Stage {
+    /// Returns the agents that have nodes, rising.
+    fn agents(&self) -> Vec<EntityId>;
+
+    /// Returns the cycle that comes next.
+    fn cycle(&self) -> Cycle;
+
+    /// Whether there is no further cycle.
+    fn is_over(&self) -> bool;
+
+    /// Duration of a cycle, in seconds of the scenario.
+    fn cycle_s(&self) -> f64;
+
+    /// Returns what each agent that decides in the cycle to come perceives, by rising id.
+    fn sights(&self) -> Vec<Sight>;
+
+    /// Makes the cycle to come with the controls of some agents; others do what is safe.
+    ///
+    /// # Errors
+    /// When it cannot be recorded. A control that makes no sense is returned with the reason, and its agent does
+    /// what is safe.
+    fn advance(
+        &mut self,
+        controls: Vec<(EntityId, Vec<u8>)>,
+    ) -> Result<Vec<Absurd>, sidestep_session::Error>;
+}
+
+/// What an agent perceives at the start of a cycle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sight {
+    /// The agent.
+    pub agent: EntityId,
+    /// Those who decide together in this cycle, the agent among them, rising.
+    pub group: Vec<EntityId>,
+    /// The percept, as it is sent.
+    pub begin: Begin,
+}
+
+/// A control that makes no sense.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Absurd {
+    /// The agent that sent it.
+    pub agent: EntityId,
+    /// The reason.
+    pub reason: String,
+}
+
+/// A packet that an agent sends.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Outgoing {
+    /// The receivers, rising.
+    pub to: Vec<EntityId>,
+    /// Its number among the sender's in the talk.
+    pub sequence: u32,
+    /// The content.
+    pub payload: Vec<u8>,
+}
+
+/// The part of a cycle in which an agent is, for people.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Doing {
+    /// A word for it, e.g. `optimize`.
+    pub word: &'static str,
+    /// Number of rounds so far.
+    pub round: u32,
+    /// Epoch of the coordinator that it follows.
+    pub epoch: u64,
+}
+
+/// The program of an agent: a state machine without a clock, a socket or a thread.
+pub trait Program: Send {
+    /// Begins a cycle with what the agent perceives; what it did in the one before is over. Returns the tick in
+    /// which the cycle begins.
+    ///
+    /// # Errors
+    /// When the percept cannot be read, with the reason.
+    fn begin(&mut self, cycle: Cycle, sight: &[u8]) -> Result<u64, String>;
+
+    /// Takes a packet of another agent.
+    fn on_packet(&mut self, from: EntityId, payload: &[u8], tick: u64);
+
+    /// Does what is due by a tick.
+    fn on_timer(&mut self, tick: u64);
+
+    /// Returns the tick of the next timer.
+    fn next_timer(&self) -> Option<u64>;
+
+    /// Takes the packets that it sends.
+    fn take_packets(&mut self) -> Vec<Outgoing>;
+
+    /// Whether its control is there.
+    fn is_done(&self) -> bool;
+
+    /// Returns its control, once it is there.
+    fn control(&self) -> Option<Vec<u8>>;
+
+    /// Returns what it does now.
+    fn doing(&self) -> Doing;
+
+    /// Returns the others that it has heard in this cycle, or in the one before if it has just begun.
+    fn heard(&self) -> Vec<EntityId>;
+
+    /// Returns counts of packets that it has dropped, by reason.
+    fn dropped(&self) -> Vec<(String, u64)>;
+}
+
+/// A packet on its way to one receiver.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sent {
+    /// The receiver.
+    pub to: EntityId,
+    /// The tick in which it is sent. In real time it is that in which the cycle began, so that the same packets
+    /// meet the same faults although they are not sent at the same times.
+    pub tick: u64,
+    /// Its number among the sender's in that tick.
+    pub sequence: u32,
+    /// Its size.
+    pub bytes: usize,
+}
+
+/// The faults of packets from one agent to others, drawn from the scenario's seed.
+pub trait Channel: Send {
+    /// Returns the ticks in which a packet arrives: none if it is lost, two if it is doubled.
+    fn arrivals(&mut self, sent: &Sent) -> Vec<u64>;
+
+    /// Duration of a tick, in seconds of the scenario.
+    fn tick_s(&self) -> f64;
+
+    /// Begins a cycle: links are free again.
+    fn begin(&mut self, cycle: Cycle);
+}

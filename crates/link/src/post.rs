@@ -1,0 +1,244 @@
+//! Letters between two parties: numbered, acknowledged, repeated until they have come, and taken in order.
+//!
+//! Whoever misses one drops those after it, and the sender repeats all of them (go back N). That is simple, and
+//! rare: frames are lost only where a link breaks or a queue is full.
+//!
+//! A state machine without a clock: the time is handed in, from any fixed start.
+
+use crate::words::Word;
+use std::collections::VecDeque;
+use std::time::Duration;
+
+/// Time after which a letter is first sent again.
+const FIRST_WAIT: Duration = Duration::from_millis(200);
+
+/// Longest time between two times that a letter is sent.
+const LONGEST_WAIT: Duration = Duration::from_secs(2);
+
+/// Time after which a letter is acknowledged, if no frame to its sender has done so by the way.
+const ACKNOWLEDGED_WITHIN: Duration = Duration::from_millis(40);
+
+/// Most letters that are sent again at once.
+const AGAIN_AT_ONCE: usize = 16;
+
+/// The letters from and to one other party.
+#[derive(Debug)]
+pub(crate) struct Post {
+    /// Letters that the other may not have, from the oldest on.
+    waiting: VecDeque<Word>,
+    /// Number of the oldest of them.
+    oldest: u64,
+    /// Time at which they are sent again.
+    again_at: Option<Duration>,
+    wait: Duration,
+    /// Number of the next letter of the other.
+    next: u64,
+    /// Time at which the other is told which of its letters have come.
+    acknowledge_at: Option<Duration>,
+}
+
+impl Default for Post {
+    fn default() -> Self {
+        Self {
+            waiting: VecDeque::new(),
+            oldest: 0,
+            again_at: None,
+            wait: FIRST_WAIT,
+            next: 0,
+            acknowledge_at: None,
+        }
+    }
+}
+
+/// Frames that are due.
+#[derive(Debug, Default, PartialEq)]
+pub(crate) struct Due {
+    /// Letters that are sent again, with their numbers.
+    pub(crate) again: Vec<(u64, Word)>,
+    /// Whether the other is told what has come, in a frame of its own.
+    pub(crate) acknowledge: bool,
+}
+
+impl Post {
+    /// Keeps a letter until it is acknowledged, and returns its number.
+    pub(crate) fn send(&mut self, word: Word, now: Duration) -> u64 {
+        self.waiting.push_back(word);
+        self.again_at.get_or_insert(now + self.wait);
+        self.oldest + self.waiting.len() as u64 - 1
+    }
+
+    /// Returns the number up to which all letters of the other have come: every frame to it says so.
+    pub(crate) fn received(&mut self) -> u64 {
+        self.acknowledge_at = None;
+        self.next
+    }
+
+    /// Whether a letter of the other is the next one: then it is taken.
+    pub(crate) fn takes(&mut self, number: u64, now: Duration) -> bool {
+        let is_next = number == self.next;
+        self.next += u64::from(is_next);
+        // A repeated one, too: the other has not heard that it came.
+        self.acknowledge_at.get_or_insert(now + ACKNOWLEDGED_WITHIN);
+        is_next
+    }
+
+    /// Notes that the other has received all letters below a number.
+    pub(crate) fn on_received(&mut self, number: u64, now: Duration) {
+        let new = number.saturating_sub(self.oldest).min(self.waiting.len() as u64);
+        if new == 0 {
+            return;
+        }
+        self.waiting.drain(..new as usize);
+        self.oldest += new;
+        self.wait = FIRST_WAIT;
+        self.again_at = (!self.waiting.is_empty()).then_some(now + self.wait);
+    }
+
+    /// Returns the frames that are due.
+    pub(crate) fn due(&mut self, now: Duration) -> Due {
+        let mut due = Due::default();
+        if self.again_at.is_some_and(|at| at <= now) {
+            let numbered = (self.oldest..).zip(&self.waiting).take(AGAIN_AT_ONCE);
+            due.again = numbered.map(|(number, word)| (number, word.clone())).collect();
+            self.wait = (2 * self.wait).min(LONGEST_WAIT);
+            self.again_at = Some(now + self.wait);
+        }
+        if self.acknowledge_at.is_some_and(|at| at <= now) {
+            self.acknowledge_at = None;
+            // Letters say it, too.
+            due.acknowledge = due.again.is_empty();
+        }
+        due
+    }
+
+    /// Returns the time at which frames are due next.
+    pub(crate) fn next_due(&self) -> Option<Duration> {
+        self.again_at.into_iter().chain(self.acknowledge_at).min()
+    }
+
+    /// Whether all letters have come.
+    pub(crate) fn has_delivered(&self) -> bool {
+        self.waiting.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const STEP: Duration = Duration::from_millis(10);
+
+    fn letter(number: u64) -> Word {
+        Word::Close(number)
+    }
+
+    /// A frame from one post to another: what it says has come, and a letter.
+    type Flying = (u64, Option<(u64, Word)>);
+
+    /// Two posts and the frames between them.
+    struct Pair {
+        posts: [Post; 2],
+        flying: Vec<(usize, Flying)>,
+        now: Duration,
+        taken: Vec<Word>,
+    }
+
+    impl Pair {
+        fn new() -> Self {
+            let posts = [Post::default(), Post::default()];
+            Self { posts, flying: Vec::new(), now: Duration::ZERO, taken: Vec::new() }
+        }
+
+        fn fly(&mut self, from: usize, letter: Option<(u64, Word)>) {
+            let received = self.posts[from].received();
+            self.flying.push((1 - from, (received, letter)));
+        }
+
+        fn arrive(&mut self, (to, (received, letter)): (usize, Flying)) {
+            self.posts[to].on_received(received, self.now);
+            if let Some((number, word)) = letter
+                && self.posts[to].takes(number, self.now)
+            {
+                self.taken.push(word);
+            }
+        }
+
+        fn step(&mut self) {
+            self.now += STEP;
+            for from in 0..2 {
+                let due = self.posts[from].due(self.now);
+                let is_told = due.acknowledge;
+                due.again.into_iter().for_each(|letter| self.fly(from, Some(letter)));
+                if is_told {
+                    self.fly(from, None);
+                }
+            }
+        }
+    }
+
+    proptest! {
+        /// Whatever is lost, doubled and overtaken, until the network is well again.
+        #[test]
+        fn all_letters_come_once_and_in_order(
+            count in 1u64..40, faults in prop::collection::vec((0u8..4, any::<prop::sample::Index>()), 0..200),
+        ) {
+            let mut pair = Pair::new();
+            for number in 0..count {
+                let numbered = pair.posts[0].send(letter(number), pair.now);
+                prop_assert_eq!(numbered, number);
+                pair.fly(0, Some((number, letter(number))));
+            }
+            for (fault, which) in faults {
+                pair.step();
+                if pair.flying.is_empty() {
+                    continue;
+                }
+                let frame = pair.flying.swap_remove(which.index(pair.flying.len()));
+                match fault {
+                    0 => {}
+                    1 => {
+                        pair.arrive(frame.clone());
+                        pair.arrive(frame);
+                    }
+                    _ => pair.arrive(frame),
+                }
+            }
+            let mut steps = 0;
+            while !pair.posts[0].has_delivered() {
+                steps += 1;
+                prop_assert!(steps < 10_000, "it never comes to an end");
+                pair.step();
+                for frame in std::mem::take(&mut pair.flying) {
+                    pair.arrive(frame);
+                }
+            }
+            let all: Vec<Word> = (0..count).map(letter).collect();
+            prop_assert_eq!(pair.taken, all);
+        }
+    }
+
+    #[test]
+    fn a_letter_is_repeated_less_and_less_often_and_a_word_of_the_other_ends_that() {
+        let mut post = Post::default();
+        post.send(letter(0), Duration::ZERO);
+        let mut times = Vec::new();
+        while times.len() < 6 {
+            let at = post.next_due().expect("it waits");
+            assert_eq!(post.due(at).again, [(0, letter(0))]);
+            times.push(at.as_millis());
+        }
+        assert_eq!(times, [200, 600, 1400, 3000, 5000, 7000]);
+        post.on_received(1, Duration::from_secs(8));
+        assert!(post.has_delivered() && post.next_due().is_none());
+    }
+
+    #[test]
+    fn a_number_that_was_never_sent_is_no_harm() {
+        let mut post = Post::default();
+        post.send(letter(0), Duration::ZERO);
+        post.on_received(u64::MAX, Duration::ZERO);
+        assert!(post.has_delivered());
+        assert_eq!(post.send(letter(1), Duration::ZERO), 1);
+    }
+}

@@ -1,0 +1,50 @@
+//! Certificates, looked at before anything starts: what is wrong with one shows on a network as silence.
+
+use sidestep::kernel::InputError;
+use sidestep_session::fleet::Tls;
+use std::path::Path;
+use x509_parser::pem::Pem;
+
+/// Checks that the files are there, and are certificates that hold today.
+///
+/// # Errors
+/// With the first that is not.
+pub(super) fn check(tls: &Tls) -> Result<(), InputError> {
+    for (option, file) in [("--tls-ca", &tls.authority), ("--tls-cert", &tls.certificate)] {
+        let place = format!("{option} {}", file.display());
+        check_certificate(&place, &read(&place, file)?)?;
+    }
+    let place = format!("--tls-key {}", tls.key.display());
+    let key = read(&place, &tls.key)?;
+    if !String::from_utf8_lossy(&key).contains("PRIVATE KEY-----") {
+        let remedy = "give the file that begins with -----BEGIN PRIVATE KEY-----";
+        return Err(InputError::new(place, "there is no private key in it", remedy));
+    }
+    Ok(())
+}
+
+fn read(place: &str, file: &Path) -> Result<Vec<u8>, InputError> {
+    let unreadable =
+        |e: std::io::Error| InputError::new(place, e.to_string(), "name a file that can be read");
+    std::fs::read(file).map_err(unreadable)
+}
+
+fn check_certificate(place: &str, text: &[u8]) -> Result<(), InputError> {
+    let no_certificate = |cause: String| {
+        let remedy = "give a file that begins with -----BEGIN CERTIFICATE-----";
+        InputError::new(place, cause, remedy)
+    };
+    let mut is_any = false;
+    for pem in Pem::iter_from_buffer(text) {
+        let pem = pem.map_err(|e| no_certificate(e.to_string()))?;
+        let certificate = pem.parse_x509().map_err(|e| no_certificate(e.to_string()))?;
+        let validity = certificate.validity();
+        if !validity.is_valid() {
+            let cause = format!("it holds from {} to {}", validity.not_before, validity.not_after);
+            let remedy = "have it made again, or see whether the date of this machine is right";
+            return Err(InputError::new(place, cause, remedy));
+        }
+        is_any = true;
+    }
+    if is_any { Ok(()) } else { Err(no_certificate("there is no certificate in it".into())) }
+}

@@ -1,0 +1,267 @@
+//! A fleet: the server of a world as a process, with the nodes that it starts.
+
+use super::crew::Crew;
+use super::lifeline::Lifeline;
+use super::metrics;
+use super::node::wrong_endpoint;
+use super::packets::Packets;
+use super::scenario::Scenario;
+use super::told::tell;
+use crate::airspace::Airspace;
+use crate::mail::Mail;
+use crate::server::{Attendant, Broken, Look, Server, Tally, Terms};
+use crate::wire::Party;
+use crate::wire::zenoh::{WireError, ZenohWire, hold};
+use crate::words::{Clock, Logged, Topology, Welcome};
+use sidestep::kernel::ports::RecordError;
+use sidestep::kernel::EntityId;
+use sidestep_session::fleet::{FleetJob, FleetNow, NodeJob, NodeNow, Told};
+use sidestep_session::{Error, Journey, Keep, Watcher};
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+/// Time between two reports.
+const REPORT: Duration = Duration::from_millis(500);
+
+/// Flies a fleet to its end.
+///
+/// # Errors
+/// When anything is wrong with the job, a node is gone in lockstep, or results cannot be stored.
+pub(super) fn fly(job: &FleetJob, lifeline: &Lifeline) -> Result<(), Error> {
+    let scenario = Scenario::read(&job.common.flown)?;
+    let fingerprint = scenario.fingerprint()?;
+    let overrides = scenario.needs(job.clock, job.out.is_some());
+    let scenario = scenario.with(&overrides)?;
+    let listen = endpoints(&job.listen).map_err(wrong_endpoint)?;
+    let wire = ZenohWire::server(&listen, job.common.tls.as_ref()).map_err(wrong_endpoint)?;
+    let told = metrics::Board::open(job.common.metrics.as_deref())?;
+    let keep = Keep { folder: job.out.as_deref(), mcap: None, replace: job.replace };
+    let journey = Journey::start(scenario.compiled.as_ref(), &scenario.source, 1, keep, None)?;
+    tell(&Told::Listens(listen.clone()));
+    let mail = Mail::new(Party::Server, Box::new(wire));
+    let welcome =
+        Welcome { clock: job.clock, topology: job.topology, overrides, logs_packets: job.packets };
+    let terms = Terms {
+        scenario: fingerprint,
+        build: sidestep_session::build().into(),
+        welcome,
+        lease: Duration::from_secs_f64(job.common.lease_s),
+        has_faults: scenario.world.network.is_some(),
+    };
+    let watcher = Watched;
+    let mut stage = Airspace::new(journey, &watcher);
+    let all = scenario.world.airplanes.len();
+    let crew = Crew::start(node_jobs(job, &listen, all), job.clock != Clock::Lockstep)?;
+    let cycles = stage.journey().simulation().plan().cycles;
+    let mut captain = Captain::new(crew, lifeline, cycles, told);
+    captain.packets = job
+        .out
+        .as_ref()
+        .filter(|_| job.packets)
+        .map(|folder| {
+            Packets::begin(folder, &scenario.source.text, stage.journey().simulation().plan().seed)
+        })
+        .transpose()?;
+    let (flown, tally) = Server::new(mail, &mut stage, &mut captain, terms).run();
+    captain.crew.end();
+    let flown = flown.and_then(|()| captain.finish_packets());
+    finish(stage.into_journey(), &watcher, flown, captain.now(&tally))
+}
+
+/// Returns the endpoints at which the server listens, each with a port.
+fn endpoints(listen: &[String]) -> Result<Vec<String>, WireError> {
+    // The ports are free again when the list is complete, and had at once.
+    let held = listen.iter().map(|endpoint| hold(endpoint)).collect::<Result<Vec<_>, _>>()?;
+    Ok(held.into_iter().map(|held| held.endpoint).collect())
+}
+
+/// Returns the jobs of the nodes that are started here.
+fn node_jobs(job: &FleetJob, connect: &[String], all: usize) -> Vec<NodeJob> {
+    let any = match job.topology {
+        // As the server's own: these are on its machine.
+        Topology::Mesh => vec![any_port(&connect[0])],
+        Topology::Star => Vec::new(),
+    };
+    let one = |airplane| NodeJob {
+        common: sidestep_session::fleet::Common { metrics: None, ..job.common.clone() },
+        airplane,
+        connect: connect.to_vec(),
+        listen: any.clone(),
+        patience_s: job.common.lease_s.max(30.0),
+    };
+    let count = job.nodes.unwrap_or(all).min(all);
+    (0..count as EntityId).map(one).collect()
+}
+
+fn any_port(endpoint: &str) -> String {
+    let host = endpoint.rsplit_once(':').map_or(endpoint, |(host, _)| host);
+    format!("{host}:0")
+}
+
+/// Stores and tells the results.
+fn finish(
+    journey: Journey,
+    watcher: &Watched,
+    flown: Result<(), Broken>,
+    fleet: FleetNow,
+) -> Result<(), Error> {
+    if let Err(Broken::World(error)) = flown {
+        // What could not be recorded before cannot be now.
+        return Err(error);
+    }
+    let summary = journey.finish(watcher)?;
+    let (folder, outcome) = (summary.folder.clone(), summary.outcome.clone());
+    let summary = serde_json::to_value(&summary).expect("summaries are plain data");
+    tell(&Told::Ended { summary, outcome, fleet });
+    match flown {
+        Ok(()) => Ok(()),
+        Err(Broken::Stopped) => Err(Error::Interrupted),
+        Err(Broken::World(error)) => Err(error),
+        Err(gone @ Broken::Gone { .. }) => {
+            let remedy = match folder {
+                Some(folder) => {
+                    format!("go on without nodes: sidestep resume {}", folder.display())
+                }
+                None => "start the fleet again; with --out DIR it could be resumed".into(),
+            };
+            Err(Error::stopped(gone.to_string(), remedy))
+        }
+    }
+}
+
+/// The program as a watcher of the run, which goes on cycle by cycle: who looks after the fleet says when to stop.
+struct Watched;
+
+impl Watcher for Watched {
+    fn warn(&self, error: &Error) {
+        tracing::warn!("{error}");
+    }
+
+}
+
+/// Looks after nodes, and tells how the fleet is.
+struct Captain<'a> {
+    crew: Crew,
+    lifeline: &'a Lifeline,
+    cycles: u64,
+    board: metrics::Board,
+    report_at: Instant,
+    now: FleetNow,
+    /// Packets and bytes of each node at the last report, and when that was.
+    before: BTreeMap<EntityId, (u64, u64)>,
+    reported: Instant,
+    /// The table of all packets, if it is wanted,
+    packets: Option<Packets>,
+    /// and why it cannot be written.
+    unwritten: Option<RecordError>,
+}
+
+impl<'a> Captain<'a> {
+    fn new(crew: Crew, lifeline: &'a Lifeline, cycles: u64, board: metrics::Board) -> Self {
+        let now = Instant::now();
+        Self {
+            crew,
+            lifeline,
+            cycles,
+            board,
+            report_at: now,
+            now: FleetNow { cycles, ..FleetNow::default() },
+            before: BTreeMap::new(),
+            reported: now,
+            packets: None,
+            unwritten: None,
+        }
+    }
+
+    /// Completes the table of packets.
+    fn finish_packets(&mut self) -> Result<(), Broken> {
+        let finished = self.packets.take().map_or(Ok(()), Packets::finish);
+        let stored = self.unwritten.take().map_or(finished, Err);
+        stored.map_err(|e| Broken::World(e.into()))
+    }
+
+    /// Returns the fleet as it was when it was looked at last, with the counts at the end.
+    fn now(&self, tally: &Tally) -> FleetNow {
+        FleetNow { late_cycles: tally.late_cycles, ..self.now.clone() }
+    }
+
+    fn look(&mut self, fleet: &Look<'_>) {
+        let passed_s = self.reported.elapsed().as_secs_f64().max(1e-3);
+        self.reported = Instant::now();
+        let mut nodes = Vec::with_capacity(fleet.seats.len());
+        for (&airplane, seat) in fleet.seats {
+            let status = &seat.status;
+            let (packets, bytes) = self.before.get(&airplane).copied().unwrap_or_default();
+            self.before.insert(airplane, (status.packets, status.bytes));
+            let rate = |now: u64, before: u64| now.saturating_sub(before) as f64 / passed_s;
+            let state = match &seat.member {
+                None => "awaited",
+                Some(_) if seat.is_gone => "gone",
+                Some(_) if !fleet.has_begun => "joined",
+                Some(_) if seat.control.is_some() => "done",
+                Some(_) => &status.doing,
+            };
+            nodes.push(NodeNow {
+                airplane,
+                state: state.into(),
+                process: seat.member.as_ref().map(|_| seat.process),
+                epoch: status.epoch,
+                heard: status.heard.len(),
+                heard_of: status.heard.clone(),
+                round: status.round,
+                flown: seat.flown,
+                late: seat.late,
+                lives: seat.lives,
+                packets: status.packets,
+                bytes: status.bytes,
+                packets_per_s: rate(status.packets, packets),
+                bytes_per_s: rate(status.bytes, bytes),
+                silent_s: fleet
+                    .mail
+                    .silent_for(Party::Node(airplane))
+                    .map(|silent| silent.as_secs_f64()),
+            });
+        }
+        let quantile_ms = |q: f64| fleet.tally.talked.quantile(q).map(|s| 1e3 * s);
+        self.now = FleetNow {
+            cycle: fleet.cycle,
+            cycles: self.cycles,
+            has_begun: fleet.has_begun,
+            late_cycles: fleet.tally.late_cycles,
+            talk_p50_ms: quantile_ms(0.5),
+            talk_p99_ms: quantile_ms(0.99),
+            nodes,
+        };
+    }
+}
+
+impl Attendant for Captain<'_> {
+    fn attend(&mut self, fleet: &Look<'_>) -> Result<Vec<(EntityId, String)>, Broken> {
+        if self.lifeline.has_ended() {
+            return Err(Broken::Stopped);
+        }
+        if let Some(error) = self.unwritten.take() {
+            return Err(Broken::World(error.into()));
+        }
+        if Instant::now() >= self.report_at {
+            self.report_at = Instant::now() + REPORT;
+            self.look(fleet);
+            self.board.show(|| metrics::of_fleet(&self.now, fleet));
+            tell(&Told::Fleet(self.now.clone()));
+        }
+        let gone = self.crew.look()?;
+        if let Some((agent, reason)) = gone.first().filter(|_| !fleet.has_begun) {
+            let (agent, reason) = (*agent, reason.clone());
+            return Err(Broken::Gone { agent, cycle: fleet.cycle, reason });
+        }
+        Ok(gone)
+    }
+
+    fn take_packets(&mut self, packets: Vec<(EntityId, Logged)>) {
+        if let Some(table) = &mut self.packets
+            && let Err(error) = table.add(packets)
+        {
+            self.unwritten = Some(error);
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! Metrics in Prometheus' text format (version 0.0.4), for who asks at an address.
+
+use crate::server::Look;
+use crate::server::tally::Histogram;
+use crate::wire::board::serve;
+use crate::words::Status;
+use sidestep::kernel::{EntityId, InputError};
+use sidestep_session::fleet::{FleetNow, NodeNow};
+use std::fmt::Write;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// The place where metrics are shown; nobody looks at one that has no address.
+#[derive(Debug, Default)]
+pub(super) struct Board(Option<Arc<Mutex<String>>>);
+
+impl Board {
+    /// Opens a board at an address, if one is given.
+    ///
+    /// # Errors
+    /// When the address cannot be had.
+    pub(super) fn open(address: Option<&str>) -> Result<Self, InputError> {
+        let Some(address) = address else { return Ok(Self::default()) };
+        let text = Arc::new(Mutex::new(String::new()));
+        serve(address, text.clone()).map_err(|e| {
+            let remedy = "give --metrics HOST:PORT of this machine that nobody else has";
+            InputError::new(format!("--metrics {address}"), e.to_string(), remedy)
+        })?;
+        Ok(Self(Some(text)))
+    }
+
+    /// Shows a text, which is made only if somebody could see it.
+    pub(super) fn show(&self, text: impl FnOnce() -> String) {
+        if let Some(shown) = &self.0 {
+            *shown.lock().unwrap_or_else(PoisonError::into_inner) = text();
+        }
+    }
+}
+
+/// A text under construction.
+#[derive(Default)]
+struct Text(String);
+
+impl Text {
+    /// Begins a metric.
+    fn metric(&mut self, name: &str, kind: &str, help: &str) {
+        let _ = writeln!(self.0, "# HELP sidestep_{name} {help}\n# TYPE sidestep_{name} {kind}");
+    }
+
+    fn value(&mut self, name: &str, labels: &str, value: impl std::fmt::Display) {
+        let labels = if labels.is_empty() { String::new() } else { format!("{{{labels}}}") };
+        let _ = writeln!(self.0, "sidestep_{name}{labels} {value}");
+    }
+
+    fn histogram(&mut self, name: &str, help: &str, histogram: &Histogram) {
+        self.metric(name, "histogram", help);
+        for (bound_s, count) in histogram.cumulative() {
+            self.value(&format!("{name}_bucket"), &format!("le=\"{bound_s}\""), count);
+        }
+        self.value(&format!("{name}_bucket"), "le=\"+Inf\"", histogram.count());
+        self.value(&format!("{name}_sum"), "", histogram.sum_s);
+        self.value(&format!("{name}_count"), "", histogram.count());
+    }
+
+    /// Adds a metric with a value for each airplane.
+    fn each(
+        &mut self,
+        name: &str,
+        kind: &str,
+        help: &str,
+        values: impl Iterator<Item = (EntityId, f64)>,
+    ) {
+        self.metric(name, kind, help);
+        for (airplane, value) in values {
+            self.value(name, &format!("airplane=\"{airplane}\""), value);
+        }
+    }
+}
+
+/// Returns the metrics of a fleet.
+pub(super) fn of_fleet(now: &FleetNow, fleet: &Look<'_>) -> String {
+    let mut text = Text::default();
+    text.metric("cycle", "gauge", "Cycles done.");
+    text.value("cycle", "", now.cycle);
+    let tally = fleet.tally;
+    text.histogram(
+        "talk_seconds",
+        "Time from the percepts of a cycle to its last control.",
+        &tally.talked,
+    );
+    text.histogram(
+        "advance_seconds",
+        "Time in which the world went on by a cycle.",
+        &tally.advanced,
+    );
+    text.histogram(
+        "late_seconds",
+        "In real time: by how much later than due a cycle began.",
+        &tally.late,
+    );
+    text.metric(
+        "late_cycles_total",
+        "counter",
+        "Cycles that began later than a tenth of their length.",
+    );
+    text.value("late_cycles_total", "", tally.late_cycles);
+    text.metric("absurd_controls_total", "counter", "Controls that could not be flown.");
+    text.value("absurd_controls_total", "", tally.absurd_controls);
+    text.metric("refused_total", "counter", "Nodes that were refused, by reason.");
+    for (reason, count) in &tally.refused {
+        text.value("refused_total", &format!("reason=\"{reason}\""), count);
+    }
+    text.metric("frames_total", "counter", "Frames that the server has sent.");
+    text.value("frames_total", "", fleet.mail.counts().frames);
+    text.metric("frame_bytes_total", "counter", "Bytes of frames that the server has sent.");
+    text.value("frame_bytes_total", "", fleet.mail.counts().bytes);
+    of_nodes(&mut text, now, fleet);
+    text.0
+}
+
+fn of_nodes(text: &mut Text, now: &FleetNow, fleet: &Look<'_>) {
+    let each =
+        |value: fn(&NodeNow) -> f64| now.nodes.iter().map(move |node| (node.airplane, value(node)));
+    let is_up = |node: &NodeNow| f64::from(!["awaited", "gone"].contains(&&*node.state));
+    text.each("node_up", "gauge", "Whether the node of an airplane is there.", each(is_up));
+    text.each(
+        "controls_flown_total",
+        "counter",
+        "Controls that were flown.",
+        each(|node| node.flown as f64),
+    );
+    text.each(
+        "controls_late_total",
+        "counter",
+        "Controls that were not there in time.",
+        each(|node| node.late as f64),
+    );
+    text.each(
+        "node_lives_total",
+        "counter",
+        "Times that a node has joined.",
+        each(|node| node.lives as f64),
+    );
+    text.each(
+        "packets_total",
+        "counter",
+        "Packets that a node has sent.",
+        each(|node| node.packets as f64),
+    );
+    text.each("packet_bytes_total", "counter", "Bytes of these.", each(|node| node.bytes as f64));
+    text.each(
+        "epoch",
+        "gauge",
+        "Epoch of the coordinator that a node follows.",
+        each(|node| node.epoch as f64),
+    );
+    text.each(
+        "heard",
+        "gauge",
+        "Other airplanes that a node has heard in a cycle.",
+        each(|node| node.heard as f64),
+    );
+    let statuses = fleet.seats.iter().map(|(&airplane, seat)| (airplane, &seat.status));
+    of_mail(text, &statuses.collect::<Vec<_>>());
+}
+
+/// Adds what nodes tell of their mail.
+fn of_mail(text: &mut Text, statuses: &[(EntityId, &Status)]) {
+    let retries = statuses.iter().map(|(airplane, status)| (*airplane, status.retries as f64));
+    text.each("retries_total", "counter", "Letters that a node has sent again.", retries);
+    text.metric(
+        "dropped_total",
+        "counter",
+        "Frames and packets that a node has dropped, by reason.",
+    );
+    for (airplane, status) in statuses {
+        for (reason, count) in &status.dropped {
+            let labels = format!("airplane=\"{airplane}\",reason=\"{reason}\"");
+            text.value("dropped_total", &labels, count);
+        }
+    }
+}
+
+/// Returns the metrics of a node.
+pub(super) fn of_node(airplane: EntityId, status: &Status) -> String {
+    let mut text = Text::default();
+    let one = |value: u64| std::iter::once((airplane, value as f64));
+    text.each("node_cycle", "gauge", "The cycle that a node is in.", one(status.cycle));
+    text.each("packets_total", "counter", "Packets that a node has sent.", one(status.packets));
+    text.each("packet_bytes_total", "counter", "Bytes of these.", one(status.bytes));
+    text.each("epoch", "gauge", "Epoch of the coordinator that a node follows.", one(status.epoch));
+    let heard = one(status.heard.len() as u64);
+    text.each("heard", "gauge", "Other airplanes that a node has heard in a cycle.", heard);
+    of_mail(&mut text, &[(airplane, status)]);
+    text.0
+}

@@ -1,0 +1,98 @@
+//! The program: reads its job, does it, and tells what comes of it, a line of JSON each.
+//!
+//! ```text
+//! fleet.rs   the server of a world, and nodes that it starts    crew.rs     processes of nodes
+//! node.rs    one node                                           lifeline.rs whoever started it is gone
+//! told.rs    lines that are told                                metrics.rs  Prometheus' text
+//! log.rs     logs to standard error                             scenario.rs what server and nodes fly
+//! packets.rs the table of all packets                           certificates.rs whether they hold
+//! ```
+
+mod certificates;
+mod crew;
+mod fleet;
+mod lifeline;
+mod log;
+mod metrics;
+mod node;
+mod packets;
+mod scenario;
+mod told;
+
+use lifeline::Lifeline;
+use sidestep_session::Error;
+use sidestep_session::fleet::{Failed, Flown, Job, Told};
+use std::io::BufRead;
+use std::process::ExitCode;
+use told::tell;
+
+/// Words for who starts the program by hand.
+const USAGE: &str = "\
+sidestep-link runs the server and the nodes of a fleet. `sidestep fleet` and `sidestep node` start it
+and tell it, in a line of JSON, what to do: see `sidestep fleet --help`.";
+
+/// Does the job that standard input asks for. Exit codes are those of `sidestep`.
+pub fn main() -> ExitCode {
+    if let Some(word) = std::env::args().nth(1) {
+        let is_version = ["--version", "-V"].contains(&word.as_str());
+        let text = if is_version { version() } else { USAGE.into() };
+        println!("{text}");
+        let is_known = is_version || ["--help", "-h", "help"].contains(&word.as_str());
+        return ExitCode::from(if is_known { 0 } else { 2 });
+    }
+    let mut line = String::new();
+    let job = std::io::stdin().lock().read_line(&mut line).map_err(|e| e.to_string());
+    let job = job.and_then(|_| serde_json::from_str::<Job>(&line).map_err(|e| e.to_string()));
+    match job {
+        Ok(job) => exit_code(do_job(job)),
+        Err(reason) => {
+            eprintln!("error: standard input has no job: {reason}\n{USAGE}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn version() -> String {
+    format!("sidestep-link {}", sidestep_session::build())
+}
+
+fn do_job(job: Job) -> Result<(), Error> {
+    let common = match &job {
+        Job::Fleet(job) => &job.common,
+        Job::Node(job) => &job.common,
+    };
+    log::start(common.json_log, &common.log)?;
+    check_build(&common.flown)?;
+    common.tls.as_ref().map_or(Ok(()), certificates::check)?;
+    match job {
+        Job::Fleet(job) => fleet::fly(&job, &Lifeline::watch()),
+        Job::Node(job) => {
+            Lifeline::end_with();
+            node::fly(&job)
+        }
+    }
+}
+
+/// Refuses the job of another build: all that decide must be of one.
+fn check_build(flown: &Flown) -> Result<(), Error> {
+    let own = sidestep_session::build();
+    if flown.build == own {
+        return Ok(());
+    }
+    let cause = format!("sidestep-link is of sidestep {own}, and the command of {}", flown.build);
+    let remedy = "install both from the same source: cargo install --path crates/link";
+    Err(sidestep::kernel::InputError::new("sidestep-link", cause, remedy).into())
+}
+
+/// Tells why a job failed, and returns the exit code.
+fn exit_code(done: Result<(), Error>) -> ExitCode {
+    let Err(error) = done else { return ExitCode::SUCCESS };
+    let failed = Failed::from(&error);
+    let code = match () {
+        () if failed.is_input => 2,
+        () if failed.is_interrupted => 130,
+        () => 1,
+    };
+    tell(&Told::Failed(failed));
+    ExitCode::from(code)
+}

@@ -1,0 +1,103 @@
+//! A node as a process.
+
+use super::metrics::{Board, of_node};
+use super::scenario::Scenario;
+use crate::airspace::{Aboard, Faults};
+use crate::mail::Mail;
+use crate::node::{Asked, Node, NodeError, join};
+use crate::ports::{Channel, Program};
+use crate::wire::Party;
+use crate::wire::zenoh::{Held, WireError, ZenohWire, hold};
+use crate::words::{Join, Refusal, Topology};
+use sidestep::kernel::{EntityId, InputError};
+use sidestep_session::Error;
+use sidestep_session::fleet::NodeJob;
+use std::time::Duration;
+
+/// Flies one airplane until the server ends the fleet.
+///
+/// # Errors
+/// When anything is wrong with the job, or the server is gone.
+pub(super) fn fly(job: &NodeJob) -> Result<(), Error> {
+    let scenario = Scenario::read(&job.common.flown)?;
+    let agent = job.airplane;
+    check_airplane(&scenario, agent)?;
+    let ports = job.listen.iter().map(|endpoint| hold(endpoint)).collect::<Result<Vec<Held>, _>>();
+    let ports = ports.map_err(wrong_endpoint)?;
+    let listens = ports.iter().map(|held| held.endpoint.clone()).collect();
+    let board = Board::open(job.common.metrics.as_deref())?;
+    let patience = Duration::from_secs_f64(job.patience_s);
+    let tls = job.common.tls.as_ref();
+    let wire = ZenohWire::node(Party::Node(agent), &job.connect, tls, patience);
+    let wire = wire.map_err(wrong_endpoint)?.listening(ports);
+    let mut mail = Mail::new(Party::Node(agent), Box::new(wire));
+    let build = sidestep_session::build();
+    let question = Join {
+        agent,
+        scenario: scenario.fingerprint()?,
+        build: build.into(),
+        listens,
+        process: std::process::id(),
+    };
+    let welcome =
+        join(&mut mail, &Asked { join: question, patience }).map_err(|e| failed(e, job))?;
+    if welcome.topology == Topology::Mesh && job.listen.is_empty() {
+        let cause = "in a mesh other nodes must reach this one";
+        let remedy =
+            "give it an address of this machine: --listen tcp/ADDRESS:PORT (port 0 for any)";
+        return Err(InputError::new("--listen", cause, remedy).into());
+    }
+    let scenario = scenario.with(&welcome.overrides)?;
+    let world = scenario.world;
+    let program: Box<dyn Program> = Box::new(Aboard::new(world.clone(), agent, build));
+    let channel = Faults::new(world, agent).map(|faults| Box::new(faults) as Box<dyn Channel>);
+    let lease = Duration::from_secs_f64(job.common.lease_s);
+    tracing::info!(airplane = agent, "joined");
+    let node = Node::new(agent, mail, (program, channel), &welcome, lease);
+    let node = node.watched(move |agent, status| board.show(|| of_node(agent, status)));
+    node.run().map(drop).map_err(|e| failed(e, job))
+}
+
+fn check_airplane(scenario: &Scenario, agent: EntityId) -> Result<(), InputError> {
+    let n = scenario.world.airplanes.len();
+    if (agent as usize) < n {
+        return Ok(());
+    }
+    let cause = format!("the scenario has no airplane {agent}");
+    let remedy = format!("give 0 to {}", n.saturating_sub(1));
+    Err(InputError::new(format!("--airplane {agent}"), cause, remedy))
+}
+
+/// Returns the error of a wire that there is not.
+pub(super) fn wrong_endpoint(error: WireError) -> Error {
+    let cause = error.to_string();
+    match error {
+        WireError::NoEndpoint(endpoint) => {
+            let remedy = "write it as tcp/HOST:PORT, or tls/HOST:PORT with certificates";
+            InputError::new(endpoint, cause, remedy).into()
+        }
+        WireError::Taken { endpoint, .. } => {
+            let remedy = "end what listens there, or give another port; 0 stands for any free one";
+            InputError::new(endpoint, cause, remedy).into()
+        }
+        WireError::NoAnswer { .. } => {
+            let remedy = "start the fleet first, and see whether its address can be reached; where it asks for \
+                          certificates, give --tls-ca, --tls-cert and --tls-key";
+            Error::stopped(cause, remedy)
+        }
+    }
+}
+
+fn failed(error: NodeError, job: &NodeJob) -> Error {
+    let cause = error.to_string();
+    match error {
+        NodeError::Refused(Refusal { remedy, .. }) => {
+            InputError::new(job.connect.join(", "), cause, remedy).into()
+        }
+        NodeError::Wire(error) => wrong_endpoint(error),
+        NodeError::Silence(_) => {
+            Error::stopped(cause, "see whether the server runs, and start both again")
+        }
+        NodeError::Percept(_) => Error::stopped(cause, "please report it with the scenario"),
+    }
+}

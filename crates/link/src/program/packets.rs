@@ -1,0 +1,86 @@
+//! The table `packets`: every packet that a node has sent.
+
+use crate::words::Logged;
+use sidestep::VERSION;
+use sidestep::kernel::EntityId;
+use sidestep::kernel::ports::{RecordError, Recorder, Table};
+use sidestep_record::{Origin, ParquetRecorder};
+use std::path::Path;
+
+/// Rows that are stored at once.
+const BLOCK: usize = 1 << 16;
+
+/// A row: the sender and what it has sent.
+type Row = (EntityId, Logged);
+
+/// A packet's table in a run folder. Until it is finished it is called `packets.partial`.
+pub(super) struct Packets {
+    recorder: ParquetRecorder,
+    table: Table<Row>,
+    waiting: Vec<Row>,
+}
+
+fn table() -> Table<Row> {
+    Table::new("packets")
+        .u64("cycle", "cycle of the talk", |(_, packet): &Row| packet.cycle)
+        .u64("sent", "tick in which it was sent", |(_, packet)| packet.sent)
+        .u32("sender", "entity id of the airplane that sent it", |(sender, _)| *sender)
+        .u32("receiver", "entity id of the airplane to which it was sent", |(_, packet)| packet.to)
+        .u32(
+            "sequence",
+            "number among the sender's, in the talk or, in real time, in the cycle",
+            |(_, packet)| packet.sequence,
+        )
+        .u32("bytes", "size in bytes", |(_, packet)| packet.bytes)
+        .u32(
+            "copies",
+            "times that it arrived: 0 if it was lost, 2 if it was doubled",
+            |(_, packet)| packet.copies,
+        )
+        .u64("arrives", "tick in which it first arrived; 0 if it was lost", |(_, packet)| {
+            packet.arrives
+        })
+}
+
+impl Packets {
+    /// Begins the table in a run folder.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub(super) fn begin(folder: &Path, scenario: &str, seed: u64) -> Result<Self, RecordError> {
+        let (program_version, scenario) = (VERSION.into(), scenario.into());
+        let table = table();
+        let origin = Origin { program_version, scenario, seed };
+        let recorder = ParquetRecorder::create(folder, &[table.schema()], &origin)?;
+        Ok(Self { recorder, table, waiting: Vec::new() })
+    }
+
+    /// Adds packets of cycles of which no more come.
+    ///
+    /// # Errors
+    /// When they cannot be written.
+    pub(super) fn add(&mut self, mut rows: Vec<Row>) -> Result<(), RecordError> {
+        // In whatever order nodes have told of them.
+        rows.sort_unstable_by_key(|(sender, packet)| (packet.cycle, *sender, *packet));
+        self.waiting.append(&mut rows);
+        if self.waiting.len() < BLOCK {
+            return Ok(());
+        }
+        self.store()
+    }
+
+    fn store(&mut self) -> Result<(), RecordError> {
+        let block = self.table.block(&self.waiting);
+        self.waiting.clear();
+        self.recorder.append(0, &block)
+    }
+
+    /// Completes the table.
+    ///
+    /// # Errors
+    /// When the last rows cannot be written.
+    pub(super) fn finish(mut self) -> Result<(), RecordError> {
+        self.store()?;
+        self.recorder.finish()
+    }
+}

@@ -1,0 +1,338 @@
+//! The server of a fleet: it has the world, hands each node its percept, takes the controls, and lets the world go on.
+//!
+//! ```text
+//! muster.rs    who may join, until all are there     seat.rs      what is known of a node
+//! lockstep.rs  waits for every control               realtime.rs  each cycle is a deadline
+//! ticks.rs     counted time, on a network with faults
+//! ```
+//!
+//! It names no socket: what it says and hears goes over [`Mail`].
+
+mod lockstep;
+mod muster;
+mod realtime;
+mod seat;
+pub mod tally;
+mod ticks;
+
+use crate::mail::{Heard, Mail};
+use crate::ports::{Sight, Stage};
+use crate::wire::Party;
+use crate::words::{Clock, Control, Fingerprint, Logged, Ticked, Welcome, Word};
+pub use seat::Seat;
+use sidestep::kernel::{Cycle, EntityId};
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+use tally::Histogram;
+
+/// The longest wait of the server before it looks around.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// Time between two signs of life to all nodes.
+const BEAT: Duration = Duration::from_millis(500);
+
+/// The terms on which nodes join, and how the fleet is flown.
+#[derive(Debug, Clone)]
+pub struct Terms {
+    /// Fingerprint of the scenario.
+    pub scenario: Fingerprint,
+    /// The build of the program.
+    pub build: String,
+    /// The answer to those who may join.
+    pub welcome: Welcome,
+    /// Time after which a node that is not heard is gone.
+    pub lease: Duration,
+    /// Whether packets may be lost, delayed or doubled, so that lockstep counts time in ticks.
+    pub has_faults: bool,
+}
+
+/// The end of a fleet before the world's.
+#[derive(Debug, thiserror::Error)]
+pub enum Broken {
+    /// Somebody asked it to end.
+    #[error("interrupted")]
+    Stopped,
+    /// A node is gone, and lockstep does not go on without it.
+    #[error("the node of agent {agent} is gone in cycle {cycle}: {reason}")]
+    Gone {
+        /// Its agent.
+        agent: EntityId,
+        /// The cycle.
+        cycle: Cycle,
+        /// The reason.
+        reason: String,
+    },
+    /// The world cannot go on.
+    #[error(transparent)]
+    World(#[from] sidestep_session::Error),
+}
+
+/// The fleet as somebody sees it who looks in now and then.
+pub struct Look<'a> {
+    /// The seats.
+    pub seats: &'a BTreeMap<EntityId, Seat>,
+    /// The counts of the server.
+    pub tally: &'a Tally,
+    /// The mail of the server.
+    pub mail: &'a Mail,
+    /// The cycle that comes next.
+    pub cycle: Cycle,
+    /// Whether all nodes are there.
+    pub has_begun: bool,
+}
+
+/// Somebody who looks after the fleet while the server waits.
+pub trait Attendant {
+    /// Looks at the fleet, 50 times a second or so. Returns the nodes that have ended, with the reason.
+    ///
+    /// # Errors
+    /// When the fleet is to end.
+    fn attend(&mut self, fleet: &Look<'_>) -> Result<Vec<(EntityId, String)>, Broken>;
+
+    /// Takes packets that nodes have sent, where all are recorded: those of the cycles before the present one, each
+    /// with its sender.
+    fn take_packets(&mut self, _: Vec<(EntityId, Logged)>) {}
+}
+
+/// Counts of a server.
+#[derive(Debug, Clone, Default)]
+pub struct Tally {
+    /// Time from the sights to the last control of a cycle.
+    pub talked: Histogram,
+    /// Time in which the world went on by one cycle.
+    pub advanced: Histogram,
+    /// In real time: by how much later than due a cycle began.
+    pub late: Histogram,
+    /// Number of cycles that began later than a tenth of their length.
+    pub late_cycles: u64,
+    /// Number of controls that were not there in time.
+    pub late_controls: u64,
+    /// Number of controls that made no sense.
+    pub absurd_controls: u64,
+    /// Nodes that were refused, by reason.
+    pub refused: BTreeMap<&'static str, u64>,
+}
+
+/// The server of a fleet.
+pub struct Server<'a> {
+    mail: Mail,
+    stage: &'a mut dyn Stage,
+    attendant: &'a mut dyn Attendant,
+    terms: Terms,
+    seats: BTreeMap<EntityId, Seat>,
+    tally: Tally,
+    has_begun: bool,
+    beat_at: Instant,
+    look_at: Instant,
+    /// Reports of nodes that have done a tick.
+    ticked: Vec<(EntityId, Ticked)>,
+    /// Packets that nodes have sent, where all are recorded.
+    packets: Vec<(EntityId, Logged)>,
+}
+
+impl<'a> Server<'a> {
+    /// Returns a server to which nobody has joined yet.
+    pub fn new(
+        mail: Mail,
+        stage: &'a mut dyn Stage,
+        attendant: &'a mut dyn Attendant,
+        terms: Terms,
+    ) -> Self {
+        let seats = stage.agents().into_iter().map(|agent| (agent, Seat::default())).collect();
+        let (beat_at, look_at) = (Instant::now(), Instant::now());
+        let (tally, ticked, packets) = (Tally::default(), Vec::new(), Vec::new());
+        Self {
+            mail,
+            stage,
+            attendant,
+            terms,
+            seats,
+            tally,
+            has_begun: false,
+            beat_at,
+            look_at,
+            ticked,
+            packets,
+        }
+    }
+
+    /// Waits for all nodes, and flies the world to its end. The nodes are told to end in any case.
+    ///
+    /// # Errors
+    /// When it ends before.
+    pub fn run(mut self) -> (Result<(), Broken>, Tally) {
+        let flown = self.muster().and_then(|()| self.fly());
+        self.end();
+        (flown, self.tally)
+    }
+
+    fn fly(&mut self) -> Result<(), Broken> {
+        self.has_begun = true;
+        match self.terms.welcome.clock {
+            Clock::Lockstep => {
+                while !self.stage.is_over() {
+                    self.cycle_in_lockstep()?;
+                }
+                Ok(())
+            }
+            Clock::Realtime { speed } => self.fly_in_real_time(speed),
+        }
+    }
+
+    /// Tells all nodes that the fleet has ended, and waits a little until they have said what they had to say.
+    fn end(&mut self) {
+        let seated: Vec<EntityId> = self.seated().collect();
+        seated.iter().for_each(|&agent| self.mail.letter(Party::Node(agent), Word::End));
+        let until = Instant::now() + BEAT;
+        while self.seated().any(|agent| !self.seats[&agent].has_left) && Instant::now() < until {
+            if let Some(heard) = self.mail.receive(LOOK) {
+                self.take(heard);
+            }
+        }
+        self.attendant.take_packets(std::mem::take(&mut self.packets));
+    }
+
+    /// Agents whose nodes are there, rising.
+    fn seated(&self) -> impl Iterator<Item = EntityId> + '_ {
+        self.seats.iter().filter(|(_, seat)| seat.life().is_some()).map(|(&agent, _)| agent)
+    }
+
+    /// Hears what comes within some time, at most until the next look around.
+    ///
+    /// # Errors
+    /// When the fleet is to end.
+    fn hear(&mut self, within: Duration) -> Result<(), Broken> {
+        let now = Instant::now();
+        if now >= self.look_at {
+            self.look_at = now + LOOK;
+            self.look_around(now)?;
+        }
+        if let Some(heard) = self.mail.receive(within.min(LOOK)) {
+            self.take(heard);
+        }
+        Ok(())
+    }
+
+    fn look_around(&mut self, now: Instant) -> Result<(), Broken> {
+        if now >= self.beat_at {
+            self.beat_at = now + BEAT;
+            let seated: Vec<EntityId> = self.seated().collect();
+            seated.into_iter().for_each(|agent| self.mail.note(Party::Node(agent), Word::Beat));
+        }
+        let Self { mail, seats, tally, has_begun, stage, .. } = self;
+        let look = Look { seats, tally, mail, cycle: stage.cycle(), has_begun: *has_begun };
+        let mut gone = self.attendant.attend(&look)?;
+        let lease = self.terms.lease;
+        let is_silent =
+            |agent| self.mail.silent_for(Party::Node(agent)).is_some_and(|silent| silent > lease);
+        let silent = self.seated().filter(|&agent| is_silent(agent));
+        let reason = || format!("not heard for {} s", lease.as_secs_f64());
+        gone.extend(silent.map(|agent| (agent, reason())));
+        gone.into_iter().try_for_each(|(agent, reason)| self.lose(agent, reason))
+    }
+
+    /// Notes that a node is gone.
+    fn lose(&mut self, agent: EntityId, reason: String) -> Result<(), Broken> {
+        let Some(seat) = self.seats.get_mut(&agent).filter(|seat| seat.life().is_some()) else {
+            return Ok(());
+        };
+        seat.is_gone = true;
+        self.mail.part(Party::Node(agent));
+        tracing::warn!(airplane = agent, cycle = self.stage.cycle(), reason, "a node is gone");
+        let cycle = self.stage.cycle();
+        match self.terms.welcome.clock {
+            Clock::Lockstep if self.has_begun => Err(Broken::Gone { agent, cycle, reason }),
+            _ => Ok(()),
+        }
+    }
+
+    fn take(&mut self, Heard { from, life, word }: Heard) {
+        let Party::Node(agent) = from else { return };
+        if let Word::Join(join) = word {
+            self.on_join(agent, life, join);
+            return;
+        }
+        let Some(seat) = self.seats.get_mut(&agent).filter(|seat| seat.life() == Some(life)) else {
+            return;
+        };
+        match word {
+            Word::Ready => seat.is_ready = true,
+            Word::Status(status) => seat.status = status,
+            Word::Control(control) => self.on_control(agent, control),
+            Word::Ticked(ticked) => self.ticked.push((agent, ticked)),
+            Word::Packets(sent) => {
+                self.packets.extend(sent.into_iter().map(|logged| (agent, logged)));
+            }
+            Word::Left => seat.has_left = true,
+            // Of a node that says what only others say.
+            _ => {}
+        }
+    }
+
+    fn on_control(&mut self, agent: EntityId, Control { cycle, control }: Control) {
+        let Some(seat) = self.seats.get_mut(&agent) else { return };
+        if cycle == self.stage.cycle() {
+            seat.control = Some(control);
+        }
+    }
+
+    /// Hands each agent that decides its percept; returns the groups of those who decide together.
+    fn hand_out_sights(&mut self) -> Vec<Vec<EntityId>> {
+        self.seats.values_mut().for_each(|seat| seat.control = None);
+        let mut groups = Vec::new();
+        for Sight { agent, group, begin } in self.stage.sights() {
+            self.mail.letter(Party::Node(agent), Word::Begin(begin));
+            if group.first() == Some(&agent) {
+                groups.push(group);
+            }
+        }
+        groups
+    }
+
+    /// Lets the world go on with the controls that are there, and counts those that are not.
+    fn advance(&mut self, groups: &[Vec<EntityId>]) -> Result<(), Broken> {
+        let mut controls = Vec::new();
+        for agent in groups.iter().flatten() {
+            let Some(seat) = self.seats.get_mut(agent) else { continue };
+            match seat.control.take() {
+                Some(control) => {
+                    seat.flown += 1;
+                    controls.push((*agent, control));
+                }
+                None => {
+                    seat.late += 1;
+                    self.tally.late_controls += 1;
+                }
+            }
+        }
+        let began = Instant::now();
+        let cycle = self.stage.cycle();
+        controls.sort_unstable_by_key(|(agent, _)| *agent);
+        for absurd in self.stage.advance(controls)? {
+            tracing::warn!(
+                airplane = absurd.agent,
+                cycle,
+                reason = absurd.reason,
+                "an absurd control"
+            );
+            self.tally.absurd_controls += 1;
+            if let Some(seat) = self.seats.get_mut(&absurd.agent) {
+                seat.absurd += 1;
+                seat.flown -= 1;
+            }
+        }
+        self.tally.advanced.add(began.elapsed());
+        // A node may tell of a cycle until it hears of the next one.
+        let past = self.packets.extract_if(.., |(_, packet)| packet.cycle < cycle).collect();
+        self.attendant.take_packets(past);
+        Ok(())
+    }
+
+    /// Whether all of these agents have sent their controls.
+    fn has_controls(&self, groups: &[Vec<EntityId>]) -> bool {
+        groups
+            .iter()
+            .flatten()
+            .all(|agent| self.seats.get(agent).is_some_and(|seat| seat.control.is_some()))
+    }
+}

@@ -1,0 +1,108 @@
+//! The muster: nodes join, until every agent has one and all have heard each other.
+
+use super::{Broken, LOOK, Server};
+use crate::wire::Party;
+use crate::words::{Clock, Join, Life, Member, Refusal, Word};
+use sidestep::kernel::EntityId;
+
+impl Server<'_> {
+    /// Waits until all nodes are there and ready.
+    ///
+    /// # Errors
+    /// When somebody asks the fleet to end.
+    pub(super) fn muster(&mut self) -> Result<(), Broken> {
+        while !self.seats.values().all(|seat| seat.is_ready && !seat.is_gone) {
+            self.hear(LOOK)?;
+        }
+        tracing::info!(nodes = self.seats.len(), "all nodes are there");
+        Ok(())
+    }
+
+    /// Answers a node that wants to join. It asks until it hears the answer.
+    pub(super) fn on_join(&mut self, agent: EntityId, life: Life, join: Join) {
+        if let Some((reason, refusal)) = self.refusal(agent, life, &join) {
+            let Refusal { cause, remedy } = &refusal;
+            tracing::warn!(
+                airplane = agent,
+                process = join.process,
+                cause,
+                remedy,
+                "a node is refused"
+            );
+            *self.tally.refused.entry(reason).or_default() += 1;
+            self.mail.note(Party::Node(agent), Word::Refused(refusal));
+            return;
+        }
+        let member = Member { agent, life, listens: join.listens };
+        let is_known = self.seats[&agent].life() == Some(life);
+        self.mail.meet(Party::Node(agent), life);
+        self.mail.note(Party::Node(agent), Word::Welcome(self.terms.welcome.clone()));
+        if is_known {
+            return;
+        }
+        if let Some(seat) = self.seats.get_mut(&agent) {
+            seat.take(member, join.process);
+        }
+        tracing::info!(airplane = agent, process = join.process, "a node has joined");
+        self.tell_roster();
+    }
+
+    /// Tells all nodes who the others are, once all have joined.
+    fn tell_roster(&mut self) {
+        let members = self.seats.values().map(|seat| seat.member.clone());
+        let Some(members) = members.collect::<Option<Vec<Member>>>() else { return };
+        let seated: Vec<EntityId> = self.seated().collect();
+        for agent in seated {
+            self.mail.letter(Party::Node(agent), Word::Roster(members.clone()));
+        }
+    }
+
+    /// Returns why a node may not join, in a word and at length; none if it may.
+    fn refusal(&self, agent: EntityId, life: Life, join: &Join) -> Option<(&'static str, Refusal)> {
+        let refused = |word, cause: String, remedy: &str| {
+            Some((word, Refusal { cause, remedy: remedy.into() }))
+        };
+        let Some(seat) = self.seats.get(&agent).filter(|_| join.agent == agent) else {
+            let last = self.seats.keys().last().copied().unwrap_or_default();
+            let remedy = format!("give --airplane 0 to {last}");
+            return refused("unknown", format!("the fleet has no airplane {agent}"), &remedy);
+        };
+        if join.build != self.terms.build {
+            let cause = format!(
+                "the server is of sidestep {}, this node of {}",
+                self.terms.build, join.build
+            );
+            return refused("build", cause, "install the same build on both machines");
+        }
+        if join.scenario != self.terms.scenario {
+            let cause = format!(
+                "the server flies another scenario (fingerprint {}, this node has read {})",
+                self.terms.scenario, join.scenario
+            );
+            return refused(
+                "scenario",
+                cause,
+                "give the node the same file and the same --set, --seed and --cycles as the server",
+            );
+        }
+        let is_other = seat.life().is_some_and(|taken| taken != life);
+        if is_other {
+            let cause = format!("airplane {agent} has a node already (process {})", seat.process);
+            return refused("taken", cause, "give the --airplane of one that has none");
+        }
+        let is_back = seat.lives > 0 && seat.life().is_none();
+        if is_back && self.has_begun && self.terms.welcome.clock == Clock::Lockstep {
+            let cause = "the fleet flies in lockstep, and has begun".to_string();
+            return refused("begun", cause, "start the fleet again");
+        }
+        let moved = seat.member.as_ref().filter(|_| is_back && self.has_begun);
+        if moved.is_some_and(|member| member.listens != join.listens) {
+            let cause = format!(
+                "the other nodes look for airplane {agent} at {}",
+                seat.member.as_ref().map(|member| member.listens.join(", ")).unwrap_or_default()
+            );
+            return refused("moved", cause, "give the same --listen as before");
+        }
+        None
+    }
+}

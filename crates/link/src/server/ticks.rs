@@ -1,0 +1,122 @@
+//! Counted time: lockstep on a network with faults.
+//!
+//! A packet takes a number of ticks, and an agent asks again after some. For the same faults as in one process, all
+//! nodes go through the same ticks: the server knows when each timer ends and each packet arrives, and lets those
+//! nodes go on for which something happens next. No node goes on to a tick before all packets that arrive by then
+//! are there: the server tells it how many they are.
+
+use super::{Broken, LOOK, Server};
+use crate::wire::Party;
+use crate::words::{Tick, Ticked, Word};
+use sidestep::kernel::EntityId;
+use std::collections::BTreeMap;
+
+/// The server's knowledge of a node in a cycle.
+#[derive(Debug, Default)]
+struct Course {
+    /// The tick of its next timer.
+    timer: Option<u64>,
+    /// Number of packets that arrive at it, by tick.
+    arrivals: BTreeMap<u64, u64>,
+    /// Number of those that have arrived.
+    arrived: u64,
+    is_done: bool,
+    /// Whether it has yet to report.
+    is_out: bool,
+}
+
+impl Course {
+    /// Returns the next tick in which something happens.
+    fn next(&self) -> Option<u64> {
+        let arrival = self.arrivals.keys().next().copied();
+        self.timer.filter(|_| !self.is_done).into_iter().chain(arrival).min()
+    }
+
+    /// Goes on to a tick, and returns the number of packets that have arrived by then.
+    fn go_on_to(&mut self, tick: u64) -> u64 {
+        let later = self.arrivals.split_off(&(tick + 1));
+        self.arrived += self.arrivals.values().sum::<u64>();
+        self.arrivals = later;
+        self.is_out = true;
+        self.arrived
+    }
+}
+
+/// The courses of the nodes of one group, whose ticks are those of nobody else.
+#[derive(Debug, Default)]
+struct Talk {
+    courses: BTreeMap<EntityId, Course>,
+    is_over: bool,
+}
+
+impl Talk {
+    fn new(group: &[EntityId]) -> Self {
+        let out = || Course { is_out: true, ..Course::default() };
+        let courses = group.iter().map(|&agent| (agent, out())).collect();
+        Self { courses, is_over: false }
+    }
+
+    fn note(&mut self, agent: EntityId, report: Ticked) {
+        for (receiver, arrives) in report.sent {
+            if let Some(course) = self.courses.get_mut(&receiver) {
+                *course.arrivals.entry(arrives).or_default() += 1;
+            }
+        }
+        if let Some(course) = self.courses.get_mut(&agent) {
+            (course.timer, course.is_done, course.is_out) = (report.timer, report.is_done, false);
+        }
+    }
+
+    /// Returns the nodes that go on, with the packets that have arrived at each by then, and the tick; none before all
+    /// have reported. When all are done, or nothing can happen any more, the talk is over.
+    fn go_on(&mut self) -> Vec<(EntityId, u64, u64)> {
+        if self.is_over || self.courses.values().any(|course| course.is_out) {
+            return Vec::new();
+        }
+        let next = self.courses.values().filter_map(Course::next).min();
+        let next = next.filter(|&tick| tick < u64::MAX);
+        let is_done = self.courses.values().all(|course| course.is_done);
+        let Some(tick) = next.filter(|_| !is_done) else {
+            self.is_over = true;
+            return Vec::new();
+        };
+        let go = self.courses.iter_mut().filter(|(_, course)| course.next() == Some(tick));
+        go.map(|(&agent, course)| (agent, course.go_on_to(tick), tick)).collect()
+    }
+}
+
+impl Server<'_> {
+    /// Lets nodes talk, tick by tick, until each of them has a control.
+    ///
+    /// # Errors
+    /// When a node is gone, or somebody asks the fleet to end.
+    pub(super) fn count_ticks(&mut self, groups: &[Vec<EntityId>]) -> Result<(), Broken> {
+        let cycle = self.stage.cycle();
+        let mut talks: Vec<Talk> = groups.iter().map(|group| Talk::new(group)).collect();
+        while talks.iter().any(|talk| !talk.is_over) {
+            self.hear(LOOK)?;
+            for (agent, report) in std::mem::take(&mut self.ticked) {
+                let of = |talk: &&mut Talk| talk.courses.contains_key(&agent);
+                if let Some(talk) = talks.iter_mut().find(of)
+                    && report.cycle == cycle
+                {
+                    talk.note(agent, report);
+                    self.let_go_on(talk);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn let_go_on(&mut self, talk: &mut Talk) {
+        let cycle = self.stage.cycle();
+        for (agent, packets, tick) in talk.go_on() {
+            self.mail.letter(Party::Node(agent), Word::Tick(Tick { cycle, tick, packets }));
+        }
+        if talk.is_over {
+            for &agent in talk.courses.keys() {
+                self.mail.letter(Party::Node(agent), Word::Close(cycle));
+            }
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! A text that is shown to whoever asks for it by HTTP, at one address.
+
+use std::io::{self, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// Time that one who asks has for it.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// Most bytes of a question that are read.
+const MOST_BYTES: usize = 4096;
+
+/// Shows a text at an address from now on, one question after the other.
+///
+/// # Errors
+/// When the address cannot be had.
+pub fn serve(address: &str, text: Arc<Mutex<String>>) -> io::Result<()> {
+    let listener = TcpListener::bind(address)?;
+    std::thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            // Who asks in no proper way gets no answer.
+            let _ = answer(stream, &text);
+        }
+    });
+    Ok(())
+}
+
+fn answer(mut stream: TcpStream, text: &Mutex<String>) -> io::Result<()> {
+    stream.set_read_timeout(Some(PATIENCE))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
+    let mut asked = [0; MOST_BYTES];
+    let mut length = 0;
+    while !asked[..length].windows(4).any(|end| end == b"\r\n\r\n") {
+        let read = stream.read(&mut asked[length..])?;
+        if read == 0 {
+            return Ok(());
+        }
+        length += read;
+    }
+    let text = text.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    let status = if asked.starts_with(b"GET ") { "200 OK" } else { "405 Method Not Allowed" };
+    write!(
+        stream,
+        "HTTP/1.1 {status}\r\nContent-Type: text/plain; version=0.0.4; charset=utf-8\r\n\
+         Content-Length: {}\r\nConnection: close\r\n\r\n{text}",
+        text.len()
+    )
+}

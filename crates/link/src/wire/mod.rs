@@ -1,0 +1,63 @@
+//! The wire: frames from one party of a fleet to another, of which some may be lost.
+//!
+//! Everything that must arrive is numbered, acknowledged and repeated above it ([`crate::post`]).
+
+pub mod board;
+pub mod memory;
+pub mod zenoh;
+
+use crate::words::Member;
+use serde::{Deserialize, Serialize};
+use sidestep::kernel::EntityId;
+use std::fmt;
+use std::time::Duration;
+pub use zenoh::WireError;
+
+/// A party of a fleet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Party {
+    /// The server of the world.
+    Server,
+    /// The node of an agent.
+    Node(EntityId),
+}
+
+impl fmt::Display for Party {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Server => write!(f, "server"),
+            Self::Node(id) => write!(f, "{id}"),
+        }
+    }
+}
+
+/// Carries frames between parties. A frame may be lost, and nobody is told.
+pub trait Wire: Send {
+    /// Sends a frame to another party, without waiting for it.
+    fn send(&mut self, to: Party, frame: &[u8]);
+
+    /// Returns the next frame that has arrived; waits for one as long as is said. `None` when none came.
+    fn receive(&mut self, within: Duration) -> Option<Vec<u8>>;
+
+    /// Makes the straight ways from a node to all others, where there are any.
+    ///
+    /// # Errors
+    /// When an endpoint cannot be had.
+    fn join(&mut self, _me: EntityId, _members: &[Member]) -> Result<(), WireError> {
+        Ok(())
+    }
+}
+
+impl<W: Wire + ?Sized> Wire for Box<W> {
+    fn send(&mut self, to: Party, frame: &[u8]) {
+        (**self).send(to, frame);
+    }
+
+    fn receive(&mut self, within: Duration) -> Option<Vec<u8>> {
+        (**self).receive(within)
+    }
+
+    fn join(&mut self, me: EntityId, members: &[Member]) -> Result<(), WireError> {
+        (**self).join(me, members)
+    }
+}

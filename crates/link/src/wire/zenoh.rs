@@ -1,0 +1,318 @@
+//! The wire between processes and machines: Zenoh sessions on endpoints that are all named, with its scouting off.
+//! The one file that names sockets.
+//!
+//! A node has a session as a *client* of the server's, which relays (a *router* in Zenoh's words, for peers do not).
+//! In a mesh it has another one as a *peer*, connected with every other node: packets go the straight way there.
+//! A frame that cannot be sent soon is dropped rather than waited for, so that nobody who has stopped stops others.
+
+use super::{Party, Wire};
+use crate::words::Member;
+use sidestep::kernel::EntityId;
+use sidestep_session::fleet::Tls;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::net::{TcpListener, ToSocketAddrs};
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::Duration;
+use zenoh::pubsub::{Publisher, Subscriber};
+use zenoh::qos::CongestionControl;
+use zenoh::{Config, Session, Wait};
+
+/// Time without a sign of life after which Zenoh takes a link for broken, in milliseconds.
+const LEASE_MS: u64 = 2_000;
+
+/// Time that opening a link may take at either end, in milliseconds. Zenoh's own, ten seconds, is how long it
+/// takes to come back after a partition.
+const OPENED_WITHIN_MS: u64 = 1_000;
+
+/// The reason why there is no wire.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum WireError {
+    /// An address cannot be listened at.
+    #[error("cannot listen at {endpoint}: {reason}")]
+    Taken {
+        /// The address.
+        endpoint: String,
+        /// The reason.
+        reason: String,
+    },
+    /// An endpoint is not written as one.
+    #[error("`{0}` is no endpoint")]
+    NoEndpoint(String),
+    /// Nobody answers.
+    #[error("nobody answers at {endpoint}: {reason}")]
+    NoAnswer {
+        /// The address.
+        endpoint: String,
+        /// The reason.
+        reason: String,
+    },
+}
+
+/// Settings of a Zenoh session.
+#[derive(Debug, Clone, Default)]
+struct Settings<'a> {
+    mode: &'a str,
+    listen: &'a [String],
+    connect: &'a [String],
+    /// Time that it waits for the first connection; none for one that goes on trying.
+    connected_within: Option<Duration>,
+    tls: Option<&'a Tls>,
+}
+
+impl Settings<'_> {
+    /// Returns the keys of Zenoh's configuration, as JSON.
+    fn keys(&self) -> Vec<(&'static str, String)> {
+        let list = |endpoints: &[String]| serde_json::json!(endpoints).to_string();
+        let connected = self.connected_within.map_or(-1, |within| within.as_millis() as i64);
+        let mut keys = vec![
+            ("mode", format!("{:?}", self.mode)),
+            ("scouting/multicast/enabled", "false".into()),
+            ("scouting/gossip/enabled", "false".into()),
+            // A router sleeps that long before it is open, in order to be found.
+            ("scouting/delay", "0".into()),
+            // Without the empty list a party that only connects would listen at every interface.
+            ("listen/endpoints", list(self.listen)),
+            ("listen/exit_on_failure", "true".into()),
+            ("connect/endpoints", list(self.connect)),
+            ("connect/timeout_ms", connected.to_string()),
+            ("connect/exit_on_failure", self.connected_within.is_some().to_string()),
+            (
+                "connect/retry",
+                r#"{"period_init_ms":50,"period_max_ms":500,"period_increase_factor":2}"#.into(),
+            ),
+            ("transport/link/tx/lease", LEASE_MS.to_string()),
+            ("transport/link/tx/keep_alive", "4".into()),
+            ("transport/unicast/open_timeout", OPENED_WITHIN_MS.to_string()),
+            ("transport/unicast/accept_timeout", OPENED_WITHIN_MS.to_string()),
+        ];
+        if let Some(tls) = self.tls {
+            let path = |path: &PathBuf| serde_json::json!(path).to_string();
+            let [certificate, key] = [path(&tls.certificate), path(&tls.key)];
+            keys.extend([
+                ("transport/link/tls/root_ca_certificate", path(&tls.authority)),
+                ("transport/link/tls/listen_certificate", certificate.clone()),
+                ("transport/link/tls/listen_private_key", key.clone()),
+                ("transport/link/tls/connect_certificate", certificate),
+                ("transport/link/tls/connect_private_key", key),
+                ("transport/link/tls/enable_mtls", "true".into()),
+                ("transport/link/tls/verify_name_on_connect", "true".into()),
+                ("transport/link/tls/close_link_on_expiration", "true".into()),
+            ]);
+        }
+        keys
+    }
+
+    fn open(&self) -> Result<Session, String> {
+        let mut config = Config::default();
+        for (key, value) in self.keys() {
+            config.insert_json5(key, &value).map_err(|e| format!("{key} = {value}: {e}"))?;
+        }
+        zenoh::open(config).wait().map_err(|e| e.to_string())
+    }
+}
+
+/// A wire over one or two Zenoh sessions.
+pub struct ZenohWire {
+    me: Party,
+    arrived: Receiver<Vec<u8>>,
+    arrives: Sender<Vec<u8>>,
+    /// The session with the server, or the server's own.
+    hub: Line,
+    /// The session with all other nodes, in a mesh,
+    mesh: Option<Line>,
+    /// the endpoints at which they reach this one, none in a star,
+    listens: Vec<String>,
+    /// and their ports, until it listens.
+    ports: Vec<Held>,
+    tls: Option<Tls>,
+}
+
+/// A session, and who is sent to over it.
+struct Line {
+    publishers: BTreeMap<Party, Publisher<'static>>,
+    _heard: Subscriber<()>,
+    session: Session,
+}
+
+impl fmt::Debug for ZenohWire {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ZenohWire").field("me", &self.me).finish_non_exhaustive()
+    }
+}
+
+/// The key under which frames for a party are published.
+fn key(to: Party) -> String {
+    format!("sidestep/{to}")
+}
+
+impl Line {
+    fn new(session: Session, me: Party, arrives: &Sender<Vec<u8>>) -> Result<Self, String> {
+        let arrives = arrives.clone();
+        // The receiver is gone when the wire is.
+        let took = move |sample: zenoh::sample::Sample| {
+            let _ = arrives.send(sample.payload().to_bytes().into_owned());
+        };
+        let heard = session.declare_subscriber(key(me)).callback(took).wait();
+        let heard = heard.map_err(|e| e.to_string())?;
+        Ok(Self { publishers: BTreeMap::new(), _heard: heard, session })
+    }
+
+    fn send(&mut self, to: Party, frame: &[u8]) {
+        if !self.publishers.contains_key(&to) {
+            let publisher = self.session.declare_publisher(key(to));
+            let publisher =
+                publisher.congestion_control(CongestionControl::Drop).express(true).wait();
+            // A key of letters and digits is always one; a closed session sends nothing.
+            let Ok(publisher) = publisher else { return };
+            self.publishers.insert(to, publisher);
+        }
+        // Lost where it cannot be sent, as on the way.
+        let _ = self.publishers[&to].put(frame).wait();
+    }
+}
+
+impl ZenohWire {
+    /// Returns the server's wire, which listens at endpoints.
+    ///
+    /// # Errors
+    /// When one of them cannot be had.
+    pub fn server(listen: &[String], tls: Option<&Tls>) -> Result<Self, WireError> {
+        listen.iter().try_for_each(|endpoint| vacant(endpoint))?;
+        let settings = Settings { mode: "router", listen, tls, ..Settings::default() };
+        Self::over(Party::Server, &settings).map_err(|reason| taken(listen, reason))
+    }
+
+    /// Returns the wire of a node to its server, at one of some endpoints.
+    ///
+    /// # Errors
+    /// When none of them answers within some time.
+    pub fn node(
+        me: Party,
+        connect: &[String],
+        tls: Option<&Tls>,
+        within: Duration,
+    ) -> Result<Self, WireError> {
+        let connected_within = Some(within);
+        let settings = Settings { mode: "client", connect, tls, connected_within, listen: &[] };
+        Self::over(me, &settings)
+            .map_err(|reason| WireError::NoAnswer { endpoint: connect.join(", "), reason })
+    }
+
+    fn over(me: Party, settings: &Settings<'_>) -> Result<Self, String> {
+        let (arrives, arrived) = channel();
+        let hub = Line::new(settings.open()?, me, &arrives)?;
+        let (listens, ports, tls) = (Vec::new(), Vec::new(), settings.tls.cloned());
+        Ok(Self { me, arrived, arrives, hub, mesh: None, listens, ports, tls })
+    }
+
+    /// Lets this node be reached by others at endpoints of its own, once it joins them.
+    pub fn listening(self, ports: Vec<Held>) -> Self {
+        let listens = ports.iter().map(|held| held.endpoint.clone()).collect();
+        Self { listens, ports, ..self }
+    }
+
+    fn open_mesh(&mut self, connect: &[String]) -> Result<(), WireError> {
+        // Held until now, so that nobody else has them.
+        self.ports.clear();
+        let (listen, tls) = (&self.listens, self.tls.as_ref());
+        let settings = Settings { mode: "peer", listen, connect, tls, connected_within: None };
+        let open = settings.open().and_then(|session| Line::new(session, self.me, &self.arrives));
+        self.mesh = Some(open.map_err(|reason| taken(listen, reason))?);
+        Ok(())
+    }
+}
+
+impl Wire for ZenohWire {
+    fn send(&mut self, to: Party, frame: &[u8]) {
+        match (&mut self.mesh, to) {
+            (Some(mesh), Party::Node(_)) => mesh.send(to, frame),
+            _ => self.hub.send(to, frame),
+        }
+    }
+
+    fn receive(&mut self, within: Duration) -> Option<Vec<u8>> {
+        self.arrived.recv_timeout(within).ok()
+    }
+
+    fn join(&mut self, me: EntityId, members: &[Member]) -> Result<(), WireError> {
+        // The session finds those again that were away.
+        if self.listens.is_empty() || self.mesh.is_some() {
+            return Ok(());
+        }
+        // One connection for each two: of the one with the higher id.
+        let before = members.iter().filter(|member| member.agent < me);
+        let connect: Vec<String> = before.flat_map(|member| member.listens.clone()).collect();
+        self.open_mesh(&connect)
+    }
+}
+
+/// Returns an endpoint's host and port, e.g. of `tcp/127.0.0.1:7600`.
+///
+/// # Errors
+/// When it is none.
+pub fn host_and_port(endpoint: &str) -> Result<(&str, u16), WireError> {
+    let no_endpoint = || WireError::NoEndpoint(endpoint.into());
+    let (protocol, address) = endpoint.split_once('/').ok_or_else(no_endpoint)?;
+    let (host, port) = address.rsplit_once(':').ok_or_else(no_endpoint)?;
+    if !["tcp", "tls"].contains(&protocol) || host.is_empty() {
+        return Err(no_endpoint());
+    }
+    Ok((host, port.parse().map_err(|_| no_endpoint())?))
+}
+
+/// Holds a port until somebody else may have it.
+#[derive(Debug)]
+pub struct Held {
+    /// The endpoint, with a port.
+    pub endpoint: String,
+    _port: TcpListener,
+}
+
+/// Lowest port that is tried for who asks for any, and their number: below those that systems give to connections
+/// that go out, of which one could have it first.
+const PORTS: (u16, u16) = (20_000, 12_000);
+
+/// Holds the port of an endpoint; port 0 stands for any free one.
+///
+/// # Errors
+/// When it cannot be had, or the endpoint is none.
+pub fn hold(endpoint: &str) -> Result<Held, WireError> {
+    let (host, port) = host_and_port(endpoint)?;
+    let bare = host.trim_start_matches('[').trim_end_matches(']');
+    let bind = |port: u16| {
+        let addresses = (bare, port).to_socket_addrs().map_err(|e| e.to_string())?;
+        TcpListener::bind(&*addresses.collect::<Vec<_>>()).map_err(|e| e.to_string())
+    };
+    let with = |port: u16| {
+        let start = endpoint.len() - endpoint.rsplit(':').next().map_or(0, str::len);
+        format!("{}{port}", &endpoint[..start])
+    };
+    if port > 0 {
+        let held = bind(port).map_err(|reason| taken(&[endpoint.into()], reason))?;
+        return Ok(Held { endpoint: endpoint.into(), _port: held });
+    }
+    let first = (std::process::id().wrapping_mul(97) % u32::from(PORTS.1)) as u16;
+    let mut why = String::new();
+    for k in 0..PORTS.1 {
+        let port = PORTS.0 + (first + k) % PORTS.1;
+        match bind(port) {
+            Ok(held) => return Ok(Held { endpoint: with(port), _port: held }),
+            Err(reason) => why = reason,
+        }
+    }
+    Err(taken(&[endpoint.into()], why))
+}
+
+/// Checks that an endpoint can be listened at.
+fn vacant(endpoint: &str) -> Result<(), WireError> {
+    hold(endpoint).map(drop)
+}
+
+fn taken(endpoints: &[String], reason: String) -> WireError {
+    WireError::Taken { endpoint: endpoints.join(", "), reason }
+}
+
+#[cfg(test)]
+mod tests;

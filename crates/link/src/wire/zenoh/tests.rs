@@ -1,0 +1,196 @@
+//! Traps of Zenoh that this wire goes around, each shown to be one, on loopback.
+
+use super::*;
+use crate::mail::{Heard, Mail};
+use crate::words::Word;
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// Time that nothing here takes.
+const LONG: Duration = Duration::from_secs(30);
+
+/// Time in which a frame on loopback has come a hundred times over.
+const SOON: Duration = Duration::from_millis(300);
+
+const A: Party = Party::Node(1);
+const B: Party = Party::Node(2);
+
+fn free() -> String {
+    hold("tcp/127.0.0.1:0").expect("a free port").endpoint
+}
+
+fn line(mode: &str, me: Party, [listen, connect]: [&[String]; 2]) -> (Line, Receiver<Vec<u8>>) {
+    let connected_within = (mode == "client").then_some(LONG);
+    let session =
+        Settings { mode, listen, connect, connected_within, tls: None }.open().expect("open");
+    let (arrives, arrived) = channel();
+    (Line::new(session, me, &arrives).expect("a line"), arrived)
+}
+
+/// Sends a frame again and again until it has come.
+fn reaches(from: &mut Line, to: Party, arrived: &Receiver<Vec<u8>>) {
+    let until = Instant::now() + LONG;
+    loop {
+        from.send(to, b"frame");
+        if arrived.recv_timeout(Duration::from_millis(20)).is_ok() {
+            return;
+        }
+        assert!(Instant::now() < until, "no frame has come to {to}");
+    }
+}
+
+/// A hub that is a peer hears both leaves, and they do not hear each other: nobody says so. Through a router they do.
+#[test]
+fn a_peer_does_not_relay_and_a_router_does() {
+    for (hub, leaf, relays) in [("peer", "peer", false), ("router", "client", true)] {
+        let at = [free()];
+        let (_hub, at_hub) = line(hub, Party::Server, [&at, &[]]);
+        let (mut a, _at_a) = line(leaf, A, [&[], &at]);
+        let (mut b, at_b) = line(leaf, B, [&[], &at]);
+        reaches(&mut a, Party::Server, &at_hub);
+        reaches(&mut b, Party::Server, &at_hub);
+        if relays {
+            reaches(&mut a, B, &at_b);
+        } else {
+            a.send(B, b"frame");
+            assert!(
+                at_b.recv_timeout(SOON).is_err(),
+                "peers relay now: the wire can be made simpler"
+            );
+        }
+    }
+}
+
+/// A way between two ends that can be cut: then it takes what is sent, as a network without a cable does, and
+/// nothing arrives.
+struct Cable {
+    endpoint: String,
+    is_cut: Arc<AtomicBool>,
+}
+
+impl Cable {
+    fn to(server: &str, is_cut: bool) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        let endpoint = format!("tcp/{}", listener.local_addr().expect("bound"));
+        let is_cut = Arc::new(AtomicBool::new(is_cut));
+        let (cut, server) = (is_cut.clone(), server.trim_start_matches("tcp/").to_string());
+        std::thread::spawn(move || {
+            for near in listener.incoming().flatten() {
+                let Ok(far) = TcpStream::connect(&server) else { continue };
+                let both = [(near.try_clone(), far.try_clone()), (Ok(far), Ok(near))];
+                for (from, to) in both {
+                    let cut = cut.clone();
+                    std::thread::spawn(move || carry(from.ok()?, to.ok()?, &cut));
+                }
+            }
+        });
+        Self { endpoint, is_cut }
+    }
+
+    fn cut(&self, is_cut: bool) {
+        self.is_cut.store(is_cut, Ordering::Relaxed);
+    }
+}
+
+/// Carries bytes one way. A connection that has lost any is never whole again.
+fn carry(mut from: TcpStream, mut to: TcpStream, is_cut: &AtomicBool) -> Option<()> {
+    let mut bytes = [0; 4096];
+    let mut has_lost = false;
+    loop {
+        let read = from.read(&mut bytes).ok().filter(|read| *read > 0);
+        let Some(read) = read else {
+            let _ = to.shutdown(std::net::Shutdown::Both);
+            return None;
+        };
+        has_lost |= is_cut.load(Ordering::Relaxed);
+        if !has_lost {
+            to.write_all(&bytes[..read]).ok()?;
+        }
+    }
+}
+
+/// In a partition a put succeeds and its frame is gone; letters come when it is over. The link is given up within its
+/// lease, and opened again within seconds, as both time limits of opening are one: Zenoh's own are ten.
+#[test]
+fn frames_vanish_in_a_partition_and_letters_do_not() {
+    let server = free();
+    let cable = Cable::to(&server, false);
+    let wire = ZenohWire::server(&[server], None).expect("a server");
+    let mut hub = Mail::new(Party::Server, Box::new(wire));
+    let wire =
+        ZenohWire::node(A, std::slice::from_ref(&cable.endpoint), None, LONG).expect("it answers");
+    let mut node = Mail::new(A, Box::new(wire));
+    node.meet(Party::Server, hub.life());
+    hub.meet(A, node.life());
+    let mut hear = |node: &mut Mail, word: Word, within: Duration| {
+        let until = Instant::now() + within;
+        while Instant::now() < until {
+            node.receive(Duration::from_millis(1));
+            match hub.receive(Duration::from_millis(5)) {
+                Some(Heard { word: heard, .. }) if heard == word => return true,
+                _ => {}
+            }
+        }
+        false
+    };
+    node.letter(Party::Server, Word::Close(1));
+    assert!(hear(&mut node, Word::Close(1), LONG));
+    cable.cut(true);
+    node.note(Party::Server, Word::Hello);
+    node.letter(Party::Server, Word::Close(2));
+    assert!(!hear(&mut node, Word::Close(2), 2 * Duration::from_millis(LEASE_MS)), "it is cut");
+    cable.cut(false);
+    let healed = Instant::now();
+    assert!(hear(&mut node, Word::Close(2), LONG), "a letter comes in the end");
+    assert!(healed.elapsed() < Duration::from_secs(8), "{:?}", healed.elapsed());
+    assert!(!hear(&mut node, Word::Hello, SOON), "a note that was cut off is gone");
+}
+
+/// An end that takes connections and answers nobody, as one behind a cut cable, holds up nobody for long.
+#[test]
+fn a_link_that_is_not_answered_is_tried_again_soon() {
+    let server = free();
+    let _hub = ZenohWire::server(std::slice::from_ref(&server), None).expect("a server");
+    let cable = Cable::to(&server, true);
+    let mended = {
+        let is_cut = cable.is_cut.clone();
+        std::thread::spawn(move || {
+            // As long as one try may take.
+            std::thread::sleep(Duration::from_millis(OPENED_WITHIN_MS));
+            is_cut.store(false, Ordering::Relaxed);
+        })
+    };
+    let began = Instant::now();
+    let at = std::slice::from_ref(&cable.endpoint);
+    ZenohWire::node(A, at, None, LONG).expect("it answers in the end");
+    assert!(began.elapsed() < Duration::from_secs(8), "{:?}", began.elapsed());
+    mended.join().expect("no panic");
+}
+
+#[test]
+fn a_port_that_is_taken_or_an_endpoint_that_is_none_is_said_to_be() {
+    let held = hold("tcp/127.0.0.1:0").expect("a free port");
+    let again = hold(&held.endpoint).expect_err("it is held");
+    assert!(
+        matches!(again, WireError::Taken { ref endpoint, .. } if *endpoint == held.endpoint),
+        "{again}"
+    );
+    let server = ZenohWire::server(std::slice::from_ref(&held.endpoint), None);
+    assert!(matches!(server, Err(WireError::Taken { .. })));
+    for wrong in ["127.0.0.1:7600", "udp/127.0.0.1:1", "tcp/127.0.0.1", "tcp/:1", "tcp/a:99999", ""]
+    {
+        assert_eq!(hold(wrong).map(drop), Err(WireError::NoEndpoint(wrong.into())), "{wrong}");
+    }
+}
+
+#[test]
+fn nobody_who_answers_is_an_error_in_time() {
+    let at = [free()];
+    let began = Instant::now();
+    let found = ZenohWire::node(A, &at, None, SOON);
+    assert!(matches!(found, Err(WireError::NoAnswer { .. })));
+    assert!(began.elapsed() < Duration::from_secs(8));
+}

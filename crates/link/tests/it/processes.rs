@@ -1,0 +1,210 @@
+//! Fleets as processes: the program `sidestep-link` as it is started by `sidestep fleet`.
+
+use crate::support::{alone, superconflict, untimed, wide};
+use sidestep::worlds::WORLDS;
+use sidestep_session::fleet::{
+    Clock, Common, Failed, FleetJob, FleetNow, Flown, Job, Told, Topology,
+};
+use sidestep_session::{Journey, Status, Unwatched};
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+/// Time that nothing here takes.
+const LONG: Duration = Duration::from_secs(60);
+
+/// A job of the scenario `s.toml` of a folder.
+pub(crate) fn job(folder: &Path, topology: Topology, clock: Clock) -> FleetJob {
+    let flown = Flown {
+        file: folder.join("s.toml"),
+        overrides: Vec::new(),
+        build: sidestep_session::build().into(),
+    };
+    let (tls, metrics, log) = (None, None, "error".to_string());
+    FleetJob {
+        common: Common { flown, tls, lease_s: 10.0, metrics, json_log: false, log },
+        nodes: None,
+        clock,
+        topology,
+        listen: vec!["tcp/127.0.0.1:0".into()],
+        out: None,
+        replace: false,
+        packets: false,
+    }
+}
+
+/// A program that does a job. It is killed when it is dropped.
+pub(crate) struct Program {
+    pub(crate) child: Child,
+    pub(crate) stdin: Option<ChildStdin>,
+    told: Receiver<Told>,
+}
+
+impl Program {
+    pub(crate) fn start(job: &Job) -> Self {
+        Self::start_by(Command::new(env!("CARGO_BIN_EXE_sidestep-link")), job)
+    }
+
+    /// Starts the program in a network namespace.
+    pub(crate) fn start_in(namespace: &str, job: &Job) -> Self {
+        let mut command = Command::new("ip");
+        command.args(["netns", "exec", namespace, env!("CARGO_BIN_EXE_sidestep-link")]);
+        Self::start_by(command, job)
+    }
+
+    fn start_by(mut command: Command, job: &Job) -> Self {
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
+        let mut child = command.spawn().expect("the program starts");
+        let mut stdin = child.stdin.take().expect("a pipe");
+        let line = serde_json::to_string(job).expect("plain data");
+        writeln!(stdin, "{line}").expect("it reads its job");
+        let out = BufReader::new(child.stdout.take().expect("a pipe"));
+        let (sender, told) = channel();
+        std::thread::spawn(move || {
+            for line in out.lines().map_while(Result::ok) {
+                let _ = sender.send(serde_json::from_str(&line).expect("a line that is known"));
+            }
+        });
+        Self { child, stdin: Some(stdin), told }
+    }
+
+    /// Returns the next line for which something holds.
+    pub(crate) fn until<T>(&self, what: &str, wanted: impl Fn(Told) -> Option<T>) -> T {
+        let until = Instant::now() + LONG;
+        loop {
+            let told = self.told.recv_timeout(until.saturating_duration_since(Instant::now()));
+            let told = told.unwrap_or_else(|e| panic!("waited for {what}: {e}"));
+            if let Some(found) = wanted(told) {
+                return found;
+            }
+        }
+    }
+
+    /// Returns the fleet once something holds for it.
+    pub(crate) fn fleet(&self, what: &str, holds: impl Fn(&FleetNow) -> bool) -> FleetNow {
+        self.until(what, |told| match told {
+            Told::Fleet(now) if holds(&now) => Some(now),
+            Told::Failed(failed) => panic!("{failed:?}"),
+            _ => None,
+        })
+    }
+
+    /// Returns the exit code, and why it failed if it did.
+    pub(crate) fn end(mut self) -> (Option<i32>, Option<Failed>) {
+        let status = self.child.wait().expect("it ends");
+        let failed = self.told.iter().find_map(|told| match told {
+            Told::Failed(failed) => Some(failed),
+            _ => None,
+        });
+        (status.code(), failed)
+    }
+}
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+pub(crate) fn folder(text: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("s.toml"), text).expect("written");
+    folder
+}
+
+/// Whether a process is there, and is no corpse.
+fn is_alive(process: u32) -> bool {
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+    stat.rsplit(')')
+        .next()
+        .is_some_and(|rest| !rest.is_empty() && !rest.trim_start().starts_with('Z'))
+}
+
+fn wait_until_gone(fleet: &FleetNow, within: Duration) {
+    let until = Instant::now() + within;
+    let processes: Vec<u32> = fleet.nodes.iter().filter_map(|node| node.process).collect();
+    while let Some(left) = processes.iter().find(|&&process| is_alive(process)) {
+        assert!(Instant::now() < until, "process {left} of {processes:?} is left over");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+pub(crate) fn signal(process: u32, name: &str) {
+    let sent = Command::new("kill").args([&format!("-{name}"), &process.to_string()]).status();
+    assert!(sent.expect("kill is there").success());
+}
+
+#[test]
+fn processes_come_out_as_one_process_does_and_leave_an_ordinary_folder() {
+    let text = superconflict(4, "compact-team", 40, "");
+    let folder = folder(&text);
+    let out = folder.path().join("run");
+    let job =
+        FleetJob { out: Some(out.clone()), ..job(folder.path(), Topology::Mesh, Clock::Lockstep) };
+    let program = Program::start(&Job::Fleet(job));
+    let (summary, fleet) = program.until("the end", |told| match told {
+        Told::Ended { summary, fleet, .. } => Some((summary, fleet)),
+        Told::Failed(failed) => panic!("{failed:?}"),
+        _ => None,
+    });
+    assert_eq!(program.end(), (Some(0), None));
+    let one = alone(&text);
+    assert_eq!(summary["digest"], one.digest);
+    assert_eq!(untimed(summary["metrics"].clone()), one.metrics);
+    let packets: u64 = fleet.nodes.iter().map(|node| node.packets).sum();
+    assert!(packets > 0 && fleet.nodes.iter().all(|node| node.late == 0), "{fleet:?}");
+    let recorded = sidestep_session::stored_summary(&out).expect("an ordinary folder");
+    assert_eq!(recorded.expect("a summary")["digest"], one.digest);
+}
+
+#[test]
+fn a_fleet_whose_starter_is_gone_ends_in_good_order_and_leaves_no_process() {
+    let folder = folder(&wide(&superconflict(4, "compact-team", 1_000_000, ""), 1_000_000));
+    let out = folder.path().join("run");
+    let job =
+        FleetJob { out: Some(out.clone()), ..job(folder.path(), Topology::Star, Clock::Lockstep) };
+    let mut program = Program::start(&Job::Fleet(job));
+    let fleet = program.fleet("some cycles", |now| now.cycle > 3);
+    drop(program.stdin.take());
+    let (code, failed) = program.end();
+    assert_eq!(code, Some(130), "{failed:?}");
+    wait_until_gone(&fleet, Duration::ZERO);
+    let stored = sidestep_session::stored_summary(&out).expect("stored").expect("a summary");
+    assert_eq!(stored["status"], "incomplete");
+}
+
+/// The server is killed, and its nodes end although nobody ends them; the folder is not lost.
+#[test]
+fn nodes_of_a_server_that_is_killed_end_by_themselves_and_the_folder_resumes() {
+    let text = wide(&superconflict(4, "compact-team", 200, ""), 8_000)
+        + "[record]\ncheckpoint_every = 5\n";
+    let folder = folder(&text);
+    let out = folder.path().join("run");
+    let slow = Clock::Realtime { speed: 100.0 };
+    let job = FleetJob { out: Some(out.clone()), ..job(folder.path(), Topology::Mesh, slow) };
+    let mut program = Program::start(&Job::Fleet(job));
+    let fleet = program.fleet("some cycles", |now| now.cycle > 10);
+    program.child.kill().expect("killed");
+    wait_until_gone(&fleet, Duration::from_secs(10));
+    let journey = Journey::resume(WORLDS, &out, 1, None).expect("it can be resumed");
+    assert!(journey.cycle() >= 5);
+    let summary = journey.travel(&Unwatched).expect("flown to the end");
+    assert_eq!(summary.status, Status::Complete);
+}
+
+#[test]
+fn lockstep_does_not_go_on_without_a_node_that_is_killed() {
+    let folder = folder(&wide(&superconflict(4, "compact-team", 1_000_000, ""), 1_000_000));
+    let job = job(folder.path(), Topology::Mesh, Clock::Lockstep);
+    let program = Program::start(&Job::Fleet(job));
+    let fleet = program.fleet("some cycles", |now| now.cycle > 3);
+    signal(fleet.nodes[2].process.expect("a process"), "KILL");
+    let (code, failed) = program.end();
+    let cause = failed.expect("it says why").cause;
+    assert_eq!(code, Some(1));
+    assert!(cause.contains("agent 2 is gone") && cause.contains("signal: 9"), "{cause}");
+    wait_until_gone(&fleet, Duration::ZERO);
+}

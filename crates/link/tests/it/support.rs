@@ -1,0 +1,141 @@
+//! Fleets to test.
+
+use serde_json::Value;
+use sidestep::kernel::EntityId;
+use sidestep::scenario::{Compiled, Source};
+use sidestep::worlds::WORLDS;
+use sidestep_link::airspace::{Aboard, Airspace, Faults, fingerprint, world_of};
+use sidestep_link::mail::Mail;
+use sidestep_link::node::{Asked, Node, NodeError, join};
+use sidestep_link::ports::{Channel, Program};
+use sidestep_link::server::{Attendant, Broken, Look, Server, Tally, Terms};
+use sidestep_link::wire::{Party, Wire};
+use sidestep_link::words::{Clock, Join, Status, Topology, Welcome};
+use sidestep_session::{Journey, Keep, Unwatched};
+use std::thread::{JoinHandle, spawn};
+use std::time::Duration;
+
+/// Time that no test needs.
+pub(crate) const LONG: Duration = Duration::from_secs(60);
+
+/// Returns the text of a scenario: `n` airplanes on a circle, each of which wants to the other side.
+pub(crate) fn superconflict(n: usize, deployment: &str, cycles: u64, more: &str) -> String {
+    format!(
+        "format = 1\nworld = \"airspace\"\nname = \"ring\"\nseed = 5\ncycles = {cycles}\n[airspace]\n\
+         deployment = \"{deployment}\"\nmax_rounds = 40\n{more}\n\
+         [airspace.generator]\nkind = \"superconflict\"\nn = {n}\nradius_m = 1500.0\n"
+    )
+}
+
+/// Returns the same on a circle of another size, so that it takes longer.
+pub(crate) fn wide(text: &str, radius_m: u32) -> String {
+    text.replace("radius_m = 1500.0", &format!("radius_m = {radius_m}.0"))
+}
+
+/// The outcome of a run: the digest of its state, and the metrics but for those that a clock measures.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Came {
+    pub(crate) digest: String,
+    pub(crate) metrics: Value,
+}
+
+fn compiled(text: &str) -> (Source, Box<dyn Compiled>) {
+    let source = Source::new("s.toml", text, "");
+    let compiled = WORLDS.compile(&source).expect("a scenario");
+    (source, compiled)
+}
+
+/// Returns metrics without what a clock has measured.
+pub(crate) fn untimed(mut metrics: Value) -> Value {
+    let all = metrics.as_object_mut().expect("an object");
+    all.retain(|key, _| !key.contains("cpu") && !key.contains("wall"));
+    metrics
+}
+
+fn came(journey: Journey) -> Came {
+    let summary = journey.finish(&Unwatched).expect("stored");
+    Came { digest: summary.digest, metrics: untimed(summary.metrics) }
+}
+
+/// Returns what comes of a scenario in one process.
+pub(crate) fn alone(text: &str) -> Came {
+    let (source, compiled) = compiled(text);
+    let mut journey =
+        Journey::start(compiled.as_ref(), &source, 1, Keep::default(), None).expect("started");
+    let cycles = journey.simulation().plan().cycles;
+    journey.advance_to(cycles, &Unwatched).expect("flown");
+    came(journey)
+}
+
+/// Somebody who leaves a fleet alone.
+pub(crate) struct Nobody;
+
+impl Attendant for Nobody {
+    fn attend(&mut self, _: &Look<'_>) -> Result<Vec<(EntityId, String)>, Broken> {
+        Ok(Vec::new())
+    }
+}
+
+/// How a fleet is flown in a test.
+pub(crate) struct Way<'a> {
+    pub(crate) clock: Clock,
+    pub(crate) topology: Topology,
+    pub(crate) lease: Duration,
+    /// The wire of each party.
+    pub(crate) wire: &'a dyn Fn(Party) -> Box<dyn Wire>,
+    /// Endpoints at which a node is reached.
+    pub(crate) listens: &'a dyn Fn(EntityId) -> Vec<String>,
+    pub(crate) attendant: &'a mut dyn Attendant,
+}
+
+/// Flies a scenario with a thread for each airplane.
+pub(crate) fn in_threads(text: &str, way: Way<'_>) -> (Came, Result<(), Broken>, Tally) {
+    let (source, compiled) = compiled(text);
+    let scenario = fingerprint(compiled.as_ref(), &source).expect("a fingerprint");
+    let world = world_of(compiled.as_ref(), &source).expect("an airspace");
+    let welcome = Welcome {
+        clock: way.clock,
+        topology: way.topology,
+        overrides: Vec::new(),
+        logs_packets: false,
+    };
+    let terms = Terms {
+        scenario: scenario.clone(),
+        build: "test".into(),
+        welcome,
+        lease: way.lease,
+        has_faults: world.network.is_some(),
+    };
+    let journey =
+        Journey::start(compiled.as_ref(), &source, 1, Keep::default(), None).expect("started");
+    let mut stage = Airspace::new(journey, &Unwatched);
+    let mail = Mail::new(Party::Server, (way.wire)(Party::Server));
+    let nodes: Vec<JoinHandle<Result<Status, NodeError>>> = (0..world.airplanes.len() as EntityId)
+        .map(|agent| {
+            let mail = Mail::new(Party::Node(agent), (way.wire)(Party::Node(agent)));
+            let (listens, scenario) = ((way.listens)(agent), scenario.clone());
+            let join = Join { agent, scenario, build: "test".into(), listens, process: 0 };
+            let (world, lease) = (world.clone(), way.lease);
+            spawn(move || node(mail, join, world, lease))
+        })
+        .collect();
+    let (flown, tally) = Server::new(mail, &mut stage, way.attendant, terms).run();
+    for node in nodes {
+        let ended = node.join().expect("no panic");
+        assert!(flown.is_err() || ended.is_ok(), "{ended:?}");
+    }
+    (came(stage.into_journey()), flown, tally)
+}
+
+fn node(
+    mut mail: Mail,
+    question: Join,
+    world: std::sync::Arc<sidestep::worlds::airspace::AirspaceWorld>,
+    lease: Duration,
+) -> Result<Status, NodeError> {
+    let agent = question.agent;
+    let welcome = join(&mut mail, &Asked { join: question, patience: LONG })?;
+    let program: Box<dyn Program> = Box::new(Aboard::new(world.clone(), agent, "test"));
+    let channel = Faults::new(world, agent).map(|faults| Box::new(faults) as Box<dyn Channel>);
+    Node::new(agent, mail, (program, channel), &welcome, lease).run()
+}

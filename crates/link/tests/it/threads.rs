@@ -1,0 +1,93 @@
+//! In lockstep a fleet comes out as one process does: in threads, over memory and over sockets.
+
+use crate::support::{LONG, Nobody, Way, alone, in_threads, superconflict};
+use sidestep::kernel::EntityId;
+use sidestep_link::wire::memory::Exchange;
+use sidestep_link::wire::zenoh::{ZenohWire, hold};
+use sidestep_link::wire::{Party, Wire};
+use sidestep_link::words::{Clock, Topology};
+
+/// Deployments in which each airplane has a program of its own.
+const DEPLOYMENTS: [&str; 4] = ["team", "compact-team", "pim", "hierarchical-pim"];
+
+const BAD_NETWORK: &str = "network = { loss = 0.1, duplication = 0.1, max_delay_s = 0.003, \
+    bursts = { loss = 0.8, lasts_s = 3, every_s = 20 }, range_m = 2500, \
+    silent = [{ airplane = 2, from_s = 40, until_s = 80 }], \
+    partitions = [{ sides = [[0, 1], [2, 3]], from_s = 20, until_s = 50 }], \
+    one_way = [{ sender = 0, receiver = 3, from_s = 60 }] }";
+
+fn over_memory(text: &str) -> crate::support::Came {
+    let exchange = Exchange::default();
+    let way = Way {
+        clock: Clock::Lockstep,
+        topology: Topology::Star,
+        lease: LONG,
+        wire: &|me| Box::new(exchange.wire(me)),
+        listens: &|_| Vec::new(),
+        attendant: &mut Nobody,
+    };
+    let (came, flown, tally) = in_threads(text, way);
+    flown.expect("flown to the end");
+    assert_eq!((tally.late_controls, tally.absurd_controls), (0, 0));
+    came
+}
+
+#[test]
+fn threads_come_out_as_one_process_does_in_every_deployment() {
+    for deployment in DEPLOYMENTS {
+        let text = superconflict(4, deployment, 30, "");
+        assert_eq!(over_memory(&text), alone(&text), "{deployment}");
+    }
+}
+
+#[test]
+fn the_scenarios_own_faults_are_the_same_ones_in_threads_to_the_last_message() {
+    for deployment in DEPLOYMENTS {
+        let text = superconflict(4, deployment, 20, BAD_NETWORK);
+        let (threads, one) = (over_memory(&text), alone(&text));
+        assert!(one.metrics["contacts_lost"].as_u64() > Some(0), "{}", one.metrics);
+        assert_eq!(threads, one, "{deployment}");
+    }
+}
+
+#[test]
+fn messages_that_take_time_by_their_size_take_it_in_threads_too() {
+    let text = superconflict(4, "team", 6, "network = { bandwidth_bit_s = 1e6, loss = 0.05 }");
+    assert_eq!(over_memory(&text), alone(&text));
+}
+
+/// Sockets of this machine, in both topologies.
+#[test]
+fn sockets_come_out_as_one_process_does_in_a_mesh_and_in_a_star() {
+    for (topology, more) in
+        [(Topology::Mesh, ""), (Topology::Star, ""), (Topology::Mesh, BAD_NETWORK)]
+    {
+        let text = superconflict(4, "compact-team", 12, more);
+        let free = |_| hold("tcp/127.0.0.1:0").expect("a free port");
+        let server = free(0).endpoint;
+        let ports: Vec<String> = match topology {
+            Topology::Mesh => {
+                // All are held at once, so that they differ.
+                let held: Vec<_> = (0..4).map(free).collect();
+                held.into_iter().map(|held| held.endpoint).collect()
+            }
+            Topology::Star => Vec::new(),
+        };
+        let listens = |agent: EntityId| ports.get(agent as usize).cloned().into_iter().collect();
+        let wire = |me: Party| -> Box<dyn Wire> {
+            let at = std::slice::from_ref(&server);
+            let Party::Node(agent) = me else {
+                return Box::new(ZenohWire::server(at, None).expect("a server"));
+            };
+            let wire = ZenohWire::node(me, at, None, LONG).expect("the server answers");
+            let held = ports.get(agent as usize).map(|port| hold(port).expect("free"));
+            Box::new(wire.listening(held.into_iter().collect()))
+        };
+        let (clock, lease) = (Clock::Lockstep, LONG);
+        let way =
+            Way { clock, topology, lease, wire: &wire, listens: &listens, attendant: &mut Nobody };
+        let (came, flown, _) = in_threads(&text, way);
+        flown.expect("flown to the end");
+        assert_eq!(came, alone(&text), "{topology:?} {more}");
+    }
+}

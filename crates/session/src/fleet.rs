@@ -1,0 +1,248 @@
+//! The language in which a command asks the program `sidestep-link` to fly a fleet, and that one answers.
+//!
+//! One line of JSON goes in, a [`Job`]; lines of JSON come out, [`Told`]. The program ends in good order when its
+//! standard input ends: whoever started it is gone, or wants it to end. So no process is left over, however
+//! the one before it has ended.
+
+use serde::{Deserialize, Serialize};
+use sidestep::kernel::words::Lines;
+use sidestep::kernel::{Cycle, EntityId, InputError};
+use std::path::PathBuf;
+
+/// The name of the program.
+pub const PROGRAM: &str = "sidestep-link";
+
+/// A job for the program.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Job {
+    /// Serve a world to nodes, some of which it starts itself.
+    Fleet(FleetJob),
+    /// Fly one airplane of it.
+    Node(NodeJob),
+}
+
+/// A scenario, and the build that is to fly it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Flown {
+    /// The scenario's file.
+    pub file: PathBuf,
+    /// Changes of it, as `key=value`.
+    pub overrides: Vec<String>,
+    /// The build that asks: another one gives other results.
+    pub build: String,
+}
+
+/// Settings that a server and its nodes have alike.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Common {
+    /// The scenario.
+    pub flown: Flown,
+    /// Certificates, where links are encrypted and both ends prove who they are.
+    pub tls: Option<Tls>,
+    /// Time in seconds after which a party that is not heard is taken to be gone.
+    pub lease_s: f64,
+    /// The address at which it tells its metrics, as `HOST:PORT`.
+    pub metrics: Option<String>,
+    /// Whether logs are JSON.
+    pub json_log: bool,
+    /// The least severe log lines that are told, e.g. `info`.
+    pub log: String,
+}
+
+/// A fleet.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FleetJob {
+    /// Settings that nodes have, too.
+    pub common: Common,
+    /// Number of nodes that are started here, of the airplanes with the lowest ids; all of them unless given.
+    pub nodes: Option<usize>,
+    /// The course of time.
+    pub clock: Clock,
+    /// The way from node to node.
+    pub topology: Topology,
+    /// Endpoints at which the server listens, e.g. `tcp/127.0.0.1:0`.
+    pub listen: Vec<String>,
+    /// Folder in which the run is recorded.
+    pub out: Option<PathBuf>,
+    /// Whether an earlier run there is replaced.
+    pub replace: bool,
+    /// Whether the folder gets a table of all packets.
+    pub packets: bool,
+}
+
+/// A node.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NodeJob {
+    /// Settings that the server has, too.
+    pub common: Common,
+    /// Its airplane.
+    pub airplane: EntityId,
+    /// Endpoints at one of which the server is.
+    pub connect: Vec<String>,
+    /// Endpoints at which other nodes reach it, in a mesh.
+    pub listen: Vec<String>,
+    /// Time in seconds that it waits for the server.
+    pub patience_s: f64,
+}
+
+/// The course of time in a fleet.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Clock {
+    /// The server waits for every control.
+    Lockstep,
+    /// Each cycle is a deadline; time passes at a speed.
+    Realtime {
+        /// Seconds of the scenario in a second: 1 is as fast as in the scenario.
+        speed: f64,
+    },
+}
+
+/// The way of packets from node to node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Topology {
+    /// Every node listens, and each is connected with each.
+    Mesh,
+    /// Through the server.
+    Star,
+}
+
+/// Certificates with which both ends of a link prove who they are; files in the format PEM.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Tls {
+    /// Certificate of the authority that signs those of all parties.
+    pub authority: PathBuf,
+    /// Certificate of this party.
+    pub certificate: PathBuf,
+    /// Its private key.
+    pub key: PathBuf,
+}
+
+/// A line of the program.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Told {
+    /// It listens at these endpoints.
+    Listens(Vec<String>),
+    /// The fleet as it is now.
+    Fleet(FleetNow),
+    /// The fleet has come to its end, or was stopped.
+    Ended {
+        /// The summary of the run, as `summary.json` has it.
+        summary: serde_json::Value,
+        /// The world's own results as text.
+        outcome: Lines,
+        /// The fleet as it was at the end.
+        fleet: FleetNow,
+    },
+    /// It could not do what it was asked.
+    Failed(Failed),
+}
+
+/// The reason why the program could not do what it was asked, and the remedy.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Failed {
+    /// Whether an option, a file or another party's input is wrong: then nothing was started.
+    pub is_input: bool,
+    /// Whether somebody asked it to stop.
+    pub is_interrupted: bool,
+    /// The place of what is wrong.
+    pub place: String,
+    /// The reason.
+    pub cause: String,
+    /// The remedy.
+    pub remedy: String,
+}
+
+/// A fleet at one moment.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct FleetNow {
+    /// Cycles done.
+    pub cycle: Cycle,
+    /// Cycles planned.
+    pub cycles: Cycle,
+    /// Whether all nodes have joined.
+    pub has_begun: bool,
+    /// Number of cycles that began late, in real time.
+    pub late_cycles: u64,
+    /// Median time in milliseconds from the percepts to the last control.
+    pub talk_p50_ms: Option<f64>,
+    /// The time in milliseconds below which 99 of 100 of them are.
+    pub talk_p99_ms: Option<f64>,
+    /// The nodes, by rising id.
+    pub nodes: Vec<NodeNow>,
+}
+
+/// A node at one moment.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct NodeNow {
+    /// Its airplane.
+    pub airplane: EntityId,
+    /// A word for its state: `awaited`, `joined`, `gone`, or its part in the cycle.
+    pub state: String,
+    /// The process of the node, where it has one.
+    pub process: Option<u32>,
+    /// The epoch of the coordinator that it follows.
+    pub epoch: u64,
+    /// The number of others that it has heard in the last cycle.
+    pub heard: usize,
+    /// The ids of these.
+    pub heard_of: Vec<EntityId>,
+    /// The round of its talk.
+    pub round: u32,
+    /// Number of its controls that were flown.
+    pub flown: u64,
+    /// Number of its controls that came late, or not at all.
+    pub late: u64,
+    /// Number of times that it has joined.
+    pub lives: u64,
+    /// Packets that it has sent.
+    pub packets: u64,
+    /// Bytes of those.
+    pub bytes: u64,
+    /// Packets that it sends in a second.
+    pub packets_per_s: f64,
+    /// Bytes that it sends in a second.
+    pub bytes_per_s: f64,
+    /// Seconds since it was heard last.
+    pub silent_s: Option<f64>,
+}
+
+impl Failed {
+    /// Returns the failure as an error of a session.
+    pub fn into_error(self) -> crate::Error {
+        let Self { is_input, is_interrupted, place, cause, remedy } = self;
+        match () {
+            () if is_interrupted => crate::Error::Interrupted,
+            () if is_input => InputError::new(place, cause, remedy).into(),
+            () => crate::Error::stopped(cause, remedy),
+        }
+    }
+}
+
+impl From<&crate::Error> for Failed {
+    fn from(error: &crate::Error) -> Self {
+        let none = String::new;
+        let stopped = |cause: String, remedy: String| Self {
+            is_input: false,
+            is_interrupted: false,
+            place: none(),
+            cause,
+            remedy,
+        };
+        match error {
+            crate::Error::Input(input) => Self {
+                is_input: true,
+                place: input.place().to_string(),
+                ..stopped(input.cause().to_string(), input.remedy().to_string())
+            },
+            crate::Error::Interrupted => {
+                Self { is_interrupted: true, ..stopped(error.to_string(), none()) }
+            }
+            crate::Error::Stopped { cause, remedy } => stopped(cause.clone(), remedy.clone()),
+            other => stopped(other.to_string(), none()),
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! Promise D1, D2: a run that was flown by pilots outside of it is computed again from its folder, also where some
+//! of their controls are missing.
+
+use sidestep::kernel::{EntityId, Simulation};
+use sidestep::scenario::Source;
+use sidestep::worlds::WORLDS;
+use sidestep::worlds::airspace::AirspaceRun;
+use sidestep::worlds::airspace::pilot::{Control, Fleet, Packet, Pilot, Sight};
+use sidestep_session::{Journey, Keep, Recorded, Unwatched, replay_all, replay_to};
+use std::any::Any;
+use std::path::Path;
+
+const SCENARIO: &str = "format = 1\nworld = \"airspace\"\ncycles = 30\n[airspace]\ndeployment = \"team\"\n\
+    [airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 3000.0\n\
+    [record]\ncontrols = true\ncheckpoint_every = 10\n";
+
+fn airspace(journey: &mut Journey) -> &mut AirspaceRun {
+    let run: &mut dyn Any = journey.simulation_mut();
+    run.downcast_mut().expect("a run of an airspace")
+}
+
+/// Lets pilots decide a cycle: all packets arrive, one after the other.
+fn decided(pilots: &mut [Pilot], sights: Vec<Sight>) -> Vec<Control> {
+    let ids: Vec<EntityId> = sights.iter().map(|sight| sight.own.id).collect();
+    let mut due = Vec::new();
+    for sight in sights {
+        let own = sight.own.id as usize;
+        pilots[own].begin(sight, 0);
+    }
+    loop {
+        for pilot in &mut *pilots {
+            for Packet { to, payload, .. } in pilot.take_packets() {
+                let group = pilot.group().iter().copied();
+                let others = group.filter(|&id| id != pilot.id() && to.is_none_or(|to| to == id));
+                due.extend(others.map(|other| (other, pilot.id(), payload.clone())));
+            }
+        }
+        let Some((to, from, payload)) = due.pop() else { break };
+        pilots[to as usize].on_packet(from, &payload, 0);
+    }
+    ids.iter().map(|&id| pilots[id as usize].control().expect("nobody waits any more")).collect()
+}
+
+/// Records a run to cycle `until`; returns its digest. Some controls never reach it.
+fn recorded(folder: &Path, until: u64) -> String {
+    let source = Source::new("s.toml", SCENARIO, "");
+    let compiled = WORLDS.compile(&source).expect("valid");
+    let keep = Keep { folder: Some(folder), ..Keep::default() };
+    let mut journey = Journey::start(compiled.as_ref(), &source, 1, keep, None).expect("vacant");
+    let world = airspace(&mut journey).world().clone();
+    let mut pilots: Vec<Pilot> =
+        (0..3).map(|id| Pilot::new(world.clone(), id, Default::default())).collect();
+    while journey.cycle() < until {
+        let now = journey.cycle();
+        let run = airspace(&mut journey);
+        let controls = decided(&mut pilots, run.sights());
+        let come = controls.into_iter().filter(|control| (now + u64::from(control.id)) % 6 != 0);
+        run.control(come.collect()).expect("what pilots decide");
+        journey.advance_to(now + 1, &Unwatched).expect("there is room");
+    }
+    journey.finish(&Unwatched).expect("there is room").digest
+}
+
+#[test]
+fn a_run_that_was_flown_from_outside_is_replayed_from_its_controls() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let folder = dir.path().join("run");
+    let digest = recorded(&folder, 30);
+    let again = Recorded::open(WORLDS, &folder).expect("a run");
+    for workers in [1, 2] {
+        let replayed = replay_all(&again, workers, &Unwatched).expect("the digest is confirmed");
+        assert_eq!(replayed.run.digest().to_string(), digest);
+    }
+    for cycle in [0, 7, 13, 29] {
+        replay_to(&again, cycle, 1, &Unwatched).expect("the poses are confirmed");
+    }
+}
+
+/// Whoever served it is gone: pilots in memory fly on, and the whole run is computed again.
+#[test]
+fn a_run_that_lost_its_server_goes_on_by_itself_and_is_replayed() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let folder = dir.path().join("run");
+    recorded(&folder, 17);
+    let journey = Journey::resume(WORLDS, &folder, 1, None).expect("it can go on");
+    let digest = journey.travel(&Unwatched).expect("there is room").digest;
+    let again = Recorded::open(WORLDS, &folder).expect("a run");
+    let replayed = replay_all(&again, 2, &Unwatched).expect("the digest is confirmed");
+    assert_eq!(replayed.run.digest().to_string(), digest);
+}

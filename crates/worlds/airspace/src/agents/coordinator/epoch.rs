@@ -1,0 +1,105 @@
+//! Epochs: which of two coordinators is the newer one, how far one has come, and who is a majority.
+
+use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
+
+/// The largest number that an epoch or a hop may have: no talk comes near it, and a host that is
+/// told more has been told nonsense.
+const MOST: u32 = 1 << 24;
+
+/// The epoch of a coordinator: the same as long as its state only moves, and a newer one whenever
+/// it had to be brought back from a copy. It names the host that began it, so no two hosts begin the
+/// same one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub(super) struct Epoch {
+    /// The higher one is newer.
+    pub number: u32,
+    /// Place of the host that began it; among equal numbers the lower one is newer.
+    pub owner: u16,
+}
+
+impl Ord for Epoch {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.number.cmp(&other.number).then(other.owner.cmp(&self.owner))
+    }
+}
+
+impl PartialOrd for Epoch {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Epoch {
+    /// Returns the epoch in which all begin, without an election.
+    pub(super) fn first(owner: usize) -> Self {
+        Self { number: 0, owner: owner as u16 }
+    }
+
+    /// Returns the start of the epoch, before the first hop.
+    pub(super) fn start(self) -> Position {
+        Position { epoch: self, hop: 0 }
+    }
+
+    /// Returns whether it can be an epoch of a group.
+    pub(super) fn is_of(self, group: usize) -> bool {
+        usize::from(self.owner) < group && self.number < MOST
+    }
+}
+
+/// A point on a coordinator's journey: the epoch, and the number of hops in it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub(super) struct Position {
+    /// Its epoch.
+    pub epoch: Epoch,
+    /// Number of hops since the epoch began.
+    pub hop: u32,
+}
+
+impl Position {
+    /// Returns the position after the next hop.
+    pub(super) fn next(self) -> Self {
+        Self { hop: self.hop + 1, ..self }
+    }
+
+    pub(super) fn is_of(self, group: usize) -> bool {
+        self.epoch.is_of(group) && self.hop < MOST
+    }
+}
+
+/// Returns whether hosts are enough to elect: more than half of the group, or half of it with the
+/// first of all. Any two such sets have a member in common, which is all that elections rest on.
+pub(super) fn is_majority(members: &[bool]) -> bool {
+    let count = members.iter().filter(|is_in| **is_in).count();
+    2 * count > members.len() || (2 * count == members.len() && members[0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_newest_epoch_has_the_highest_number_and_then_the_lowest_id() {
+        let epoch = |number, owner| Epoch { number, owner };
+        let mut all = [epoch(1, 2), epoch(0, 0), epoch(2, 3), epoch(1, 0), epoch(2, 1)];
+        all.sort_unstable();
+        assert_eq!(all, [epoch(0, 0), epoch(1, 2), epoch(1, 0), epoch(2, 3), epoch(2, 1)]);
+        assert!(epoch(1, 0).start() > epoch(1, 2).start().next());
+    }
+
+    #[test]
+    fn any_two_majorities_have_a_member_in_common_and_one_of_any_two_halves_is_one() {
+        for n in 1..=8u32 {
+            let sets: Vec<Vec<bool>> =
+                (0..1u32 << n).map(|bits| (0..n).map(|k| bits >> k & 1 == 1).collect()).collect();
+            let majorities: Vec<_> = sets.iter().filter(|set| is_majority(set)).collect();
+            for a in &majorities {
+                assert!(majorities.iter().all(|b| (0..n as usize).any(|k| a[k] && b[k])), "{n}");
+            }
+            for set in &sets {
+                let others: Vec<bool> = set.iter().map(|is_in| !is_in).collect();
+                assert!(is_majority(set) != is_majority(&others), "{set:?}");
+            }
+        }
+    }
+}

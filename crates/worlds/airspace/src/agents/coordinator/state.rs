@@ -1,0 +1,215 @@
+//! The state of a coordinator: its data about the airplanes that it serves, and the steps of the
+//! algorithm on them.
+
+use super::epoch::Epoch;
+use crate::agents::contact::Beacon;
+use crate::agents::{Briefing, Decided, OwnShip};
+use crate::flight::{Levels, Prediction};
+use crate::objective::{Options, couple, own_costs};
+use serde::{Deserialize, Serialize};
+use sidestep_collectives::{Estimator, PairwiseGame, Player, optimize};
+use sidestep_kernel::interrupt;
+
+/// A coordinator's data about one airplane.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Visited {
+    /// Place of the airplane in the group.
+    pub place: usize,
+    pub beacon: Option<Beacon>,
+    /// Its learning player, when expectations are sampled.
+    pub player: Option<Player>,
+    /// Its samples of this round; the ways gathered in this tour are beside them.
+    pub samples: Vec<usize>,
+    pub ways: Vec<Prediction>,
+    /// Cost of the ways to the airplane itself.
+    pub own_costs: Vec<f64>,
+    pub separation_m: f64,
+    pub levels: Levels,
+    /// Whether it could not be reached, so that its only way is presumed.
+    pub is_presumed: bool,
+    pub decided: Option<Decided>,
+}
+
+/// The data of a round, or of all of them.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Gathered {
+    /// Number of rounds made, and of calm ones at the end of them.
+    pub round: u32,
+    pub calm: u32,
+    pub airplanes: Vec<Visited>,
+    /// Whether the decisions are made.
+    pub is_final: bool,
+}
+
+/// The next thing that a coordinator has to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) enum Task {
+    /// To visit the airplanes of its part from this one on.
+    Gather(usize),
+    /// To return to the airplane that it comes from.
+    Return,
+    /// To wait there for the coordinator above.
+    Await,
+    /// To bring airplanes from this one on their controls.
+    Deliver(usize),
+    /// Above others: to collect the data of the parts from this one on.
+    Collect(usize),
+    /// Above others: to bring the results to the parts before this one, the last one first.
+    HandBack(usize),
+}
+
+/// The data of a coordinator above others about their parts.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Overview {
+    /// The newest known epoch of each part's coordinator, which says where that one is at home.
+    pub epochs: Vec<Epoch>,
+    /// Whether each part is left out, since its coordinator is not to be found.
+    pub missing: Vec<bool>,
+    /// Places of hosts that could not be reached.
+    pub unreachable: Vec<usize>,
+}
+
+/// A coordinator.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Coordinator {
+    pub task: Task,
+    pub gathered: Gathered,
+    /// None but for the one above others.
+    pub overview: Option<Overview>,
+}
+
+/// Returns the number of samples in a round, where there are any.
+pub(super) fn block(briefing: &Briefing) -> Option<usize> {
+    match briefing.settings.estimator {
+        Estimator::Exact => None,
+        Estimator::Sampled { block, .. } => Some(block),
+    }
+}
+
+impl Visited {
+    /// Returns an airplane that is not visited yet.
+    pub(super) fn new(place: usize) -> Self {
+        Self { place, ..Self::default() }
+    }
+
+    /// Reads the model of the airplane that the coordinator is on.
+    pub(super) fn see(&mut self, host: &OwnShip, round: u32) {
+        let options = &host.options;
+        self.is_presumed = false;
+        self.beacon = Some(host.beacon.clone());
+        (self.separation_m, self.levels) = (options.separation_m, options.levels);
+        let costs = own_costs(&host.briefing.objective, options);
+        let Some(block) = block(&host.briefing) else {
+            self.ways.clone_from(&options.predictions);
+            self.own_costs = costs;
+            return;
+        };
+        let player = self.player.get_or_insert_with(|| Player::new(options.predictions.len()));
+        self.samples = host.samples(player, u64::from(round) * block as u64, block);
+        self.ways = self.samples.iter().map(|&x| options.predictions[x].clone()).collect();
+        self.own_costs = self.samples.iter().map(|&x| costs[x]).collect();
+    }
+
+    /// Presumes an airplane that is out of reach, as seen from another one.
+    pub(super) fn presume(&mut self, from: &OwnShip) {
+        let (options, block) = (from.presumed(self.place), block(&from.briefing));
+        self.is_presumed = true;
+        (self.separation_m, self.levels) = (options.separation_m, options.levels);
+        self.ways = vec![options.predictions[0].clone(); block.unwrap_or(1)];
+        self.own_costs = vec![0.0; block.unwrap_or(1)];
+        self.samples.clear();
+    }
+
+    /// Forgets the ways and the results of samples, which are no longer needed after a round.
+    fn drop_ways(&mut self) {
+        self.ways.clear();
+        self.own_costs.clear();
+        self.samples.clear();
+    }
+}
+
+impl Gathered {
+    /// Takes the step of the algorithm for which all have been visited. `is_late` says that time is
+    /// nearly up, so that sampling ends.
+    pub(super) fn settle(&mut self, briefing: &Briefing, is_late: bool) {
+        self.airplanes.sort_unstable_by_key(|airplane| airplane.place);
+        match briefing.settings.estimator {
+            Estimator::Exact => self.optimize(briefing),
+            Estimator::Sampled { block, ageing } => {
+                self.sampled_round(briefing, (block, ageing), is_late);
+            }
+        }
+        self.airplanes.iter_mut().for_each(Visited::drop_ways);
+    }
+
+    /// Makes all rounds with exact expectations.
+    fn optimize(&mut self, briefing: &Briefing) {
+        let options = |a: &Visited| Options::new(a.ways.clone(), a.separation_m, a.levels);
+        let all: Vec<Options> = self.airplanes.iter().map(options).collect();
+        let own = self.airplanes.iter().map(|airplane| airplane.own_costs.clone()).collect();
+        let mut game = PairwiseGame::new(own);
+        for i in 0..all.len() {
+            for j in i + 1..all.len() {
+                couple(&mut game, &briefing.objective, (i, &all[i]), (j, &all[j]));
+            }
+        }
+        let places: Vec<usize> = self.airplanes.iter().map(|a| a.place).collect();
+        let uniform = |player: usize, k: u64| briefing.uniform(places[player], k);
+        let outcome = optimize(&game, &briefing.settings, uniform);
+        let each = outcome.joint.into_iter().zip(outcome.expected).zip(outcome.q);
+        for (airplane, ((chosen, expected), chances)) in self.airplanes.iter_mut().zip(each) {
+            let (rounds, converged) = (outcome.rounds, outcome.converged);
+            let decided = Decided { chosen, expected, rounds, converged, chances };
+            airplane.decided = (!airplane.is_presumed).then_some(decided);
+        }
+        self.is_final = true;
+    }
+
+    /// Makes a round with samples.
+    fn sampled_round(&mut self, briefing: &Briefing, sampling: (usize, f64), is_late: bool) {
+        interrupt::look();
+        let stop = briefing.settings.stop;
+        let change = self.learn(briefing, sampling);
+        self.calm = stop.calm(self.calm, change);
+        self.round += 1;
+        let is_over = self.calm >= stop.calm_rounds || self.round >= stop.max_rounds;
+        if is_over || is_late {
+            for airplane in self.airplanes.iter_mut().filter(|a| !a.is_presumed) {
+                let Some(player) = &airplane.player else { continue };
+                let rounds = (self.round, self.calm);
+                airplane.decided = briefing.decided(airplane.place, player, rounds);
+            }
+            self.is_final = true;
+        }
+    }
+
+    /// Computes the costs once all ways of a round are known, summed in the same order as everywhere
+    /// else, and updates every player. Returns the largest change of a probability.
+    fn learn(&mut self, briefing: &Briefing, (block, ageing): (usize, f64)) -> f64 {
+        let (objective, all) = (&briefing.objective, &self.airplanes);
+        let part = |i: usize, k: usize| {
+            let own = &all[i];
+            let minds = |other: &&Visited| {
+                other.place != own.place && other.levels.meets(&own.levels, objective.vertical_m)
+            };
+            all.iter().filter(minds).fold(own.own_costs[k], |sum, other| {
+                // Others are to keep farther away from one that is presumed.
+                let wanted_m = if other.is_presumed { other.separation_m } else { 0.0 };
+                let r = own.separation_m.max(wanted_m);
+                sum + objective.collision(&own.ways[k], &other.ways[k], [r, r])[0]
+            })
+        };
+        let total: Vec<f64> =
+            (0..block).map(|k| (0..all.len()).fold(0.0, |sum, i| sum + part(i, k))).collect();
+        let settings = briefing.settings;
+        let update = |airplane: &mut Visited| {
+            let Visited { player: Some(player), samples, .. } = airplane else { return 0.0 };
+            if samples.is_empty() {
+                return 0.0;
+            }
+            player.learn(samples, &total, ageing);
+            player.update(settings.update, settings.cooling)
+        };
+        self.airplanes.iter_mut().map(update).fold(0.0, f64::max)
+    }
+}

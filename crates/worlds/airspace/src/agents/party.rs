@@ -1,0 +1,91 @@
+//! Parties to a talk: programs aboard that take messages and give messages, without a clock, a network, or
+//! the packets around what they say.
+
+use super::link::Ended;
+use super::packet::Draft;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::EntityId;
+
+/// A party to a talk, as a state machine: messages and ticks in, messages out.
+///
+/// It lives on after it has come to its outcome, and answers those that have not.
+pub trait Party: Send {
+    /// Starts the talk.
+    fn start(&mut self, tick: u64);
+
+    /// Takes a message of another member, as it came off the network: any bytes, any number of times, in
+    /// any order.
+    ///
+    /// # Errors
+    /// When the message cannot be read, or says what cannot be; nothing has changed then.
+    fn on_message(&mut self, from: EntityId, message: &[u8], tick: u64) -> Result<(), Unsound>;
+
+    /// Does what is due by a tick.
+    fn on_timer(&mut self, tick: u64);
+
+    /// Returns the tick in which something is due, unless a message comes before it.
+    fn next_timer(&self) -> Option<u64>;
+
+    /// Returns whether it has come to its outcome.
+    fn is_done(&self) -> bool;
+
+    /// Takes out the messages that it has to send.
+    fn take_messages(&mut self) -> Vec<Outgoing>;
+
+    /// Returns the largest number of bytes that a message to it may have.
+    fn most_bytes(&self) -> usize;
+}
+
+/// A party that has an outcome.
+pub trait Concludes: Party {
+    /// Type of the outcome.
+    type Outcome;
+
+    /// Returns the end of the talk for it; one that is not done ends because time is up.
+    fn end(&mut self) -> Ended<Self::Outcome>;
+}
+
+/// A message on its way out.
+#[derive(Debug, Clone)]
+pub struct Outgoing {
+    /// The receiver; `None` for all others of the talk.
+    pub to: Option<EntityId>,
+    /// The message.
+    pub message: Draft,
+}
+
+/// A reason why a message is not taken: whoever sent it is none of ours, or lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Unsound {
+    /// Its bytes are no message of the talk.
+    Form,
+    /// It is of a kind that nobody sends with these settings.
+    Kind,
+    /// A list in it has another length than it must have.
+    Length,
+    /// A number in it is out of its bounds, or none at all.
+    Number,
+    /// It is about an airplane that is not in the group.
+    Airplane,
+    /// It is of a round that there is not.
+    Round,
+    /// It tells an airplane to be where nobody sees it, or to be able to do what its filed plan does not
+    /// say.
+    Plan,
+}
+
+/// Largest number of meters that anybody tells: beyond it, distances and their squares lose all sense.
+const FARTHEST_M: f64 = 1e15;
+
+/// Returns whether coordinates and altitudes in meters are such that one can compute with them.
+pub(super) fn are_places(told_m: impl IntoIterator<Item = f64>) -> bool {
+    // Nothing compares with what is no number.
+    told_m.into_iter().all(|m| m.abs() <= FARTHEST_M)
+}
+
+impl Unsound {
+    /// Returns `Ok` if something holds, or else this reason.
+    pub(crate) fn unless(self, holds: bool) -> Result<(), Self> {
+        if holds { Ok(()) } else { Err(self) }
+    }
+}

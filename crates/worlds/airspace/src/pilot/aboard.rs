@@ -1,0 +1,532 @@
+//! The pilot, as a state machine.
+
+use super::briefing::unheard;
+use super::control::{Control, Course, Memory, Optimized};
+use super::early::Early;
+use super::schedule::{Schedule, patience};
+use super::sight::Sight;
+use super::talks::{Came, Speaker, optimizes, proposes, tells};
+use crate::agents::contact::{Contacts, note};
+use crate::agents::exchange::Agreed;
+use crate::agents::intent::Intent;
+use crate::agents::network::Traffic;
+use crate::agents::packet::{Packet, Refusal, Refused, TalkId, Topic, digest, open};
+use crate::agents::{Conclusion, Ended, Frame, Party, Radio, Talk};
+use crate::avoid::Beset;
+use crate::decide::{Considered, Manner, alone, as_decided, by_velocity};
+use crate::events::{Event, EventKind};
+use crate::flight::Known;
+use crate::world::AirspaceWorld;
+use sidestep_kernel::EntityId;
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// Number of ended talks of which questions are answered: those of two cycles.
+const PAST_TALKS: usize = 4;
+
+/// The program aboard one airplane: see the [module](super).
+pub struct Pilot {
+    world: Arc<AirspaceWorld>,
+    id: EntityId,
+    fingerprint: u64,
+    memory: Memory,
+    /// The cycle that it is in, or was in last.
+    turn: Option<Turn>,
+    /// Talks that have ended for it.
+    past: VecDeque<Talk<dyn Party>>,
+    early: Early,
+    out: Vec<Packet>,
+    refused: Refused,
+}
+
+/// A cycle of one airplane.
+struct Turn {
+    sight: Sight,
+    schedule: Schedule,
+    members: Arc<[EntityId]>,
+    stage: Stage,
+    considered: Considered,
+    /// What it does, as far as that is decided.
+    control: Control,
+}
+
+/// The part of a cycle that an airplane is in.
+enum Stage {
+    /// In a talk about what each wants.
+    Deciding(Talk<Speaker>),
+    /// It knows what it wants, and waits until the shield's exchange starts.
+    Decided,
+    /// In the shield's exchange; the places of the ways that it has proposed, among all that it considers.
+    Shielding(Talk<Speaker>, Vec<usize>),
+    /// The control is there.
+    Over,
+}
+
+impl Pilot {
+    /// Returns the pilot of an airplane, which has heard of others before as `contacts` say.
+    ///
+    /// # Panics
+    /// When there is no such airplane in the world.
+    pub fn new(world: Arc<AirspaceWorld>, id: EntityId, contacts: Contacts) -> Self {
+        Self::remembering(world, id, Memory { contacts, ..Memory::default() })
+    }
+
+    /// Returns the pilot of an airplane with all that it remembers.
+    ///
+    /// # Panics
+    /// When there is no such airplane in the world.
+    pub fn remembering(world: Arc<AirspaceWorld>, id: EntityId, memory: Memory) -> Self {
+        assert!((id as usize) < world.airplanes.len(), "there is no airplane {id}");
+        Self {
+            fingerprint: world.fingerprint,
+            world,
+            id,
+            memory,
+            turn: None,
+            past: VecDeque::new(),
+            early: Early::default(),
+            out: Vec::new(),
+            refused: Refused::default(),
+        }
+    }
+
+    /// Returns the same pilot, which talks only with those of the same build.
+    #[must_use]
+    pub fn of_build(self, build: &str) -> Self {
+        let fingerprint = digest([build.as_bytes(), &self.world.fingerprint.to_le_bytes()]);
+        Self { fingerprint, ..self }
+    }
+
+    /// Its airplane.
+    pub fn id(&self) -> EntityId {
+        self.id
+    }
+
+    /// Starts the talks of a cycle. What was not over of an earlier one is given up.
+    ///
+    /// # Panics
+    /// When the sight is that of another airplane.
+    pub fn begin(&mut self, sight: Sight, tick: u64) {
+        let schedule = Schedule::from(tick, self.world.network.as_ref());
+        self.begin_by(sight, schedule);
+    }
+
+    /// Starts the talks of a cycle at ticks that all agree on.
+    pub(crate) fn begin_by(&mut self, sight: Sight, schedule: Schedule) {
+        self.take_up(sight, schedule);
+        let Some(turn) = &self.turn else { return };
+        let group: Vec<Known> = turn.sight.group.iter().map(|one| one.known()).collect();
+        let manner = Manner::of(&self.world, &group, &turn.sight.intruders);
+        match manner {
+            Manner::Optimizing | Manner::Reacting => self.talk(Topic::Decision, schedule.begins),
+            Manner::Alone | Manner::TooMany => self.decide_alone(manner, group.len()),
+        }
+        self.settle(schedule.begins);
+    }
+
+    fn take_up(&mut self, sight: Sight, schedule: Schedule) {
+        assert_eq!(sight.own.id, self.id, "the sight is that of another airplane");
+        if let Some(turn) = self.turn.take()
+            && let Stage::Deciding(talk) | Stage::Shielding(talk, _) = turn.stage
+        {
+            self.keep_past(talk);
+        }
+        let control = Control::orbit(self.id, sight.cycle, Memory::default());
+        self.turn = Some(Turn {
+            members: sight.members().into(),
+            schedule,
+            stage: Stage::Decided,
+            considered: Considered::default(),
+            control,
+            sight,
+        });
+    }
+
+    /// Takes a packet that came off the network from an airplane: any bytes. What is not understood is
+    /// counted and dropped.
+    pub fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
+        // What is due by then is done first, because afterwards it is too late for the packet.
+        self.settle(tick);
+        if let Err(why) = self.take(from, bytes, tick) {
+            self.refused.count(why);
+        }
+        self.settle(tick);
+    }
+
+    /// Does what is due by a tick.
+    pub fn on_timer(&mut self, tick: u64) {
+        self.settle(tick);
+        if let Some(talk) = self.turn.as_mut().and_then(Turn::talk) {
+            talk.on_timer(tick, &mut self.out);
+        }
+        self.settle(tick);
+    }
+
+    /// Returns the tick in which something is due, unless a packet comes before it.
+    pub fn next_timer(&self) -> Option<u64> {
+        let turn = self.turn.as_ref()?;
+        match &turn.stage {
+            Stage::Deciding(talk) | Stage::Shielding(talk, _) => {
+                let ends = talk.frame().ends;
+                Some(talk.next_timer().map_or(ends, |due| due.min(ends)))
+            }
+            Stage::Decided => Some(turn.schedule.shield_from),
+            Stage::Over => None,
+        }
+    }
+
+    /// Returns the tick in which the talks of the present cycle end in any case.
+    pub fn deadline(&self) -> u64 {
+        self.turn.as_ref().map_or(u64::MAX, |turn| turn.schedule.ends)
+    }
+
+    /// Takes out the packets that wait to be sent.
+    pub fn take_packets(&mut self) -> Vec<Packet> {
+        std::mem::take(&mut self.out)
+    }
+
+    /// Returns the ids of the group that it talks with, its own among them, rising.
+    pub fn group(&self) -> &[EntityId] {
+        self.turn.as_ref().map_or(&[], |turn| &turn.members)
+    }
+
+    /// Returns what it does in the present cycle, once that is decided.
+    pub fn control(&self) -> Option<Control> {
+        let turn = self.turn.as_ref().filter(|turn| matches!(turn.stage, Stage::Over))?;
+        let mut control = turn.control.clone();
+        // Questions were answered since.
+        for talk in self.past.iter().filter(|talk| talk.frame().id.cycle == control.cycle) {
+            let traffic = match talk.frame().id.topic {
+                Topic::Decision => &mut control.deciding,
+                Topic::Shield => &mut control.shielding,
+            };
+            *traffic = Traffic { ticks: traffic.ticks, ..talk.traffic() };
+        }
+        Some(control)
+    }
+
+    /// Returns whether it knows what it wants in the present cycle.
+    pub fn has_decided(&self) -> bool {
+        self.turn.as_ref().is_some_and(|turn| !matches!(turn.stage, Stage::Deciding(_)))
+    }
+
+    /// Returns whether it has come to an end in the present cycle.
+    pub fn is_done(&self) -> bool {
+        self.turn.as_ref().is_some_and(|turn| matches!(turn.stage, Stage::Over))
+    }
+
+    /// Returns what it does in the present cycle, and what it has considered; `None` before that is decided.
+    pub(crate) fn into_outcome(mut self) -> Option<(Control, Considered)> {
+        let control = self.control()?;
+        Some((control, self.turn.take()?.considered))
+    }
+
+    /// Returns its knowledge of others.
+    pub fn contacts(&self) -> &Contacts {
+        &self.memory.contacts
+    }
+
+    /// Returns the counts of packets that were dropped.
+    pub fn refused(&self) -> Refused {
+        self.refused
+    }
+
+    /// Reads a packet, and hands its message to the talk that it belongs to.
+    fn take(&mut self, from: EntityId, bytes: &[u8], tick: u64) -> Result<(), Refusal> {
+        let (seal, message) = open(bytes, self.fingerprint)?;
+        let is_other = from != self.id && (from as usize) < self.world.airplanes.len();
+        if seal.sender != from || !is_other {
+            return Err(Refusal::Sender);
+        }
+        let Self { turn, past, early, out, .. } = self;
+        if let Some(turn) = turn {
+            if self.world.is_silent(self.id, turn.sight.cycle) {
+                return Ok(());
+            }
+            if let Some(talk) = turn.talk()
+                && talk.frame().id == seal.talk
+            {
+                return talk.hear(from, message, tick, out);
+            }
+        }
+        if let Some(talk) = past.iter_mut().find(|talk| talk.frame().id == seal.talk) {
+            return talk.hear(from, message, tick, out);
+        }
+        match turn.as_ref().map(|turn| turn.stands_at(&seal.talk)) {
+            None | Some(Stands::Before) => early.keep(seal.talk, from, message),
+            Some(Stands::Beside) => Err(Refusal::OtherGroup),
+            Some(Stands::Beyond) => Err(Refusal::Stale),
+            Some(Stands::FarBefore) => Err(Refusal::NoRoom),
+        }
+    }
+
+    /// Goes on as far as the talks have come, and the time.
+    fn settle(&mut self, tick: u64) {
+        while let Some(turn) = &mut self.turn {
+            match &mut turn.stage {
+                Stage::Deciding(talk) | Stage::Shielding(talk, _)
+                    if talk.is_done() || tick >= talk.frame().ends =>
+                {
+                    let ended = talk.end();
+                    // Where nothing is lost, messages take no time that counts.
+                    let ticks = match self.world.network {
+                        Some(_) => tick.min(talk.frame().ends).saturating_sub(talk.frame().begins),
+                        None => 0,
+                    };
+                    turn.note_traffic(ticks);
+                    self.conclude(ended);
+                }
+                Stage::Decided if tick >= turn.schedule.shield_from => {
+                    self.talk(Topic::Shield, tick);
+                }
+                _ => return,
+            }
+        }
+    }
+
+    /// Starts a talk with the others of the group.
+    fn talk(&mut self, topic: Topic, tick: u64) {
+        let Some(turn) = &mut self.turn else { return };
+        let world = &*self.world;
+        let Turn { sight, schedule, members, considered, .. } = turn;
+        let (begins, ends) = schedule.of(topic, tick);
+        let id = TalkId::new(sight.cycle, topic, members);
+        let is_silent = world.is_silent(self.id, sight.cycle);
+        let radio = Radio {
+            group: members.clone(),
+            me: sight.me(),
+            patience: patience(world.network.as_ref(), topic),
+            ticks: ends - begins,
+            is_silent,
+        };
+        let (me, members, fingerprint) = (self.id, members.clone(), self.fingerprint);
+        let frame = Frame { id, members, me, fingerprint, begins, ends, is_silent };
+        let Memory { contacts, resolving } = &self.memory;
+        turn.stage = match topic {
+            Topic::Shield => {
+                let allowed = allowed(world, sight, considered);
+                let ways: Vec<_> = allowed.iter().map(|&k| considered.ways[k].clone()).collect();
+                let party = proposes(world, sight, contacts, &ways, radio);
+                Stage::Shielding(Talk::new(frame, party), allowed)
+            }
+            Topic::Decision if Manner::reacts(world) => {
+                let party = tells(world, sight, contacts, resolving, radio);
+                Stage::Deciding(Talk::new(frame, party))
+            }
+            Topic::Decision => {
+                let party = optimizes(world, sight, contacts, radio);
+                Stage::Deciding(Talk::new(frame, party))
+            }
+        };
+        self.hear_early(id, tick);
+    }
+
+    /// Starts the talk that it is in, and hands over what others have said in it already.
+    fn hear_early(&mut self, id: TalkId, tick: u64) {
+        let Some(talk) = self.turn.as_mut().and_then(Turn::talk) else { return };
+        talk.start(tick, &mut self.out);
+        let (early, [stale, other_group]) = self.early.take(&id);
+        (0..stale).for_each(|_| self.refused.count(Refusal::Stale));
+        (0..other_group).for_each(|_| self.refused.count(Refusal::OtherGroup));
+        for (from, message) in early {
+            if let Err(why) = talk.hear(from, &message, tick, &mut self.out) {
+                self.refused.count(why);
+            }
+        }
+    }
+
+    /// Keeps a talk that has ended here, to answer questions about it.
+    fn keep_past(&mut self, talk: Talk<Speaker>) {
+        if self.past.len() == PAST_TALKS {
+            self.past.pop_front();
+        }
+        self.past.push_back(talk.past());
+    }
+
+    /// Decides without a talk.
+    fn decide_alone(&mut self, manner: Manner, members: usize) {
+        let Some(turn) = &mut self.turn else { return };
+        let own = &turn.sight.own;
+        if manner == Manner::TooMany && turn.members.first() == Some(&self.id) {
+            let event = Event::of(turn.sight.cycle, EventKind::GroupTooLarge, self.id);
+            turn.control.events.push(event.with(members as f64));
+        }
+        let considered = alone(&self.world, own.known(), own.wish.as_ref());
+        self.is_decided(considered);
+    }
+
+    /// Notes what it wants; without the shield it flies that.
+    fn is_decided(&mut self, considered: Considered) {
+        let Some(turn) = &mut self.turn else { return };
+        turn.considered = considered;
+        turn.stage = Stage::Decided;
+        if !self.world.shield {
+            let way = turn.considered.ways.first().cloned().unwrap_or_default();
+            let side = turn.sight.own.fallback;
+            turn.control.course = Course::Way { wish: 0, way, side };
+            self.is_over();
+        }
+    }
+
+    fn is_over(&mut self) {
+        if let Some(turn) = &mut self.turn {
+            turn.stage = Stage::Over;
+            turn.control.memory = self.memory.clone();
+        }
+    }
+
+    /// Ends the talk that it is in, and draws the conclusion from it.
+    fn conclude(&mut self, ended: Ended<Came>) {
+        let Some(turn) = &mut self.turn else { return };
+        if self.world.network.is_some() {
+            turn.note_end(&self.world, &ended, &self.memory.contacts);
+        }
+        match std::mem::replace(&mut turn.stage, Stage::Decided) {
+            Stage::Deciding(talk) => {
+                self.keep_past(talk);
+                match ended.outcome {
+                    Some(Came::Told(told)) => self.react(&told),
+                    Some(Came::Decided(conclusion)) => self.is_optimized(Some(conclusion)),
+                    _ => self.is_optimized(None),
+                }
+            }
+            Stage::Shielding(talk, allowed) => {
+                self.keep_past(talk);
+                self.is_shielded(ended.outcome, &allowed);
+            }
+            Stage::Decided | Stage::Over => {}
+        }
+    }
+
+    /// Notes what has come of the shield's exchange, in which it has proposed the ways that were `allowed`.
+    fn is_shielded(&mut self, came: Option<Came>, allowed: &[usize]) {
+        let Some(turn) = &mut self.turn else { return };
+        self.memory.contacts = match came {
+            Some(Came::Agreed(Agreed { decision, held_back, contacts })) => {
+                if held_back {
+                    let event = Event::of(turn.sight.cycle, EventKind::HeldBack, self.id);
+                    turn.control.events.push(event);
+                }
+                turn.control.course = turn.considered.course(decision, allowed);
+                contacts
+            }
+            // Without an agreement it no longer knows where any other airplane is.
+            _ => Contacts::new(),
+        };
+        self.is_over();
+    }
+
+    /// Notes the outcome of an optimization; none if time was up before there was any.
+    fn is_optimized(&mut self, conclusion: Option<Conclusion>) {
+        let Some(turn) = &mut self.turn else { return };
+        let (decided, beacons) =
+            conclusion.map_or_else(Default::default, |came| (came.decided, came.beacons));
+        turn.control.optimized = Some(Optimized::of(decided.as_ref()));
+        if self.world.network.is_some() {
+            for (beacon, &id) in beacons.into_iter().zip(&*turn.members) {
+                if let Some(beacon) = beacon {
+                    note(&mut self.memory.contacts, id, beacon, turn.sight.cycle);
+                }
+            }
+        }
+        let considered = as_decided(&self.world, turn.sight.own.known(), decided);
+        self.is_decided(considered);
+    }
+
+    /// Finds the headings of all from what they have told; who has told nothing is taken to fly straight on.
+    fn react(&mut self, told: &[Option<Intent>]) {
+        let Some(turn) = &self.turn else { return };
+        let (mut group, mut memory, mut me) = (Vec::new(), Vec::new(), 0);
+        let mut intruders = turn.sight.intruders.clone();
+        for (one, intent) in turn.sight.group.iter().zip(told) {
+            let Some(intent) = intent else {
+                intruders.push(unheard(&self.world, one));
+                continue;
+            };
+            if one.id == self.id {
+                me = group.len();
+            }
+            let &Intent { next, orders, altitude_m, .. } = intent;
+            let next = next as usize;
+            group.push(Known { slot: one.id, pose: one.pose, next, orders, altitude_m });
+            memory.push(intent.resolving.clone());
+        }
+        let mut all = by_velocity(&self.world, &group, &intruders, &mut memory);
+        if self.world.is_resolving() {
+            self.memory.resolving = memory.swap_remove(me);
+        }
+        self.is_decided(all.swap_remove(me));
+    }
+}
+
+/// The place of a talk beside those of a cycle.
+enum Stands {
+    /// It comes later.
+    Before,
+    /// It comes so much later that nobody can be there.
+    FarBefore,
+    /// It is of the same cycle and subject, and of other members.
+    Beside,
+    /// It is over.
+    Beyond,
+}
+
+impl Turn {
+    /// Returns the talk that it is in.
+    fn talk(&mut self) -> Option<&mut Talk<Speaker>> {
+        match &mut self.stage {
+            Stage::Deciding(talk) | Stage::Shielding(talk, _) => Some(talk),
+            Stage::Decided | Stage::Over => None,
+        }
+    }
+
+    /// Returns where a talk stands that is none of those that it has been in.
+    fn stands_at(&self, talk: &TalkId) -> Stands {
+        let topic = match self.stage {
+            Stage::Deciding(_) | Stage::Decided => Topic::Decision,
+            Stage::Shielding(..) | Stage::Over => Topic::Shield,
+        };
+        let here = TalkId { topic, ..TalkId::new(self.sight.cycle, topic, &self.members) };
+        // Nobody begins a cycle before all have ended the one before it.
+        let last = self.sight.cycle.saturating_add(1);
+        match () {
+            () if talk.cycle > last => Stands::FarBefore,
+            () if here.is_before(talk) => Stands::Before,
+            () if (talk.cycle, talk.topic) == (here.cycle, here.topic) => Stands::Beside,
+            () => Stands::Beyond,
+        }
+    }
+
+    /// Notes the packets of the talk that it is in, and the time that it took.
+    fn note_traffic(&mut self, ticks: u64) {
+        let (traffic, noted) = match &self.stage {
+            Stage::Deciding(talk) => (talk.traffic(), &mut self.control.deciding),
+            Stage::Shielding(talk, _) => (talk.traffic(), &mut self.control.shielding),
+            Stage::Decided | Stage::Over => return,
+        };
+        *noted = Traffic { ticks, ..traffic };
+    }
+
+    /// Notes how a talk has ended, and which others it no longer hears.
+    fn note_end(&mut self, world: &AirspaceWorld, end: &Ended<Came>, contacts: &Contacts) {
+        let (id, now) = (self.sight.own.id, self.sight.cycle);
+        let heard_in = |other: &EntityId| match contacts.get(other) {
+            Some(contact) => contact.heard_in,
+            None => world.appears_in(*other as usize),
+        };
+        let unheard = end.unheard.iter().map(|&place| self.members[place]);
+        let lost = unheard.filter(|other| heard_in(other) + 1 >= now);
+        let events = &mut self.control.events;
+        events.extend(lost.map(|other| Event::of_pair(now, EventKind::Unheard, id, other)));
+        if end.late {
+            events.push(Event::of(now, EventKind::Deadline, id));
+        }
+    }
+}
+
+/// Returns the places of the ways that intruders leave to an airplane, among all that it considers.
+fn allowed(world: &AirspaceWorld, sight: &Sight, considered: &Considered) -> Vec<usize> {
+    let flyer = sight.own.flyer(world);
+    let beset = Beset::new(&flyer, &sight.intruders, world.timing.dtau_s);
+    beset.allowed(&considered.ways, || sight.own.on_orbit(world))
+}

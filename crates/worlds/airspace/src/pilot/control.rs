@@ -1,0 +1,107 @@
+//! What an airplane does in a cycle, and what came of its talks.
+
+use crate::agents::Decided;
+use crate::agents::contact::Contacts;
+use crate::agents::network::Traffic;
+use crate::baseline::mvp::Resolving;
+use crate::events::Event;
+use crate::shield::{Decision, Side, Way};
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::{Cycle, EntityId};
+
+/// What an airplane does in a cycle, and everything else that its run keeps of the decision: one message.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Control {
+    /// The airplane.
+    pub id: EntityId,
+    /// The cycle in which it flies so.
+    pub cycle: Cycle,
+    /// What it flies.
+    pub course: Course,
+    /// Outcome of the optimization; none where there was nothing to optimize.
+    pub optimized: Option<Optimized>,
+    /// Packets of the talk about what each wants.
+    pub deciding: Traffic,
+    /// Packets of the shield's exchange.
+    pub shielding: Traffic,
+    /// Others that it no longer hears, deadlines missed, and the like.
+    pub events: Vec<Event>,
+    /// What it remembers.
+    pub memory: Memory,
+}
+
+/// The course of an airplane for one `dt`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Course {
+    /// A way of its choice.
+    Way {
+        /// Number of the way among its wishes: 0 for the wanted one.
+        wish: u32,
+        /// Turn rate in each step.
+        way: Way,
+        /// Side of the fallback that it stores for the end of the way.
+        side: Side,
+    },
+    /// Its stored orbit.
+    Orbit,
+}
+
+/// Outcome of an optimization for an airplane.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Optimized {
+    /// Whether a decision has reached it.
+    pub is_decided: bool,
+    /// Number of rounds.
+    pub rounds: u32,
+    /// Whether the distributions had settled.
+    pub converged: bool,
+}
+
+/// What an airplane remembers from one cycle to the next.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Memory {
+    /// Its knowledge of others; empty where the network is reliable.
+    pub contacts: Contacts,
+    /// The conflicts that it resolves; empty unless the method is MVP.
+    pub resolving: Resolving,
+}
+
+impl Course {
+    /// Returns it as the shield decides; `fallback` is the side of the stored orbit.
+    pub(crate) fn decision(&self, fallback: Side) -> Decision {
+        match *self {
+            Self::Way { wish, side, .. } => {
+                Decision { candidate: Some(wish as usize), fallback: side }
+            }
+            Self::Orbit => Decision { candidate: None, fallback },
+        }
+    }
+}
+
+impl Optimized {
+    /// Returns the outcome with a decision, or without one.
+    pub(crate) fn of(decided: Option<&Decided>) -> Self {
+        let of = |decided: &Decided| Self {
+            is_decided: true,
+            rounds: decided.rounds,
+            converged: decided.converged,
+        };
+        decided.map_or_else(Self::default, of)
+    }
+}
+
+impl Control {
+    /// Returns a control by which an airplane stays on its orbit.
+    pub(crate) fn orbit(id: EntityId, cycle: Cycle, memory: Memory) -> Self {
+        Self {
+            id,
+            cycle,
+            course: Course::Orbit,
+            optimized: None,
+            deciding: Traffic::default(),
+            shielding: Traffic::default(),
+            events: Vec::new(),
+            memory,
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! Runs whose pilots are elsewhere: each cycle they are told what they perceive, and say what they do.
+
+use super::control::{Control, Course};
+use super::sight::Sight;
+use crate::AirspaceRun;
+use crate::decide::possible;
+use crate::deploy::Deployment;
+use crate::events::EventKind;
+use crate::shield::Way;
+use crate::state::AirspaceState;
+use crate::world::{AirspaceWorld, Method};
+use sidestep_kernel::control::OrderError;
+use sidestep_kernel::{Cycle, EntityId, Simulation};
+use std::collections::BTreeMap;
+
+/// A run whose airplanes may be flown by pilots outside of it.
+pub trait Fleet {
+    /// Returns what each airplane that decides in the cycle to come perceives, by rising id. No result depends on
+    /// it.
+    fn sights(&self) -> Vec<Sight>;
+
+    /// Hands over what airplanes do in the cycle to come. One that is missing stays on its stored orbit; where no
+    /// network is given that may lose messages, so does its whole group, because then plans are safe only if
+    /// all fly them. A run that is recorded keeps the controls, so that it can be computed again.
+    ///
+    /// # Errors
+    /// When one of them is of another airplane or cycle, or cannot be flown; none is taken then. When the run is
+    /// recorded without its controls, or one process decides for all.
+    fn control(&mut self, controls: Vec<Control>) -> Result<(), OrderError>;
+
+    /// Returns the controls, each serialized, that cannot be flown in the cycle to come, with the reasons.
+    fn absurd(&self, controls: &[(EntityId, Vec<u8>)]) -> Vec<(EntityId, String)>;
+
+    /// Returns, of each airplane that decides in the cycle to come, the others of its group that its radio does
+    /// not reach, both by rising id.
+    fn beyond(&self) -> Vec<(EntityId, Vec<EntityId>)>;
+}
+
+impl Fleet for AirspaceRun {
+    fn sights(&self) -> Vec<Sight> {
+        self.world().sights(self.state(), self.cycle())
+    }
+
+    fn control(&mut self, controls: Vec<Control>) -> Result<(), OrderError> {
+        let bytes =
+            |control: &Control| postcard::to_stdvec(control).expect("controls are plain data");
+        let controls: Vec<_> = controls.iter().map(|one| (one.id, bytes(one))).collect();
+        self.hand_over(&controls)
+    }
+
+    fn absurd(&self, controls: &[(EntityId, Vec<u8>)]) -> Vec<(EntityId, String)> {
+        let sights = self.sights();
+        let sight = |id| sights.iter().find(|sight| sight.own.id == id);
+        let why = |(id, bytes): &(EntityId, Vec<u8>)| {
+            Some((*id, self.world().read_control(*id, bytes, sight(*id)).err()?))
+        };
+        controls.iter().filter_map(why).collect()
+    }
+
+    fn beyond(&self) -> Vec<(EntityId, Vec<EntityId>)> {
+        self.world().beyond(self.state(), self.cycle())
+    }
+}
+
+impl AirspaceWorld {
+    /// Returns what each airplane perceives that decides in cycle `now`.
+    pub(crate) fn sights(&self, state: &AirspaceState, now: Cycle) -> Vec<Sight> {
+        let mut all = Vec::new();
+        self.perceived(state, now, |turn, flown, intruders| {
+            let slots: Vec<EntityId> = flown.iter().map(|known| known.slot).collect();
+            all.extend(Sight::all(turn, &slots, intruders));
+        });
+        all.sort_unstable_by_key(|sight| sight.own.id);
+        all
+    }
+
+    /// Returns the others of its group that each airplane does not reach in cycle `now`.
+    fn beyond(&self, state: &AirspaceState, now: Cycle) -> Vec<(EntityId, Vec<EntityId>)> {
+        let range_m = self.network.as_ref().map_or(f64::INFINITY, |network| network.range_m);
+        let mut all = Vec::new();
+        if range_m == f64::INFINITY {
+            return all;
+        }
+        self.perceived(state, now, |turn, flown, _| {
+            for own in flown {
+                let is_beyond = |other: &EntityId| turn.state.apart_m([own.slot, *other]) > range_m;
+                let others = flown.iter().map(|known| known.slot).filter(|&id| id != own.slot);
+                all.push((own.slot, others.filter(is_beyond).collect()));
+            }
+        });
+        all.sort_unstable();
+        all
+    }
+
+    /// Notes the controls of airplanes, once all are found to be right.
+    pub(crate) fn note_controls(
+        &self,
+        state: &AirspaceState,
+        now: Cycle,
+        controls: &[(EntityId, Vec<u8>)],
+    ) -> Result<(), OrderError> {
+        if self.deployment == Deployment::Direct {
+            let cause = "one process decides for all (deployment = \"direct\"); set deployment to team, \
+                         compact-team, pim or hierarchical-pim";
+            return Err(OrderError::NobodyOutside { cause: cause.into() });
+        }
+        let sights = self.sights(state, now);
+        let sights: BTreeMap<_, _> = sights.iter().map(|sight| (sight.own.id, sight)).collect();
+        let mut read = BTreeMap::new();
+        for (id, bytes) in controls {
+            let refused = |cause: String| {
+                let who = format!("airplane {}", self.called_if_known(*id));
+                OrderError::Control { who, cause }
+            };
+            let control =
+                self.read_control(*id, bytes, sights.get(id).copied()).map_err(refused)?;
+            if read.insert(*id, control).is_some() {
+                return Err(refused("there are two of it; give one for each airplane".into()));
+            }
+        }
+        state.hand_over(now, read.into_values().collect());
+        Ok(())
+    }
+
+    /// Returns what people call an airplane, if there is one of this id.
+    fn called_if_known(&self, id: EntityId) -> String {
+        self.callsign(id).unwrap_or_else(|| id.to_string())
+    }
+
+    /// Reads a control, and checks that its airplane can do that.
+    fn read_control(
+        &self,
+        id: EntityId,
+        bytes: &[u8],
+        sight: Option<&Sight>,
+    ) -> Result<Control, String> {
+        let Some(sight) = sight else {
+            let cause =
+                "it does not decide in this cycle; give controls for those of `sights` only";
+            return Err(cause.into());
+        };
+        let read = postcard::take_from_bytes::<Control>(bytes);
+        let Some((control, _)) = read.ok().filter(|(_, rest)| rest.is_empty()) else {
+            return Err("its bytes are none of a control of this build".into());
+        };
+        if (control.id, control.cycle) != (id, sight.cycle) {
+            return Err(format!(
+                "it is of airplane {} and cycle {}; give that of airplane {id} and cycle {}",
+                control.id, control.cycle, sight.cycle
+            ));
+        }
+        self.can_fly(sight, &control.course)?;
+        self.can_be_kept(&control)?;
+        Ok(control)
+    }
+
+    /// Checks that an airplane can fly a course.
+    fn can_fly(&self, sight: &Sight, course: &Course) -> Result<(), String> {
+        let Course::Way { wish, way: Way { omegas_rad_s }, .. } = course else { return Ok(()) };
+        let (own, steps) = (&sight.own, self.timing.points_per_dt());
+        if omegas_rad_s.len() != steps {
+            let found = omegas_rad_s.len();
+            return Err(format!("its way has {found} turn rates; give {steps}, one for each step"));
+        }
+        let most_rad_s = self.stage(own.id, own.orders).model.omega_max_rad_s;
+        if let Some(omega) = omegas_rad_s.iter().find(|omega| !(omega.abs() <= most_rad_s)) {
+            return Err(format!(
+                "a turn rate of {omega} rad/s; give {} to {most_rad_s}",
+                -most_rad_s
+            ));
+        }
+        let ways = match self.method {
+            // Any heading may be ordered, or come of a method that looks at others.
+            Method::Mvp | Method::Orca | Method::External => return Ok(()),
+            Method::Pc | Method::None => possible(self, own.known()),
+        };
+        match ways.iter().any(|way| way.omegas_rad_s == *omegas_rad_s) {
+            true if (*wish as usize) < ways.len() => Ok(()),
+            _ => Err("its way is none of those that its actions lead; give one of them".into()),
+        }
+    }
+
+    /// Checks what comes with a control beside the course.
+    fn can_be_kept(&self, control: &Control) -> Result<(), String> {
+        let is_told = |kind: EventKind| {
+            use EventKind::{Deadline, GroupTooLarge, HeldBack, Unheard};
+            matches!(kind, Deadline | GroupTooLarge | HeldBack | Unheard)
+        };
+        let (id, n) = (control.id, self.airplanes.len());
+        let is_own = control.events.iter().all(|event| {
+            let about = (event.airplane, event.cycle) == (id, control.cycle);
+            about && is_told(event.kind) && (event.other as usize) < n && event.at_m.is_none()
+        });
+        let are_known = control.memory.contacts.keys().all(|&other| (other as usize) < n);
+        let has_contacts = self.network.is_some() || control.memory.contacts.is_empty();
+        match is_own && are_known && has_contacts && control.memory.resolving.check(n).is_ok() {
+            true => Ok(()),
+            false => Err("its events or its memory are none that a pilot can have".into()),
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! The pilot: the program aboard one airplane, as it flies in the simulator and in the field.
+//!
+//! ```text
+//!            Sight ──> Pilot ──> Control           one of each per airplane and cycle
+//!                      │   ^
+//!              Packet  v   │  Packet               to and from the others of its group
+//! ```
+//!
+//! A [`Pilot`] knows the filed flights (the world), perceives a [`Sight`], talks with the others of its group
+//! first about what each wants and then about whether that is safe, and ends with a [`Control`]. It is a state
+//! machine without a clock, a socket or a thread. The simulator runs a group of them over a network in memory
+//! (`deploy/`); a process on a network runs one.
+//!
+//! No process sees when all are done, so each ends by its own outcome or its deadline, and goes on to answer
+//! what others ask about talks that it has ended. One that is ahead may talk about what comes next: such
+//! packets are kept until it comes, as many as there is room for.
+//!
+//! ```text
+//! sight.rs  control.rs    what goes in once a cycle, and what comes out
+//! aboard.rs               the state machine
+//! schedule.rs  early.rs   when talks start and end; packets of talks to come
+//! briefing.rs  talks.rs   the knowledge with which it goes into a talk; which talk it is
+//! fleet.rs                runs whose pilots are elsewhere
+//! ```
+
+mod aboard;
+mod briefing;
+mod control;
+mod early;
+mod fleet;
+mod schedule;
+mod sight;
+mod talks;
+#[cfg(test)]
+mod tests;
+
+pub use crate::agents::packet::{Packet, Refusal, Refused, TalkId, Topic};
+pub use aboard::Pilot;
+pub use control::{Control, Course, Memory, Optimized};
+pub use fleet::Fleet;
+pub(crate) use schedule::Schedule;
+#[cfg(test)]
+pub(crate) use schedule::patience;
+pub use sight::{Own, Sight, Sighted};

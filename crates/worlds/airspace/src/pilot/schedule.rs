@@ -1,0 +1,64 @@
+//! The ticks in which the talks of a cycle start and end.
+
+use crate::agents::network::{Network, Patience};
+use crate::agents::packet::Topic;
+use sidestep_kernel::Cycle;
+
+/// Patience of agents that wait for each other as long as it takes.
+const FOR_EVER: Patience =
+    Patience { ticks: u64::MAX, bits_per_tick: f64::INFINITY, tries: 1, first_tries: 1 };
+
+/// The ticks of a cycle's talks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Schedule {
+    /// Start of the first one.
+    pub(crate) begins: u64,
+    /// Its end in any case.
+    pub(crate) decided_by: u64,
+    /// Start of the shield's exchange, unless the first talk takes longer.
+    pub(crate) shield_from: u64,
+    /// Its end in any case.
+    pub(crate) ends: u64,
+}
+
+impl Schedule {
+    /// Returns the ticks of talks that start in a tick: over a network that loses messages each has its time;
+    /// over one that loses nothing the second follows on the first, and each takes as long as it takes.
+    pub(crate) fn from(tick: u64, network: Option<&Network>) -> Self {
+        let Some(network) = network else {
+            return Self { begins: tick, decided_by: u64::MAX, shield_from: tick, ends: u64::MAX };
+        };
+        let long = network.deadline_ticks();
+        Self {
+            begins: tick,
+            decided_by: tick.saturating_add(long),
+            shield_from: tick.saturating_add(long + 1),
+            ends: tick.saturating_add(2 * long + 1),
+        }
+    }
+
+    /// Returns the ticks of a cycle where all cycles follow on each other without a gap, and no second talk starts
+    /// before all have ended the first.
+    pub(crate) fn of_cycle(cycle: Cycle, network: Option<&Network>) -> Self {
+        let Some(network) = network else {
+            return Self { shield_from: u64::MAX / 2, ..Self::from(0, None) };
+        };
+        Self::from(2 * cycle * (network.deadline_ticks() + 1), Some(network))
+    }
+
+    /// Returns the first and the last tick of a talk that starts in `tick`.
+    pub(crate) fn of(&self, topic: Topic, tick: u64) -> (u64, u64) {
+        match topic {
+            Topic::Decision => (self.begins, self.decided_by),
+            Topic::Shield => (tick.max(self.shield_from), self.ends),
+        }
+    }
+}
+
+/// Returns how agents that do not answer are asked again.
+pub(crate) fn patience(network: Option<&Network>, topic: Topic) -> Patience {
+    network.map_or(FOR_EVER, |network| match topic {
+        Topic::Decision => network.short_patience(),
+        Topic::Shield => network.patience(),
+    })
+}

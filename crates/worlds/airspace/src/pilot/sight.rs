@@ -1,0 +1,194 @@
+//! What an airplane perceives at the start of a cycle.
+
+use crate::Turn;
+use crate::flight::{Known, Levels, Pose, Stage, distance_m};
+use crate::intruder::Intruder;
+use crate::perceive::seen;
+use crate::shield::{Flyer, Holding, Side, Way};
+use crate::wish::Wish;
+use crate::world::AirspaceWorld;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::{Cycle, EntityId, Slot};
+
+/// Distance in meters beyond which all goals rank alike.
+const FARTHEST_M: f64 = 2e9;
+/// Part of a `dt`'s way by which a refusal brings an airplane forward in rank, so that it does not
+/// wait for ever.
+const REFUSED_PART: f64 = 0.125;
+
+/// Everything that an airplane perceives at the start of a cycle: one message. Whatever else it knows it has
+/// heard, remembers, or finds in the filed flights.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Sight {
+    /// The cycle for which it decides.
+    pub cycle: Cycle,
+    /// Its own airplane.
+    pub own: Own,
+    /// Those who decide together in this cycle, itself among them, by rising id: what all see of each.
+    pub group: Vec<Sighted>,
+    /// Airplanes near the group that mind nobody, as all see them.
+    pub intruders: Vec<Intruder>,
+}
+
+/// An airplane as those aboard know it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Own {
+    /// The airplane.
+    pub id: EntityId,
+    /// Its pose by its own instruments, by which it keeps to its orbit.
+    pub pose: Pose,
+    /// The pose that it would have on its stored orbit without errors of heading.
+    pub held: Pose,
+    /// Its pose as all see it, from which it plans.
+    pub seen: Pose,
+    /// Its pose on the stored orbit, as all see it.
+    pub seen_held: Pose,
+    /// Altitude in meters.
+    pub altitude_m: f64,
+    /// Number of way-points done with.
+    pub next: u32,
+    /// Number of orders carried out.
+    pub orders: u32,
+    /// Side of its stored fallback.
+    pub fallback: Side,
+    /// Number of times that its wish was refused so far.
+    pub refusals: u32,
+    /// The others with which it is named, by rising id: the shield promises nothing for these pairs.
+    pub named: Vec<EntityId>,
+    /// The wish that was ordered of it, if it is decided from outside.
+    pub wish: Option<Wish>,
+}
+
+/// An airplane as others see it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Sighted {
+    /// The airplane.
+    pub id: EntityId,
+    /// Its pose, with the error of the cycle.
+    pub pose: Pose,
+    /// Altitude in meters.
+    pub altitude_m: f64,
+    /// The side to which it turns, if it is seen to be on its stored orbit.
+    pub orbit: Option<Side>,
+}
+
+impl Own {
+    /// Returns an airplane as those aboard know it.
+    pub(crate) fn of(turn: &Turn<'_>, slot: Slot) -> Self {
+        let Turn { world, state, now, .. } = *turn;
+        let cell = &state.airplanes[slot as usize];
+        let (pose, held) = (cell.pose(), state.held(slot));
+        Self {
+            id: slot,
+            pose,
+            held,
+            seen: seen(world, slot, now, pose),
+            seen_held: seen(world, slot, now, held),
+            altitude_m: cell.altitude_m.get(),
+            next: cell.next.get(),
+            orders: cell.orders.get().into(),
+            fallback: cell.side(),
+            refusals: cell.overrides.get(),
+            named: state.named_with(slot).to_vec(),
+            wish: state.wish(slot),
+        }
+    }
+
+    /// Returns what its group knows of it once it has told it.
+    pub(crate) fn known(&self) -> Known {
+        let &Self { id, seen, next, orders, altitude_m, .. } = self;
+        Known { slot: id, pose: seen, next: next as usize, orders, altitude_m }
+    }
+
+    /// Returns the part of it that the shield knows: it is where all see it.
+    pub(crate) fn flyer(&self, world: &AirspaceWorld) -> Flyer {
+        let stage = world.stage(self.id, self.orders);
+        Flyer {
+            id: self.id,
+            pose: self.seen,
+            held: self.seen_held,
+            v_m_s: stage.model.v_m_s,
+            omega_max_rad_s: stage.model.omega_max_rad_s,
+            orbit_rad_s: world.orbit_rad_s[self.id as usize],
+            separation_m: stage.model.separation_m,
+            error_m: world.error_m(self.id as usize),
+            levels: Levels::between(self.altitude_m, stage.altitude_m),
+            vertical_m: world.vertical_m,
+            fallback: self.fallback,
+            named: self.named.as_slice().into(),
+            rank: self.rank(world.timing.dt_s, &stage),
+        }
+    }
+
+    /// Returns its rank. It is higher the nearer its goal is, so that it is soon out of
+    /// the others' way, and the more often its wish was refused, so that nobody waits for ever. Whole
+    /// meters in the upper half; the id in the lower half makes it unique.
+    fn rank(&self, dt_s: f64, stage: &Stage<'_>) -> u64 {
+        let ahead = &stage.mission[(self.next as usize).min(stage.mission.len())..];
+        let legs = ahead
+            .iter()
+            .scan(self.pose.at, |from, &to| Some(distance_m(std::mem::replace(from, to), to)));
+        let refused_m = f64::from(self.refusals) * stage.model.v_m_s * dt_s;
+        // The conversion saturates at the ends of the range.
+        let first = (FARTHEST_M + REFUSED_PART * refused_m - legs.sum::<f64>()) as u32;
+        u64::from(first) << 32 | u64::from(!self.id)
+    }
+
+    /// Returns the way by which it keeps to its stored orbit for one `dt`.
+    pub(crate) fn on_orbit(&self, world: &AirspaceWorld) -> Way {
+        let rate_rad_s = world.orbit_rad_s[self.id as usize];
+        let (steps, gust_rad) = (world.timing.points_per_dt(), world.bounds.heading_rad);
+        if gust_rad == 0.0 {
+            return Way { omegas_rad_s: vec![self.fallback.sign() * rate_rad_s; steps] };
+        }
+        let model = world.stage(self.id, self.orders).model;
+        let holding = Holding::new(self.pose, self.held, model, rate_rad_s, self.fallback);
+        Way { omegas_rad_s: holding.hold(steps, world.timing.dtau_s, gust_rad) }
+    }
+}
+
+impl Sighted {
+    /// Returns an airplane as others see it.
+    pub(crate) fn of(turn: &Turn<'_>, slot: Slot) -> Self {
+        let Turn { world, state, now, .. } = *turn;
+        let cell = &state.airplanes[slot as usize];
+        Self {
+            id: slot,
+            pose: seen(world, slot, now, cell.pose()),
+            altitude_m: cell.altitude_m.get(),
+            orbit: (cell.orbiting.get() > 0).then(|| cell.side()),
+        }
+    }
+
+    /// Returns what is known of it before it has told anything: its filed flight, where it is seen.
+    pub(crate) fn known(&self) -> Known {
+        let &Self { id, pose, altitude_m, .. } = self;
+        Known { slot: id, pose, next: 0, orders: 0, altitude_m }
+    }
+}
+
+impl Sight {
+    /// Returns what each airplane of a group perceives; `flown` are those that the method flies, by rising
+    /// id.
+    pub(crate) fn all(turn: &Turn<'_>, flown: &[Slot], intruders: &[Intruder]) -> Vec<Self> {
+        let group: Vec<Sighted> = flown.iter().map(|&slot| Sighted::of(turn, slot)).collect();
+        let one = |&slot: &Slot| Self {
+            cycle: turn.now,
+            own: Own::of(turn, slot),
+            group: group.clone(),
+            intruders: intruders.to_vec(),
+        };
+        flown.iter().map(one).collect()
+    }
+
+    /// Returns the ids of those who decide together, rising.
+    pub fn members(&self) -> Vec<EntityId> {
+        self.group.iter().map(|one| one.id).collect()
+    }
+
+    /// Returns its place among them.
+    pub(crate) fn me(&self) -> usize {
+        let place = self.group.binary_search_by_key(&self.own.id, |one| one.id);
+        place.expect("an airplane is in its own group")
+    }
+}

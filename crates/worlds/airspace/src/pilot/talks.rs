@@ -1,0 +1,160 @@
+//! The talks of a cycle: the parties to them, by deployment and method, and what comes of them.
+
+use super::briefing::{filed, own_ship, scene};
+use super::sight::Sight;
+use crate::agents::contact::Contacts;
+use crate::agents::coordinator::Host;
+use crate::agents::exchange::{self, Agreed};
+use crate::agents::intent::{self, Intent};
+use crate::agents::{
+    Agent, Concludes, Conclusion, Ended, Endpoint, Outgoing, Party, Radio, Unsound, informed,
+    sampling,
+};
+use crate::baseline::mvp::Resolving;
+use crate::deploy::Deployment;
+use crate::shield::Way;
+use crate::world::AirspaceWorld;
+use sidestep_collectives::Estimator;
+use sidestep_kernel::EntityId;
+use std::sync::Arc;
+
+/// What comes of a talk.
+pub(super) enum Came {
+    /// Of an optimization.
+    Decided(Conclusion),
+    /// Of telling each other where all mean to fly.
+    Told(Vec<Option<Intent>>),
+    /// Of the shield's exchange.
+    Agreed(Agreed),
+}
+
+impl From<Conclusion> for Came {
+    fn from(conclusion: Conclusion) -> Self {
+        Self::Decided(conclusion)
+    }
+}
+
+impl From<Vec<Option<Intent>>> for Came {
+    fn from(told: Vec<Option<Intent>>) -> Self {
+        Self::Told(told)
+    }
+}
+
+impl From<Agreed> for Came {
+    fn from(agreed: Agreed) -> Self {
+        Self::Agreed(agreed)
+    }
+}
+
+/// A party to a talk of any subject.
+pub(super) type Speaker = dyn Concludes<Outcome = Came>;
+
+/// A party of which only that it has an outcome matters.
+struct Any<P>(P);
+
+impl<P: Party> Party for Any<P> {
+    fn start(&mut self, tick: u64) {
+        self.0.start(tick);
+    }
+
+    fn on_message(&mut self, from: EntityId, message: &[u8], tick: u64) -> Result<(), Unsound> {
+        self.0.on_message(from, message, tick)
+    }
+
+    fn on_timer(&mut self, tick: u64) {
+        self.0.on_timer(tick);
+    }
+
+    fn next_timer(&self) -> Option<u64> {
+        self.0.next_timer()
+    }
+
+    fn is_done(&self) -> bool {
+        self.0.is_done()
+    }
+
+    fn take_messages(&mut self) -> Vec<Outgoing> {
+        self.0.take_messages()
+    }
+
+    fn most_bytes(&self) -> usize {
+        self.0.most_bytes()
+    }
+}
+
+impl<P: Concludes<Outcome: Into<Came>>> Concludes for Any<P> {
+    type Outcome = Came;
+
+    fn end(&mut self) -> Ended<Came> {
+        let Ended { outcome, unheard, late } = self.0.end();
+        Ended { outcome: outcome.map(Into::into), unheard, late }
+    }
+}
+
+fn endpoint<A>(agent: A, radio: Radio) -> Box<Speaker>
+where
+    A: Agent<Outcome: Into<Came>> + Send + 'static,
+{
+    Box::new(Any(Endpoint::new(agent, radio)))
+}
+
+/// Returns the party of the deployment to an optimization.
+pub(super) fn optimizes(
+    world: &AirspaceWorld,
+    sight: &Sight,
+    contacts: &Contacts,
+    radio: Radio,
+) -> Box<Speaker> {
+    let own = own_ship(world, sight, contacts);
+    match (world.deployment, world.settings.estimator) {
+        (Deployment::Pim | Deployment::HierarchicalPim, _) => {
+            let is_hierarchy = world.deployment == Deployment::HierarchicalPim;
+            Box::new(Any(Host::new(own, is_hierarchy, radio)))
+        }
+        (Deployment::Team, Estimator::Sampled { block, ageing }) => {
+            endpoint(sampling::Agent::new(own, block, ageing), radio)
+        }
+        (deployment, _) => {
+            let by_model = deployment == Deployment::CompactTeam;
+            endpoint(informed::Agent::new(own, by_model), radio)
+        }
+    }
+}
+
+/// Returns the party to a talk in which all tell where they mean to fly.
+pub(super) fn tells(
+    world: &AirspaceWorld,
+    sight: &Sight,
+    contacts: &Contacts,
+    resolving: &Resolving,
+    radio: Radio,
+) -> Box<Speaker> {
+    let own = &sight.own;
+    let expected =
+        |id: EntityId| contacts.get(&id).is_none_or(|contact| contact.heard_in + 1 >= sight.cycle);
+    let start = intent::Start {
+        me: radio.me,
+        own: Intent {
+            next: own.next,
+            orders: own.orders,
+            altitude_m: own.altitude_m,
+            resolving: resolving.clone(),
+        },
+        filed: sight.group.iter().map(|one| filed(world, one.id)).collect(),
+        airplanes: world.airplanes.len(),
+        expected: sight.group.iter().map(|one| expected(one.id)).collect(),
+    };
+    endpoint(intent::Agent::new(start), radio)
+}
+
+/// Returns the party to the shield's exchange of an airplane that may fly some ways.
+pub(super) fn proposes(
+    world: &AirspaceWorld,
+    sight: &Sight,
+    contacts: &Contacts,
+    ways: &[Way],
+    radio: Radio,
+) -> Box<Speaker> {
+    let scene = Arc::new(scene(world, sight));
+    endpoint(exchange::Agent::new(scene, radio.me, ways, contacts.clone()), radio)
+}

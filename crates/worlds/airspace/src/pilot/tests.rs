@@ -1,0 +1,101 @@
+//! Pilots outside of a run: they do what those in it do.
+
+mod fleet;
+mod hostile;
+mod order;
+
+use super::*;
+use crate::agents::network::Network;
+use crate::deploy::fly_all;
+use crate::world::AirspaceWorld;
+use crate::{AirspaceRun, airspace_run};
+use sidestep_kernel::{Cycle, EntityId, Simulation};
+use sidestep_scenario::Source;
+use std::sync::Arc;
+
+/// All that the shield has to do with: levels that are changed, one that comes in late, one that minds nobody, and
+/// two that start too close.
+const TROUBLE: &str = "[airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 2600.0\n\
+    [[airplanes]]\nat_m = [0, 3000]\nheading_deg = -90\nway_points_m = [[0, -6000]]\naltitude_m = 600.0\n\
+    orders = [{ at_s = 10.0, altitude_m = 0.0, climb_m_s = 20.0 }, { at_s = 20.0, speed_m_s = 45.0 }]\n\
+    [[airplanes]]\nat_m = [100, 3300]\nheading_deg = -90\nway_points_m = [[0, -6000]]\naltitude_m = 600.0\n\
+    [[airplanes]]\nat_m = [2000, 2500]\nheading_deg = -120\nway_points_m = [[-4000, -4000]]\nappears_s = 15.0\n\
+    [[airplanes]]\nat_m = [-3000, 0]\nheading_deg = 0\nway_points_m = [[9000, 0]]\nintruder = true\n";
+
+fn run(airspace: &str, airplanes: &str) -> AirspaceRun {
+    let text = format!(
+        "format = 1\nworld = \"airspace\"\nseed = 5\n[airspace]\n{airspace}\nmax_rounds = 12\n{airplanes}\n\
+         [record]\ncontrols = true\n"
+    );
+    airspace_run(&Source::new("pilots", text, ""), 1).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// A pilot for each airplane, outside of a run.
+struct Crew {
+    world: Arc<AirspaceWorld>,
+    pilots: Vec<Pilot>,
+}
+
+impl Crew {
+    fn of(run: &AirspaceRun) -> Self {
+        let world = run.world().clone();
+        let all = 0..world.airplanes.len() as EntityId;
+        let pilots = all.map(|id| Pilot::new(world.clone(), id, Default::default())).collect();
+        Self { world, pilots }
+    }
+
+    /// Lets those who perceive something decide, over the network of the scenario.
+    fn decide(&mut self, run: &AirspaceRun) -> Vec<Control> {
+        let network: Option<&Network> = self.world.network.as_ref();
+        let (now, schedule) = (run.cycle(), Schedule::of_cycle(run.cycle(), network));
+        // As they come off a network.
+        let sights: Vec<Sight> = run.sights().iter().map(over_the_wire).collect();
+        let is_due = |pilot: &Pilot| sights.iter().any(|sight| sight.own.id == pilot.id());
+        let (mut due, rest): (Vec<Pilot>, Vec<Pilot>) =
+            std::mem::take(&mut self.pilots).into_iter().partition(is_due);
+        for (pilot, sight) in due.iter_mut().zip(sights) {
+            pilot.begin_by(sight, schedule);
+        }
+        fly_all(&self.world, run.state(), (now, schedule), &mut due);
+        let controls = due.iter().map(|pilot| pilot.control().expect("all end")).collect();
+        self.pilots = due.into_iter().chain(rest).collect();
+        self.pilots.sort_unstable_by_key(Pilot::id);
+        controls
+    }
+}
+
+fn over_the_wire<T: serde::Serialize + serde::de::DeserializeOwned>(value: &T) -> T {
+    let bytes = postcard::to_stdvec(value).expect("plain data");
+    postcard::from_bytes(&bytes).expect("what was written")
+}
+
+/// Everything that others cannot see of an airplane changes, and nobody perceives anything else.
+#[test]
+fn a_sight_holds_nothing_of_others_that_cannot_be_seen() {
+    let mut run = run(
+        "deployment = \"team\"\nmethod = \"mvp\"",
+        "[airspace.generator]\nkind = \"superconflict\"\nn = 5\nradius_m = 2600.0\n",
+    );
+    run.advance(8);
+    let (world, now) = (run.world().clone(), run.cycle());
+    let sights = run.sights();
+    assert_eq!(sights.len(), 5);
+    let mut hidden = 0;
+    for own in 0..5 {
+        let mut snapshot = run.state().snapshot(now);
+        for (id, airplane) in snapshot.airplanes.iter_mut().enumerate().filter(|(id, _)| *id != own)
+        {
+            let [next, overrides, orbits, orbiting] = &mut airplane.counts;
+            (*next, *overrides, *orbits) = (1 - (*next).min(1), *overrides + 7, *orbits + 3);
+            airplane.turn_rate_rad_s += 0.01;
+            if *orbiting == 0 {
+                airplane.fallback = crate::shield::Side::BOTH[1 - airplane.fallback as usize];
+                hidden += 1;
+            }
+            snapshot.resolving[id] = crate::baseline::mvp::Resolving::default();
+        }
+        let changed = crate::state::AirspaceState::restore(&world, &snapshot);
+        assert_eq!(world.sights(&changed, now)[own], sights[own], "airplane {own}");
+    }
+    assert!(hidden > 10, "{hidden}");
+}

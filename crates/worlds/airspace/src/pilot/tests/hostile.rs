@@ -1,0 +1,240 @@
+//! Whatever bytes come: they are counted and dropped, and nobody breaks off.
+
+use super::*;
+use crate::agents::packet::{Draft, Seal, open};
+use proptest::prelude::*;
+use sidestep_kernel::Seed;
+use sidestep_kernel::stream::{Draws, Purpose, Streams};
+use std::collections::VecDeque;
+
+const THREE: &str = "[airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 2600.0\n";
+
+const KINDS: [&str; 10] = [
+    "deployment = \"team\"",
+    "deployment = \"compact-team\"",
+    "deployment = \"team\"\npreset = \"paper\"",
+    "deployment = \"compact-team\"\npreset = \"paper\"",
+    "deployment = \"pim\"",
+    "deployment = \"hierarchical-pim\"\npreset = \"paper\"",
+    "deployment = \"pim\"\nnetwork = { loss = 0.2 }",
+    "deployment = \"team\"\nmethod = \"mvp\"",
+    "deployment = \"team\"\nmethod = \"none\"\nnetwork = {}",
+    "deployment = \"team\"\nnetwork = { loss = 0.2 }",
+];
+
+/// Changes some bytes, or cuts some off, or adds some.
+fn changed(bytes: &[u8], draws: &mut Draws) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    for _ in 0..1 + draws.below(4) {
+        let at = draws.below(bytes.len().max(1) as u32) as usize;
+        match draws.below(6) {
+            0 => bytes.truncate(at),
+            1 => bytes.extend((0..draws.below(40)).map(|k| k as u8)),
+            2 if at < bytes.len() => drop(bytes.remove(at)),
+            // Lengths, numbers of rounds, and parts of floats: large, or one off.
+            3 if at < bytes.len() => bytes[at] = 0xFF,
+            4 if at < bytes.len() => bytes[at] = bytes[at].wrapping_add(1),
+            _ if at < bytes.len() => bytes[at] ^= 1 << draws.below(8),
+            _ => {}
+        }
+    }
+    bytes
+}
+
+/// Returns a packet that is well formed and says something else.
+fn forged(payload: &[u8], draws: &mut Draws) -> Vec<u8> {
+    let fingerprint = u64::from_le_bytes(std::array::from_fn(|k| payload[4 + k]));
+    let (seal, message) = open(payload, fingerprint).expect("a real packet");
+    Draft::of_bytes(&changed(message, draws)).sealed(&seal)
+}
+
+/// Returns a packet whose message is right and whose head is not.
+fn misplaced(payload: &[u8], draws: &mut Draws) -> Vec<u8> {
+    let fingerprint = u64::from_le_bytes(std::array::from_fn(|k| payload[4 + k]));
+    let (mut seal, message) = open(payload, fingerprint).expect("a real packet");
+    let Seal { talk, .. } = &mut seal;
+    match draws.below(5) {
+        0 => talk.cycle = talk.cycle.wrapping_add(2 + u64::from(draws.below(1000))),
+        1 => talk.members ^= 1,
+        2 => seal.sender = draws.below(9) + 3,
+        3 => seal.fingerprint ^= 4,
+        _ => talk.cycle = u64::MAX,
+    }
+    Draft::of_bytes(message).sealed(&seal)
+}
+
+/// Lets pilots talk in one cycle, and hands each of them `more` made of every packet before the packet itself.
+fn told_more(
+    run: &AirspaceRun,
+    pilots: &mut [Pilot],
+    mut more: impl FnMut(&[u8]) -> Vec<u8>,
+) -> u64 {
+    let (mut due, mut tick, mut told) = (VecDeque::new(), 0, 0);
+    for sight in run.sights() {
+        let own = sight.own.id as usize;
+        pilots[own].begin(sight, tick);
+    }
+    loop {
+        for pilot in &mut *pilots {
+            for Packet { to, payload, .. } in pilot.take_packets() {
+                let others = pilot.group().iter().filter(|&&other| other != pilot.id());
+                for &other in others.filter(|&&other| to.is_none_or(|to| to == other)) {
+                    due.push_back((pilot.id(), other, payload.clone()));
+                }
+            }
+        }
+        tick += 1;
+        let now = due.len();
+        for (from, to, payload) in due.drain(..now).collect::<Vec<_>>() {
+            let pilot = &mut pilots[to as usize];
+            pilot.on_packet(from, &more(&payload), tick);
+            pilot.on_packet(from, &payload, tick);
+            told += 1;
+        }
+        let timers = pilots.iter().filter_map(Pilot::next_timer).filter(|due| *due < u64::MAX);
+        match (now, timers.min()) {
+            (0, None) => return told,
+            (0, Some(next)) => tick = tick.max(next),
+            _ => {}
+        }
+        pilots.iter_mut().for_each(|pilot| pilot.on_timer(tick));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(36))]
+
+    /// Damaged on the way, or meant for others: all that counts is what was really said.
+    #[test]
+    fn what_is_damaged_or_misplaced_is_counted_and_changes_nothing(
+        seed in any::<u64>(), kind in 0..KINDS.len(), is_damaged in any::<bool>(),
+    ) {
+        let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(902));
+        let run = run(KINDS[kind], THREE);
+        let (mut alone, mut beset) = (Crew::of(&run), Crew::of(&run));
+        told_more(&run, &mut alone.pilots, <[u8]>::to_vec);
+        let told = told_more(&run, &mut beset.pilots, |payload| match is_damaged {
+            true => {
+                let mut bytes = payload.to_vec();
+                let at = draws.below(bytes.len() as u32) as usize;
+                bytes[at] ^= 1 << draws.below(8);
+                bytes
+            }
+            false => misplaced(payload, &mut draws),
+        });
+        let refused: u64 = beset.pilots.iter().map(|pilot| pilot.refused().total()).sum();
+        prop_assert!(told > 0);
+        prop_assert_eq!(refused, told, "each is counted");
+        for (found, expected) in beset.pilots.iter().zip(&alone.pilots) {
+            let (found, expected) = (found.control(), expected.control());
+            let course = |control: &Option<Control>| control.as_ref().map(|one| one.course.clone());
+            prop_assert_eq!(course(&found), course(&expected));
+        }
+    }
+
+    /// Well formed, with right checksums, and senseless or lying: nobody breaks off.
+    #[test]
+    fn whatever_a_packet_says_nobody_breaks_off(
+        seed in any::<u64>(), kind in 0..KINDS.len(), is_only in any::<bool>(),
+    ) {
+        let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(903));
+        let run = run(KINDS[kind], THREE);
+        let mut crew = Crew::of(&run);
+        let mut real = Vec::new();
+        told_more(&run, &mut crew.pilots, |payload| {
+            real.push(payload.to_vec());
+            forged(payload, &mut draws)
+        });
+        // The same again to pilots that hear nothing else, in any order.
+        let mut crew = Crew::of(&run);
+        let sights = run.sights();
+        for sight in sights.iter().filter(|_| is_only) {
+            crew.pilots[sight.own.id as usize].begin(sight.clone(), 0);
+        }
+        for _ in 0..200 {
+            let payload = &real[draws.below(real.len() as u32) as usize];
+            let bytes = forged(payload, &mut draws);
+            let from = EntityId::from(payload[28]);
+            let to = (from as usize + 1 + draws.below(2) as usize) % 3;
+            crew.pilots[to].on_packet(from, &bytes, 1);
+        }
+        for sight in sights {
+            crew.pilots[sight.own.id as usize].begin(sight, 1);
+        }
+    }
+}
+
+#[test]
+fn who_floods_a_pilot_fills_no_memory() {
+    let run = run("deployment = \"team\"", THREE);
+    let mut crew = Crew::of(&run);
+    let sight = run.sights().swap_remove(0);
+    crew.pilots[0].begin(sight.clone(), 0);
+    let seal = |cycle: Cycle, sequence: u32| Seal {
+        fingerprint: run.world().fingerprint,
+        talk: TalkId::new(cycle, Topic::Shield, &sight.members()),
+        sender: 1,
+        sequence,
+    };
+    let large = vec![7; 1 << 18];
+    for k in 0..100 {
+        let packet = Draft::of_bytes(&large).sealed(&seal(u64::from(k) % 2, k));
+        crew.pilots[0].on_packet(1, &packet, 0);
+    }
+    let refused = crew.pilots[0].refused();
+    assert!(refused.of(Refusal::NoRoom) > 80, "{refused:?}");
+    let of_this = TalkId::new(0, Topic::Decision, &sight.members());
+    let packet = Draft::of_bytes(&large).sealed(&Seal { talk: of_this, ..seal(0, 0) });
+    crew.pilots[0].on_packet(1, &packet, 0);
+    assert_eq!(crew.pilots[0].refused().of(Refusal::TooLarge), 1);
+}
+
+/// Each reason by itself.
+#[test]
+fn every_reason_is_told_from_the_others() {
+    let run = run("deployment = \"compact-team\"", THREE);
+    let mut crew = Crew::of(&run);
+    for sight in run.sights() {
+        let own = sight.own.id as usize;
+        crew.pilots[own].begin(sight, 0);
+    }
+    let packet = crew.pilots[1].take_packets().swap_remove(0).payload;
+    let (seal, message) = open(&packet, run.world().fingerprint).expect("a real packet");
+    let with = |change: &dyn Fn(&mut Seal)| {
+        let mut seal = seal;
+        change(&mut seal);
+        Draft::of_bytes(message).sealed(&seal)
+    };
+    let bent = |at: usize, to: u8| {
+        let mut bytes = packet.clone();
+        bytes[at] = to;
+        bytes
+    };
+    let said = |bytes: &[u8]| Draft::of_bytes(bytes).sealed(&seal);
+    let cases = [
+        (packet[..43].to_vec(), Refusal::NoPacket),
+        (bent(0, 0), Refusal::NoPacket),
+        (bent(2, 9), Refusal::Version),
+        (bent(60, 0xEE), Refusal::Damaged),
+        (with(&|seal| seal.fingerprint += 1), Refusal::Fingerprint),
+        (with(&|seal| seal.sender = 2), Refusal::Sender),
+        (with(&|seal| seal.talk.members += 1), Refusal::OtherGroup),
+        (with(&|seal| seal.talk.cycle = 7), Refusal::NoRoom),
+        (said(&[9, 9, 9]), Refusal::Unreadable),
+        (said(&[message, &[0]].concat()), Refusal::Unreadable),
+        // A message numbered beyond all that there may be.
+        (said(&[&[0, 0xFF, 0xFF, 0x03], &message[2..]].concat()), Refusal::Unsound),
+    ];
+    for (bytes, why) in cases {
+        let before = crew.pilots[0].refused();
+        crew.pilots[0].on_packet(1, &bytes, 0);
+        let after = crew.pilots[0].refused();
+        assert_eq!(
+            (after.of(why), after.total()),
+            (before.of(why) + 1, before.total() + 1),
+            "{why:?}"
+        );
+    }
+    crew.pilots[0].on_packet(1, &packet, 0);
+    assert_eq!(crew.pilots[0].refused().total(), 11, "the real one is taken");
+}

@@ -1,0 +1,73 @@
+//! Results do not depend on the order in which packets come, nor on who is ahead.
+
+use super::*;
+use proptest::prelude::*;
+use sidestep_kernel::Seed;
+use sidestep_kernel::stream::{Draws, Purpose, Streams};
+
+/// Something that a pilot has yet to learn.
+enum Due {
+    Sight(Sight),
+    Packet(EntityId, Vec<u8>),
+}
+
+/// Lets pilots decide a cycle. What any of them learns next is drawn, so that packets overtake each other and some
+/// are in the second talk before others have begun the first.
+fn decided(pilots: &mut [Pilot], sights: Vec<Sight>, draws: &mut Draws) -> Vec<Control> {
+    let ids: Vec<EntityId> = sights.iter().map(|sight| sight.own.id).collect();
+    let mut due: Vec<(EntityId, Due)> =
+        sights.into_iter().map(|sight| (sight.own.id, Due::Sight(sight))).collect();
+    while !due.is_empty() {
+        let (id, next) = due.swap_remove(draws.below(due.len() as u32) as usize);
+        let pilot = &mut pilots[id as usize];
+        match next {
+            Due::Sight(sight) => pilot.begin(sight, 0),
+            Due::Packet(from, bytes) => pilot.on_packet(from, &bytes, 0),
+        }
+        for Packet { to, payload, .. } in pilot.take_packets() {
+            let others = pilot.group().iter().filter(|&&other| other != id);
+            for &other in others.filter(|&&other| to.is_none_or(|to| to == other)) {
+                due.push((other, Due::Packet(id, payload.clone())));
+            }
+        }
+    }
+    let control = |&id: &EntityId| pilots[id as usize].control().expect("nobody waits any more");
+    ids.iter().map(control).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn controls_do_not_depend_on_the_order_of_packets(
+        seed in any::<u64>(),
+        airspace in prop::sample::select(vec![
+            "deployment = \"team\"",
+            "deployment = \"team\"\norder = \"parallel\"",
+            "deployment = \"compact-team\"",
+            "deployment = \"team\"\npreset = \"paper\"",
+            "deployment = \"compact-team\"\npreset = \"paper\"",
+            "deployment = \"pim\"",
+            "deployment = \"pim\"\npreset = \"paper\"",
+            "deployment = \"hierarchical-pim\"\npreset = \"paper\"",
+            "deployment = \"team\"\nmethod = \"mvp\"",
+            "deployment = \"compact-team\"\nmethod = \"orca\"",
+            "deployment = \"team\"\nmethod = \"none\"",
+        ]),
+    ) {
+        let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(901));
+        let (mut own, mut driven) = (run(airspace, TROUBLE), run(airspace, TROUBLE));
+        let mut crew = Crew::of(&driven);
+        own.advance(6);
+        for _ in 0..6 {
+            let controls = decided(&mut crew.pilots, driven.sights(), &mut draws);
+            driven.control(controls).expect("what pilots decide");
+            driven.advance(1);
+        }
+        prop_assert_eq!(driven.digest(), own.digest());
+        prop_assert_eq!(driven.metrics().messages, own.metrics().messages);
+        for pilot in &crew.pilots {
+            prop_assert_eq!(pilot.refused().total(), 0);
+        }
+    }
+}
