@@ -9,6 +9,7 @@ mod tests;
 
 pub use measures::Measures;
 
+use crate::deploy::Deployment;
 use super::driver::{Driver, Task};
 use super::formation::Robots;
 use super::metrics::Tally;
@@ -270,6 +271,8 @@ impl Plan {
             look_m: LOOK_M,
             streams: Streams::new(Seed(around.seed)),
             teams: Arc::default(),
+            deployment: Deployment::Direct,
+            network: None,
         }
     }
 }

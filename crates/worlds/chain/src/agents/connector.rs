@@ -1,0 +1,432 @@
+//! The agent of one connector: its identity, its links, its clock, and the end of its cycle.
+
+use super::climb::Climbing;
+use super::control::{Control, Ended, Goes, Led};
+use super::follow::Following;
+use super::lead::Leading;
+use super::link::Link;
+use super::message::{Message, Packet};
+use super::network::{Patience, Traffic};
+use super::sight::{Role, Sight};
+use super::{Both, Side};
+use crate::motion::replan::Rungs;
+use crate::rods::chain::{Chain, Rod};
+use crate::rods::geometry::Point;
+use crate::rods::obstacle::Obstacles;
+use crate::rods::propagate::alone::Alone;
+use crate::rods::rules::Rules;
+use crate::world::ChainWorld;
+use sidestep_kernel::{Cycle, EntityId, InputError};
+
+/// Most packets that wait for the beginning of their cycle.
+const MOST_HELD: usize = 64;
+
+/// The program aboard one connector of a chain.
+///
+/// Packets and ticks go in, packets come out; [`Self::control`] is there when its cycle is over. It
+/// never panics on what comes from the network.
+#[derive(Debug, Clone)]
+pub struct ConnectorAgent<const D: usize> {
+    /// Number of its connector in its chain of `n`, and the id of connector 0 on the network.
+    pub(super) me: u32,
+    pub(super) n: u32,
+    first_id: EntityId,
+    radio: Option<Radio>,
+    pub(super) rungs: Rungs,
+    /// The rods to its neighbors.
+    pub(super) rods: Both<Option<Rod>>,
+    pub(super) alone: Alone<D>,
+    /// What its sensors see in this cycle.
+    pub(super) obstacles: Obstacles<D>,
+    /// The cycle; none before the first.
+    cycle: Option<Cycle>,
+    began: u64,
+    now: u64,
+    pub(super) place: Track<D>,
+    pub(super) beside: Both<Option<Track<D>>>,
+    links: Both<Option<Link<Message<D>>>>,
+    pub(super) missing: Both<Option<u32>>,
+    /// Packets of cycles that have not begun here yet.
+    held: Vec<(Side, Packet<D>)>,
+    pub(super) following: Option<Following>,
+    pub(super) leading: Option<Leading<D>>,
+    pub(super) climbing: Option<Climbing<D>>,
+    /// Number of the motion that it makes in this cycle.
+    pub(super) goes_in: Option<u32>,
+    pub(super) led: Option<Led>,
+    pub(super) ended: Option<Ended<D>>,
+    is_silent: bool,
+    /// Whether the leader has finished, and whether time is up.
+    is_over: bool,
+    is_closed: bool,
+    is_late: bool,
+    traffic: Traffic,
+}
+
+/// The time that it waits for others, where messages may get lost.
+#[derive(Debug, Clone, Copy)]
+struct Radio {
+    patience: Patience,
+    /// Number of ticks after which the talk of a cycle ends.
+    ticks: u64,
+}
+
+/// A packet on its way out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Outgoing {
+    /// Id of the neighbor that it is for.
+    pub to: EntityId,
+    /// Its bytes.
+    pub payload: Vec<u8>,
+}
+
+/// A place while a motion is prepared.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Track<const D: usize> {
+    /// The place outside of motions,
+    settled: Point<D>,
+    /// after the sub-steps that are accepted,
+    pub(super) base: Point<D>,
+    /// and after the present one.
+    pub(super) now: Point<D>,
+}
+
+impl<const D: usize> Track<D> {
+    fn at(place: Point<D>) -> Self {
+        Self { settled: place, base: place, now: place }
+    }
+
+    /// Begins another motion.
+    pub(super) fn begin(&mut self) {
+        *self = Self::at(self.settled);
+    }
+
+    /// Accepts the present sub-step.
+    pub(super) fn accept(&mut self) {
+        self.base = self.now;
+    }
+
+    /// Takes the present sub-step back.
+    pub(super) fn take_back(&mut self) {
+        self.now = self.base;
+    }
+
+    /// Ends the motion.
+    pub(super) fn settle(&mut self, goes: bool) {
+        *self = Self::at(if goes { self.now } else { self.settled });
+    }
+}
+
+impl<const D: usize> ConnectorAgent<D> {
+    /// Returns the agent of a connector in a compiled world, all of which it is told being its own
+    /// limits, its rods and the rules of its chain.
+    ///
+    /// # Panics
+    /// When the world has no such connector.
+    pub fn new(world: &ChainWorld<D>, chain: EntityId, connector: u32) -> Self {
+        let spec = &world.chains[chain as usize];
+        let mut agent = Self::of(&spec.start, connector, &world.rules, world.rungs);
+        agent.first_id = world.first_id(chain);
+        agent.radio = world.network.as_ref().map(|network| Radio {
+            patience: network.patience(),
+            ticks: network.deadline_ticks(),
+        });
+        agent
+    }
+
+    /// Returns the agent of connector `k` of a chain, on a network that loses nothing.
+    pub(crate) fn of(chain: &Chain<D>, k: u32, rules: &Rules, rungs: Rungs) -> Self {
+        let n = chain.points().len() as u32;
+        let rod = |side: Side| side.of(k, n).map(|j| chain.rod_between(k as usize, j as usize));
+        Self {
+            me: k,
+            n,
+            first_id: 0,
+            radio: None,
+            rungs,
+            rods: Both::of(rod),
+            alone: Alone::new(chain, k as usize, rules),
+            obstacles: Obstacles::default(),
+            cycle: None,
+            began: 0,
+            now: 0,
+            place: Track::at(chain.points()[k as usize]),
+            beside: Both::default(),
+            links: Both::default(),
+            missing: Both::default(),
+            held: Vec::new(),
+            following: None,
+            leading: None,
+            climbing: None,
+            goes_in: None,
+            led: None,
+            ended: None,
+            is_silent: false,
+            is_over: false,
+            is_closed: false,
+            is_late: false,
+            traffic: Traffic::default(),
+        }
+    }
+
+    /// Returns the same agent on a network that may lose messages.
+    #[cfg(test)]
+    pub(crate) fn on(self, network: Option<&super::network::Network>) -> Self {
+        let radio = network.map(|network| Radio {
+            patience: network.patience(),
+            ticks: network.deadline_ticks(),
+        });
+        Self { radio, ..self }
+    }
+
+    /// Returns its id on the network.
+    pub fn id(&self) -> EntityId {
+        self.first_id + self.me
+    }
+
+    /// Begins a cycle, whose talk starts in a tick. Packets are to be taken after it.
+    ///
+    /// # Errors
+    /// When a number of the sight makes no sense; then the agent is as before.
+    pub fn begin(&mut self, sight: Sight<D>, tick: u64) -> Result<(), InputError> {
+        self.obstacles.set_moving(&sight.checked(self.me, self.n)?)?;
+        self.alone.set_max_bend_rad(sight.max_bend_rad)?;
+        (self.cycle, self.began, self.now) = (Some(sight.cycle), tick, tick);
+        self.place = Track::at(sight.at.0);
+        let [below, above] = sight.neighbors;
+        let track = |side| if side == Side::Below { below } else { above };
+        self.beside = Both::of(|side| track(side).map(|place| Track::at(place.0)));
+        let [below, above] = sight.missing;
+        self.missing = Both::of(|side| if side == Side::Below { below } else { above });
+        (self.following, self.leading, self.climbing) = (None, None, None);
+        (self.goes_in, self.led, self.ended) = (None, None, None);
+        self.is_silent = sight.is_silent;
+        (self.is_over, self.is_closed, self.is_late) = (false, sight.is_silent, false);
+        self.traffic = Traffic::default();
+        self.begin_links();
+        self.play(sight.role);
+        self.take_held(sight.cycle);
+        Ok(())
+    }
+
+    fn begin_links(&mut self) {
+        let (me, n, missing) = (self.me, self.n, self.missing);
+        let patience = self.radio.map(|radio| radio.patience);
+        self.links = Both::of(|side| {
+            let neighbor = side.of(me, n)?;
+            let mut link = Link::new(patience, missing[side] == Some(neighbor));
+            // Where messages get lost, neighbors find out in every cycle whether they are in touch.
+            if patience.is_some() {
+                link.say(Message::Here);
+            }
+            Some(link)
+        });
+    }
+
+    /// Takes up its part in this cycle.
+    fn play(&mut self, role: Role<D>) {
+        let missing = self.nearest_missing().or(self.is_silent.then_some(self.me));
+        match (role, missing) {
+            (Role::Follows, _) => return,
+            (Role::Rests, _) => self.ended = Some(Ended::Rested),
+            (Role::Leads(_), Some(missing)) => self.ended = Some(Ended::Stands { missing }),
+            (Role::Leads(wish), None) => {
+                self.climbing = Some(Climbing::new(wish, self.place.base));
+                return self.run();
+            }
+        }
+        self.finish(None);
+    }
+
+    /// Takes the packets that came before the cycle had begun here.
+    fn take_held(&mut self, cycle: Cycle) {
+        let held = std::mem::take(&mut self.held);
+        for (side, packet) in held {
+            match packet.cycle.cmp(&cycle) {
+                std::cmp::Ordering::Less => {}
+                std::cmp::Ordering::Equal => self.take(side, packet),
+                std::cmp::Ordering::Greater => self.held.push((side, packet)),
+            }
+        }
+    }
+
+    /// Takes a packet. One that comes from no neighbor, cannot be read or makes no sense is counted
+    /// and dropped.
+    pub fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
+        self.now = self.now.max(tick);
+        let neighbor = |side: &Side| side.of(self.me, self.n).map(|k| self.first_id + k);
+        let side = Side::ALL.into_iter().find(|side| neighbor(side) == Some(from));
+        let packet = Packet::read(bytes, self.n);
+        let (Some(side), Some(packet)) = (side, packet) else {
+            self.traffic.dropped += 1;
+            return;
+        };
+        match self.cycle {
+            Some(cycle) if packet.cycle == cycle => self.take(side, packet),
+            Some(cycle) if packet.cycle < cycle => {}
+            _ if self.held.len() < MOST_HELD => self.held.push((side, packet)),
+            _ => self.traffic.dropped += 1,
+        }
+    }
+
+    fn take(&mut self, side: Side, packet: Packet<D>) {
+        if self.is_silent {
+            return;
+        }
+        let Some(link) = &mut self.links[side] else { return };
+        let messages = link.take(packet.parcel);
+        let beyond = packet.missing.filter(|k| side.has(*k, self.me));
+        self.misses(side, beyond);
+        for message in messages {
+            self.on_message(side, message);
+        }
+        self.run();
+    }
+
+    fn on_message(&mut self, from: Side, message: Message<D>) {
+        if self.is_over || self.is_closed {
+            return;
+        }
+        match message {
+            Message::Here => {}
+            Message::Prepare(prepare) => self.on_prepare(from, &prepare),
+            Message::Consent(consent) => self.on_consent(from, &consent),
+            Message::Object(objection) => self.on_objection(from, objection),
+            Message::Settle { request, goes } => self.on_settle(from, request, goes),
+            Message::Over => self.finish(Some(from)),
+            Message::AskEnd | Message::Order(_) => self.on_order(from, message),
+            Message::End(..) | Message::Done(_) => self.on_answer(from, message),
+        }
+    }
+
+    /// Notes who is lost on one side, and tells the other side if that is news. A leader stops.
+    pub(super) fn misses(&mut self, side: Side, missing: Option<u32>) {
+        if self.missing[side] == missing {
+            return;
+        }
+        self.missing[side] = missing;
+        self.say(side.other(), Message::Here);
+        if let Some(missing) = missing {
+            self.give_up_leading();
+            if self.climbing.take().is_some() {
+                self.ended = Some(Ended::Stands { missing });
+                self.finish(None);
+            }
+        }
+    }
+
+    fn nearest_missing(&self) -> Option<u32> {
+        let both = Side::ALL.into_iter().filter_map(|side| self.missing[side]);
+        both.min_by_key(|k| k.abs_diff(self.me))
+    }
+
+    /// Says something to a neighbor, if there is one.
+    pub(super) fn say(&mut self, to: Side, message: Message<D>) {
+        if let Some(link) = &mut self.links[to] {
+            link.say(message);
+        }
+    }
+
+    /// Ends the cycle, as the leader does or says.
+    pub(super) fn finish(&mut self, from: Option<Side>) {
+        self.give_up_leading();
+        self.is_over = true;
+        for side in Side::ALL.into_iter().filter(|side| Some(*side) != from) {
+            self.say(side, Message::Over);
+        }
+    }
+
+    /// Does what can be done before the next message.
+    pub(super) fn run(&mut self) {
+        while self.go_on_leading() || self.climb_on() {}
+    }
+
+    /// Looks at the clock: sends again what was not confirmed, and gives up who never confirms.
+    pub fn on_timer(&mut self, tick: u64) {
+        self.now = self.now.max(tick);
+        for side in Side::ALL {
+            let link = self.links[side].as_mut().filter(|_| !self.is_silent);
+            if link.is_some_and(|link| link.on_timer(tick)) {
+                self.misses(side, side.of(self.me, self.n));
+            }
+        }
+        if !self.is_done() && self.deadline().is_some_and(|deadline| deadline <= tick) {
+            self.close();
+        }
+        self.run();
+    }
+
+    /// Ends the cycle because time is up. Who has not been heard at all is lost.
+    fn close(&mut self) {
+        for side in Side::ALL {
+            if self.links[side].as_ref().is_some_and(|link| !link.is_heard()) {
+                self.misses(side, side.of(self.me, self.n));
+            }
+        }
+        self.give_up_leading();
+        self.climbing = None;
+        self.is_late = !self.is_over && self.nearest_missing().is_none();
+        self.is_closed = true;
+    }
+
+    /// Returns the next tick in which it has to look at the clock, if there is one.
+    pub fn next_timer(&self) -> Option<u64> {
+        if self.is_done() {
+            return None;
+        }
+        let links = Side::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
+        links.filter_map(Link::due).chain(self.deadline()).min()
+    }
+
+    /// Returns the tick in which its cycle ends in any case; none where messages never get lost.
+    pub fn deadline(&self) -> Option<u64> {
+        self.radio.map(|radio| self.began.saturating_add(radio.ticks))
+    }
+
+    /// Returns the packets that it sends now.
+    pub fn take_packets(&mut self) -> Vec<Outgoing> {
+        let (Some(cycle), false) = (self.cycle, self.is_silent) else { return Vec::new() };
+        let mut out = Vec::new();
+        for side in Side::ALL {
+            let Some(neighbor) = side.of(self.me, self.n) else { continue };
+            let missing = self.missing[side.other()];
+            let Some(parcel) = self.links[side].as_mut().and_then(|link| link.parcel(self.now))
+            else {
+                continue;
+            };
+            let payload = Packet { cycle, missing, parcel }.bytes();
+            self.traffic.count(payload.len());
+            out.push(Outgoing { to: self.first_id + neighbor, payload });
+        }
+        out
+    }
+
+    /// Whether its cycle is over. It goes on answering questions.
+    pub fn is_done(&self) -> bool {
+        let mut links = Side::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
+        self.is_closed || self.is_over && links.all(Link::is_quiet)
+    }
+
+    /// Returns what its connector does in this cycle; none before the cycle is over.
+    pub fn control(&self) -> Option<Control<D>> {
+        let cycle = self.cycle.filter(|_| self.is_done())?;
+        let doubt = self.following.as_ref().filter(|following| following.has_consented);
+        let goes = match (self.goes_in, doubt) {
+            (Some(request), _) => Goes::To { request, to: self.place.settled },
+            (None, Some(following)) => {
+                Goes::WithItsMaster { request: following.request, to: self.place.now }
+            }
+            (None, None) => Goes::Stays,
+        };
+        Some(Control {
+            connector: self.me,
+            cycle,
+            goes,
+            led: self.led,
+            ended: self.ended.clone(),
+            missing: Side::ALL.map(|side| self.missing[side]),
+            is_late: self.is_late,
+            traffic: self.traffic,
+        })
+    }
+}
