@@ -57,7 +57,7 @@ mod words;
 mod world;
 
 pub use arms::{ik, kinematics};
-pub use deploy::Deployment;
+pub use deploy::{Deployment, Shown};
 pub use kind::Chains;
 pub use motion::escape::{Escape, Escaped, Escaper, Method, WayOut};
 pub use motion::replan::{Climbed, Ladder, Rungs, Situation};

@@ -1,5 +1,6 @@
 //! The changing state of a run, and its snapshot.
 
+use super::agents::Control;
 use super::driver::external::External;
 use super::driver::{Driving, Task};
 use super::formation::{Robot, Solid};
@@ -63,6 +64,8 @@ pub struct Body<const D: usize> {
     pub(crate) plan: Option<Plan<D>>,
     /// The nearest lost connectors below and above, as each connector knows; empty while nobody is lost.
     pub(crate) missing: Vec<Missing>,
+    /// Decisions of its agents for this cycle, if they run elsewhere.
+    pub(crate) handed: Option<Vec<Option<Control<D>>>>,
     /// Motions that the chain has yet to follow; none whenever somebody looks.
     pub(crate) put_off: PutOff<D>,
 }
@@ -147,6 +150,7 @@ impl<const D: usize> Body<D> {
             external: External::default(),
             plan: None,
             missing: Vec::new(),
+            handed: None,
             put_off: PutOff::default(),
         };
         body.motions = spec.motions(&body.driving)?;

@@ -2,7 +2,7 @@
 //! talk, and who is no longer heard.
 
 use super::Acting;
-use crate::agents::{Control, Ended, Role, Side, Wish};
+use crate::agents::{Ended, Role, Side, Wish};
 use crate::deploy::{Deployment, settled};
 use crate::driver::Task;
 use crate::events::EventKind;
@@ -55,17 +55,26 @@ impl<const D: usize> Acting<'_, D> {
     fn talk(&mut self, role: &Role<D>) -> Option<Ended<D>> {
         self.has_talked = true;
         let leader = self.task().map_or(0, |task| task.agent);
-        let (body, obstacles) = (&*self.body, &self.scratch.obstacles);
-        let part = (leader, role);
-        let controls = self.world.talked((self.slot, self.now), body, obstacles, part);
+        let (who, obstacles) = ((self.slot, self.now), &self.scratch.obstacles);
+        let sights = self.world.sights(who, self.body, obstacles, (leader, role));
+        let controls = match (self.body.handed.take(), &mut self.scratch.shown) {
+            (Some(handed), _) => handed,
+            (None, Some(shown)) => {
+                shown.push((self.slot, sights));
+                return None;
+            }
+            (None, None) => self.world.talked(who, sights),
+        };
         if let Some(points) = settled(&self.body.chain, &controls) {
             self.body.chain.points_mut().copy_from_slice(&points);
         }
-        let mut controls: Vec<Control<D>> = controls.into_iter().flatten().collect();
-        controls.iter().for_each(|control| self.body.tally.traffic.add(control.traffic));
-        self.note_missing(controls.iter().map(|control| control.missing).collect());
-        let place = controls.iter().position(|control| control.connector as usize == leader)?;
-        let leads = controls.swap_remove(place);
+        let all = || controls.iter().flatten();
+        all().for_each(|control| self.body.tally.traffic.add(control.traffic));
+        let mut missing = self.body.missing.clone();
+        missing.resize(controls.len(), Missing::default());
+        all().for_each(|control| missing[control.connector as usize] = control.missing);
+        self.note_missing(missing);
+        let leads = controls.into_iter().nth(leader)??;
         if leads.is_late {
             self.body.tally.deadlines_missed += 1;
             self.tell(EventKind::Deadline, leader, 0.0);

@@ -127,10 +127,10 @@ impl<const D: usize> ConnectorAgent<D> {
         let spec = &world.chains[chain as usize];
         let mut agent = Self::of(&spec.start, connector, &world.rules, world.rungs);
         agent.first_id = world.first_id(chain);
-        agent.radio = world.network.as_ref().map(|network| Radio {
-            patience: network.patience(),
-            ticks: network.deadline_ticks(),
-        });
+        agent.radio = world
+            .network
+            .as_ref()
+            .map(|network| Radio { patience: network.patience(), ticks: network.deadline_ticks() });
         agent
     }
 
@@ -172,10 +172,8 @@ impl<const D: usize> ConnectorAgent<D> {
     /// Returns the same agent on a network that may lose messages.
     #[cfg(test)]
     pub(crate) fn on(self, network: Option<&super::network::Network>) -> Self {
-        let radio = network.map(|network| Radio {
-            patience: network.patience(),
-            ticks: network.deadline_ticks(),
-        });
+        let radio = network
+            .map(|network| Radio { patience: network.patience(), ticks: network.deadline_ticks() });
         Self { radio, ..self }
     }
 

@@ -181,10 +181,8 @@ impl<const D: usize> ConnectorAgent<D> {
             return;
         }
         let Objection { has_turned, may_go_elsewhere, .. } = *objection;
-        let repeats = lengths == Lengths::Own
-            && has_turned
-            && may_go_elsewhere
-            && self.alone.repeats();
+        let repeats =
+            lengths == Lengths::Own && has_turned && may_go_elsewhere && self.alone.repeats();
         leading.stage = match repeats {
             true => Stage::Ask(side, Lengths::All),
             false => Stage::Object(*objection),

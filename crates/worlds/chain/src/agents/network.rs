@@ -39,37 +39,37 @@ impl Traffic {
 /// A while in which a connector's radio is dead: it sends nothing, hears nothing, and knows it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Silence {
+pub(crate) struct Silence {
     /// Number of the connector in its chain.
-    pub connector: u32,
+    pub(crate) connector: u32,
     /// Number of the chain.
     #[serde(default)]
-    pub chain: EntityId,
+    pub(crate) chain: EntityId,
     /// Start of the silence, in seconds after the start of the run.
     #[serde(default)]
-    pub from_s: f64,
+    pub(crate) from_s: f64,
     /// End of the silence, in seconds after the start of the run; infinite unless given.
     #[serde(default = "for_ever")]
-    pub until_s: f64,
+    pub(crate) until_s: f64,
 }
 
 /// A while in which a link between two neighbors works one way only.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct OneWay {
+pub(crate) struct OneWay {
     /// Number of the connector that is heard by the other.
-    pub sender: u32,
+    pub(crate) sender: u32,
     /// Number of its neighbor, whose messages do not reach it.
-    pub receiver: u32,
+    pub(crate) receiver: u32,
     /// Number of the chain.
     #[serde(default)]
-    pub chain: EntityId,
+    pub(crate) chain: EntityId,
     /// Start of that while, in seconds after the start of the run.
     #[serde(default)]
-    pub from_s: f64,
+    pub(crate) from_s: f64,
     /// End of that while, in seconds after the start of the run; infinite unless given.
     #[serde(default = "for_ever")]
-    pub until_s: f64,
+    pub(crate) until_s: f64,
 }
 
 fn for_ever() -> f64 {
@@ -107,12 +107,7 @@ impl Network {
     }
 
     /// Whether a packet from one connector of a chain gets to another at a time.
-    pub(crate) fn carries(
-        &self,
-        chain: EntityId,
-        [sender, receiver]: [u32; 2],
-        at_s: f64,
-    ) -> bool {
+    pub(crate) fn carries(&self, chain: EntityId, [sender, receiver]: [u32; 2], at_s: f64) -> bool {
         !self.one_ways.iter().any(|one| {
             (one.chain, one.receiver, one.sender) == (chain, sender, receiver)
                 && (one.from_s..one.until_s).contains(&at_s)

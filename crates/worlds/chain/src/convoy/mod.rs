@@ -9,7 +9,6 @@ mod tests;
 
 pub use measures::Measures;
 
-use crate::deploy::Deployment;
 use super::driver::{Driver, Task};
 use super::formation::Robots;
 use super::metrics::Tally;
@@ -23,6 +22,7 @@ use super::swarm::follower::pace;
 use super::swarm::leader::{Layer, LeaderState};
 use super::swarm::{Drive, Follower, Leader, Pose};
 use super::world::{ChainSpec, ChainWorld};
+use crate::deploy::Deployment;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed, Simulation};

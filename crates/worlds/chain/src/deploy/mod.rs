@@ -7,21 +7,22 @@
 //!   refused (`crate::scenario::deployment`).
 //!
 //! A deployment shows the connectors of a chain what they perceive (`sense.rs`), lets their agents
-//! talk over a network in memory (`drive.rs`), and carries their decisions out (`outcome.rs`).
+//! talk over a network in memory (`drive.rs`) or elsewhere (`processes.rs`), and carries their decisions
+//! out (`outcome.rs`).
 
 mod drive;
 mod kind;
 mod outcome;
+mod processes;
 mod sense;
 #[cfg(test)]
 mod tests;
 
-use crate::agents::{ConnectorAgent, Control, Role};
-use crate::rods::obstacle::Obstacles;
-use crate::state::Body;
+use crate::agents::{ConnectorAgent, Control, Sight};
 use crate::world::ChainWorld;
 pub use kind::Deployment;
 pub(crate) use outcome::settled;
+pub use processes::Shown;
 use sidestep_kernel::{Cycle, EntityId};
 
 impl<const D: usize> ChainWorld<D> {
@@ -30,11 +31,8 @@ impl<const D: usize> ChainWorld<D> {
     pub(crate) fn talked(
         &self,
         (chain, now): (EntityId, Cycle),
-        body: &Body<D>,
-        obstacles: &Obstacles<D>,
-        (leader, role): (usize, &Role<D>),
+        sights: Vec<Sight<D>>,
     ) -> Vec<Option<Control<D>>> {
-        let sights = self.sights((chain, now), body, obstacles, (leader, role));
         let mut agents = self.agents_of(chain);
         drive::run(drive::Talk::new(self, chain, now), &mut agents, sights)
     }

@@ -29,8 +29,7 @@ pub(crate) fn settled<const D: usize>(
     }
     let rods = chain.rods().iter().zip(points.windows(2).zip(chain.points().windows(2)));
     // A rod that was out of its limits before, as in a chain that was broken, may stay so.
-    let mut torn = rods.filter(|(rod, (new, old))| {
-        new != old && !fits(**rod, distance(new[0], new[1]))
-    });
+    let mut torn =
+        rods.filter(|(rod, (new, old))| new != old && !fits(**rod, distance(new[0], new[1])));
     torn.next().is_none().then_some(points)
 }

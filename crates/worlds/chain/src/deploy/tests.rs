@@ -1,5 +1,9 @@
 //! A team does what one process does, bit for bit, and nothing at all where it cannot be sure.
 
+mod hostile;
+mod scenarios;
+mod silence;
+
 use super::drive::{Talk, run};
 use super::settled;
 use crate::agents::network::Network;
@@ -70,8 +74,7 @@ fn talked<const D: usize>(
         is_empty,
         is_open: is_empty && chain.is_plain(),
     };
-    let agent =
-        |k: usize| ConnectorAgent::of(chain, k as u32, rules, Rungs::default()).on(network);
+    let agent = |k: usize| ConnectorAgent::of(chain, k as u32, rules, Rungs::default()).on(network);
     let mut agents: Vec<_> = (0..chain.points().len()).map(agent).collect();
     let streams = Streams::new(Seed(seed));
     let talk = Talk { network, streams, chain: 0, first_id: 0, now: 5, at_s: 0.0 };
@@ -91,7 +94,8 @@ fn compared<const D: usize>(seed: u64, network: Option<&Network>, tries: usize) 
         let source = Source::Operator;
         let before = world.chain.clone();
         let obstacles = &world.obstacles;
-        let controls = talked((&before, obstacles, &rules), (k, to, source), network, seed + t as u64);
+        let controls =
+            talked((&before, obstacles, &rules), (k, to, source), network, seed + t as u64);
         let request = Request { motion: Motion::Connector { k, to }, source, mode: Mode::Exact };
         let outcome = propagator.propagate(&mut world.chain, &world.obstacles, &request).unwrap();
         let points = settled(&before, &controls).unwrap_or(before.points().to_vec());
@@ -102,13 +106,28 @@ fn compared<const D: usize>(seed: u64, network: Option<&Network>, tries: usize) 
             Outcome::Vetoed(veto) => Climbed::Vetoed(veto),
         };
         match ended {
-            Some(Ended::Climbed { climbed: told, .. }) => assert_eq!(told, climbed, "seed {seed}, motion {t}"),
+            Some(Ended::Climbed { climbed: told, .. }) => {
+                assert_eq!(told, climbed, "seed {seed}, motion {t}")
+            }
             other => panic!("seed {seed}, motion {t}: {other:?}"),
         }
         moved += usize::from(outcome.moved().is_some_and(|m| m.changed > 1));
         vetoed += usize::from(outcome.veto().is_some());
     }
     (moved, vetoed)
+}
+
+/// The chain of a world after one process has moved it.
+fn compared_on<const D: usize>(
+    world: &mut AnyWorld<D>,
+    rules: &Rules,
+    (k, to): (usize, Point<D>),
+) -> Chain<D> {
+    let motion = Motion::Connector { k, to };
+    let request = Request { motion, source: Source::Operator, mode: Mode::Exact };
+    let moved = Propagator::new(*rules).propagate(&mut world.chain, &world.obstacles, &request);
+    assert!(moved.is_ok_and(|outcome| outcome.moved().is_some()));
+    world.chain.clone()
 }
 
 #[test]

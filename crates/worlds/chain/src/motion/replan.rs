@@ -363,7 +363,9 @@ impl Ladder {
             return self.stuck(climb);
         }
         self.memory.hand_overs += u32::from(begins);
-        let Some(End { by, at, ahead: u }) = climb.by.other_end(k)? else { return self.stuck(climb) };
+        let Some(End { by, at, ahead: u }) = climb.by.other_end(k)? else {
+            return self.stuck(climb);
+        };
         let axes = axes_across(u);
         let step = scaled(u, norm(way));
         let ways = fan(&Memory::default(), D - 1);

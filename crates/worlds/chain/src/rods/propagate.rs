@@ -483,8 +483,8 @@ impl<const D: usize> Scene<'_, D> {
                 return;
             }
             let reason = if was_inside { Reason::Inside } else { Reason::TargetBlocked };
-            let deeper = worst
-                .is_none_or(|(w, name, _)| after_m > w || (after_m == w && block.name < name));
+            let deeper =
+                worst.is_none_or(|(w, name, _)| after_m > w || (after_m == w && block.name < name));
             if deeper {
                 worst = Some((after_m, block.name, reason));
             }

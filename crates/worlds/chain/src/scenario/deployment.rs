@@ -52,7 +52,8 @@ fn not_local_rule(rules: &Rules, escapes: bool) -> Option<NotLocal> {
         return at("chain.backtracks", &reason, "set chain.backtracks = 0");
     }
     if escapes {
-        let reason = "escape: which parts get out of the way first, or all at once, depends on all of them";
+        let reason =
+            "escape: which parts get out of the way first, or all at once, depends on all of them";
         return at("chain.escape", reason, "set chain.escape = \"off\"");
     }
     if rules.slave_step_max_m == f64::INFINITY {
@@ -69,7 +70,8 @@ fn not_local<const D: usize>(s: usize, spec: &ChainSpec<D>) -> Option<NotLocal> 
         let reason = format!("an arm: the target of its tool {passes}");
         return Some((format!("chains.{s}.arm"), reason, "give a chain without a base"));
     }
-    let held = spec.start.connectors().iter().position(|c| c.failed || c.mobility != Mobility::Free);
+    let held =
+        spec.start.connectors().iter().position(|c| c.failed || c.mobility != Mobility::Free);
     if let Some(k) = held {
         let reason = format!("connector {k} is held: a target {passes}");
         return Some((format!("chains.{s}.limits"), reason, "let all connectors move freely"));
@@ -81,7 +83,8 @@ fn not_local<const D: usize>(s: usize, spec: &ChainSpec<D>) -> Option<NotLocal> 
             return Some((key("planner"), reason, "set planner = \"none\""));
         }
         if matches!(task.driver, Driver::External) {
-            let reason = "kind = \"external\": as far as it goes is found by halves, of rods as well".into();
+            let reason =
+                "kind = \"external\": as far as it goes is found by halves, of rods as well".into();
             return Some((key("kind"), reason, "give another kind"));
         }
     }
