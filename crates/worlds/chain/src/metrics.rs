@@ -60,8 +60,12 @@ pub struct Tally {
     pub rungs: RungTally,
     /// Counts of parts that got out of the way.
     pub escapes: EscapeTally,
-    /// Packets between its agents.
-    pub traffic: Traffic,
+    /// Packets between its agents,
+    pub messages: u64,
+    /// their bytes,
+    pub bytes: u64,
+    /// and packets that came and made no sense.
+    pub dropped: u64,
     /// Number of times that a connector was no longer heard,
     pub contacts_lost: u64,
     /// and that time was up before the leader had finished.
@@ -213,6 +217,13 @@ impl Tally {
         self.max_slave_step_m = self.max_slave_step_m.max(moved.max_slave_step_m);
     }
 
+    /// Adds packets of an agent.
+    pub(crate) fn add_traffic(&mut self, traffic: Traffic) {
+        self.messages += traffic.messages;
+        self.bytes += traffic.bytes;
+        self.dropped += traffic.dropped;
+    }
+
     /// Adds a veto.
     pub(crate) fn add_veto(&mut self, reason: Reason) {
         self.vetoes[reason.number()] += 1;
@@ -244,7 +255,9 @@ impl Default for Tally {
             robots: RobotTally::default(),
             rungs: RungTally::default(),
             escapes: EscapeTally::default(),
-            traffic: Traffic::default(),
+            messages: 0,
+            bytes: 0,
+            dropped: 0,
             contacts_lost: 0,
             deadlines_missed: 0,
             stood: 0,
@@ -431,9 +444,9 @@ impl Metrics {
             given_up: given_up.collect(),
             rungs: tallies.iter().fold(RungTally::default(), |all, t| all.add(&t.rungs)),
             escapes: tallies.iter().fold(EscapeTally::default(), |all, t| all.joined(&t.escapes)),
-            messages: sum(|t| t.traffic.messages),
-            bytes: sum(|t| t.traffic.bytes),
-            dropped: sum(|t| t.traffic.dropped),
+            messages: sum(|t| t.messages),
+            bytes: sum(|t| t.bytes),
+            dropped: sum(|t| t.dropped),
             contacts_lost: sum(|t| t.contacts_lost),
             deadlines_missed: sum(|t| t.deadlines_missed),
             stood: sum(|t| t.stood),

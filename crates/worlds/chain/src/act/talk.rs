@@ -69,7 +69,7 @@ impl<const D: usize> Acting<'_, D> {
             self.body.chain.points_mut().copy_from_slice(&points);
         }
         let all = || controls.iter().flatten();
-        all().for_each(|control| self.body.tally.traffic.add(control.traffic));
+        all().for_each(|control| self.body.tally.add_traffic(control.traffic));
         let mut missing = self.body.missing.clone();
         missing.resize(controls.len(), Missing::default());
         all().for_each(|control| missing[control.connector as usize] = control.missing);

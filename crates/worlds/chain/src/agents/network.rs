@@ -22,13 +22,6 @@ pub struct Traffic {
 }
 
 impl Traffic {
-    /// Adds the counts of other traffic.
-    pub fn add(&mut self, other: Self) {
-        self.messages += other.messages;
-        self.bytes += other.bytes;
-        self.dropped += other.dropped;
-    }
-
     /// Counts a packet.
     pub(super) fn count(&mut self, bytes: usize) {
         self.messages += 1;
