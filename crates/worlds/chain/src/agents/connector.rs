@@ -1,7 +1,7 @@
 //! The agent of one connector: its identity, its links, its clock, and the end of its cycle.
 
 use super::climb::Climbing;
-use super::control::{Control, Ended, Goes, Led};
+use super::control::{Ended, Led};
 use super::follow::Following;
 use super::lead::Leading;
 use super::link::Link;
@@ -24,14 +24,15 @@ const MOST_HELD: usize = 64;
 /// The program aboard one connector of a chain.
 ///
 /// Packets and ticks go in, packets come out; [`Self::control`] is there when its cycle is over. It
-/// never panics on what comes from the network.
+/// never panics on what comes from the network. It keeps nothing from one cycle to the next that a
+/// result depends on, so one that was killed may be started anew.
 #[derive(Debug, Clone)]
 pub struct ConnectorAgent<const D: usize> {
     /// Number of its connector in its chain of `n`, and the id of connector 0 on the network.
     pub(super) me: u32,
     pub(super) n: u32,
-    first_id: EntityId,
-    radio: Option<Radio>,
+    pub(super) first_id: EntityId,
+    pub(super) radio: Option<Radio>,
     pub(super) rungs: Rungs,
     /// The rods to its neighbors.
     pub(super) rods: Both<Option<Rod>>,
@@ -39,12 +40,12 @@ pub struct ConnectorAgent<const D: usize> {
     /// What its sensors see in this cycle.
     pub(super) obstacles: Obstacles<D>,
     /// The cycle; none before the first.
-    cycle: Option<Cycle>,
-    began: u64,
-    now: u64,
+    pub(super) cycle: Option<Cycle>,
+    pub(super) began: u64,
+    pub(super) now: u64,
     pub(super) place: Track<D>,
     pub(super) beside: Both<Option<Track<D>>>,
-    links: Both<Option<Link<Message<D>>>>,
+    pub(super) links: Both<Option<Link<Message<D>>>>,
     pub(super) missing: Both<Option<u32>>,
     /// Packets of cycles that have not begun here yet.
     held: Vec<(Side, Packet<D>)>,
@@ -55,20 +56,20 @@ pub struct ConnectorAgent<const D: usize> {
     pub(super) goes_in: Option<u32>,
     pub(super) led: Option<Led>,
     pub(super) ended: Option<Ended<D>>,
-    is_silent: bool,
+    pub(super) is_silent: bool,
     /// Whether the leader has finished, and whether time is up.
-    is_over: bool,
-    is_closed: bool,
-    is_late: bool,
-    traffic: Traffic,
+    pub(super) is_over: bool,
+    pub(super) is_closed: bool,
+    pub(super) is_late: bool,
+    pub(super) traffic: Traffic,
 }
 
 /// The time that it waits for others, where messages may get lost.
 #[derive(Debug, Clone, Copy)]
-struct Radio {
+pub(super) struct Radio {
     patience: Patience,
     /// Number of ticks after which the talk of a cycle ends.
-    ticks: u64,
+    pub(super) ticks: u64,
 }
 
 /// A packet on its way out.
@@ -84,7 +85,7 @@ pub struct Outgoing {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Track<const D: usize> {
     /// The place outside of motions,
-    settled: Point<D>,
+    pub(super) settled: Point<D>,
     /// after the sub-steps that are accepted,
     pub(super) base: Point<D>,
     /// and after the present one.
@@ -313,7 +314,7 @@ impl<const D: usize> ConnectorAgent<D> {
         }
     }
 
-    fn nearest_missing(&self) -> Option<u32> {
+    pub(super) fn nearest_missing(&self) -> Option<u32> {
         let both = Side::ALL.into_iter().filter_map(|side| self.missing[side]);
         both.min_by_key(|k| k.abs_diff(self.me))
     }
@@ -337,94 +338,5 @@ impl<const D: usize> ConnectorAgent<D> {
     /// Does what can be done before the next message.
     pub(super) fn run(&mut self) {
         while self.go_on_leading() || self.climb_on() {}
-    }
-
-    /// Looks at the clock: sends again what was not confirmed, and gives up who never confirms.
-    pub fn on_timer(&mut self, tick: u64) {
-        self.now = self.now.max(tick);
-        for side in Side::ALL {
-            let link = self.links[side].as_mut().filter(|_| !self.is_silent);
-            if link.is_some_and(|link| link.on_timer(tick)) {
-                self.misses(side, side.of(self.me, self.n));
-            }
-        }
-        if !self.is_done() && self.deadline().is_some_and(|deadline| deadline <= tick) {
-            self.close();
-        }
-        self.run();
-    }
-
-    /// Ends the cycle because time is up. Who has not been heard at all is lost.
-    fn close(&mut self) {
-        for side in Side::ALL {
-            if self.links[side].as_ref().is_some_and(|link| !link.is_heard()) {
-                self.misses(side, side.of(self.me, self.n));
-            }
-        }
-        self.give_up_leading();
-        self.climbing = None;
-        self.is_late = !self.is_over && self.nearest_missing().is_none();
-        self.is_closed = true;
-    }
-
-    /// Returns the next tick in which it has to look at the clock, if there is one.
-    pub fn next_timer(&self) -> Option<u64> {
-        if self.is_done() {
-            return None;
-        }
-        let links = Side::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
-        links.filter_map(Link::due).chain(self.deadline()).min()
-    }
-
-    /// Returns the tick in which its cycle ends in any case; none where messages never get lost.
-    pub fn deadline(&self) -> Option<u64> {
-        self.radio.map(|radio| self.began.saturating_add(radio.ticks))
-    }
-
-    /// Returns the packets that it sends now.
-    pub fn take_packets(&mut self) -> Vec<Outgoing> {
-        let (Some(cycle), false) = (self.cycle, self.is_silent) else { return Vec::new() };
-        let mut out = Vec::new();
-        for side in Side::ALL {
-            let Some(neighbor) = side.of(self.me, self.n) else { continue };
-            let missing = self.missing[side.other()];
-            let Some(parcel) = self.links[side].as_mut().and_then(|link| link.parcel(self.now))
-            else {
-                continue;
-            };
-            let payload = Packet { cycle, missing, parcel }.bytes();
-            self.traffic.count(payload.len());
-            out.push(Outgoing { to: self.first_id + neighbor, payload });
-        }
-        out
-    }
-
-    /// Whether its cycle is over. It goes on answering questions.
-    pub fn is_done(&self) -> bool {
-        let mut links = Side::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
-        self.is_closed || self.is_over && links.all(Link::is_quiet)
-    }
-
-    /// Returns what its connector does in this cycle; none before the cycle is over.
-    pub fn control(&self) -> Option<Control<D>> {
-        let cycle = self.cycle.filter(|_| self.is_done())?;
-        let doubt = self.following.as_ref().filter(|following| following.has_consented);
-        let goes = match (self.goes_in, doubt) {
-            (Some(request), _) => Goes::To { request, to: self.place.settled },
-            (None, Some(following)) => {
-                Goes::WithItsMaster { request: following.request, to: self.place.now }
-            }
-            (None, None) => Goes::Stays,
-        };
-        Some(Control {
-            connector: self.me,
-            cycle,
-            goes,
-            led: self.led,
-            ended: self.ended.clone(),
-            missing: Side::ALL.map(|side| self.missing[side]),
-            is_late: self.is_late,
-            traffic: self.traffic,
-        })
     }
 }

@@ -3,10 +3,12 @@
 use super::Side;
 use super::connector::ConnectorAgent;
 use super::message::{Consent, Message, Objection, Prepare};
+use crate::rods::chain::Rod;
 use crate::rods::geometry::distance;
 use crate::rods::propagate::alone::{Alone, Pull, Reaction};
 use crate::rods::scene::Refusal;
 use crate::rods::veto::Reason;
+use crate::rods::wire::Place;
 
 /// A motion in which a connector is a slave.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,22 +42,36 @@ impl<const D: usize> ConnectorAgent<D> {
         if let Some(master) = &mut self.beside[from] {
             (master.base, master.now) = (prepare.mo, prepare.mn);
         }
-        let reaction = self.reaction(from, prepare);
-        let Ok(Reaction { at, ends, rotated, has_others, has_turned }) = reaction else {
-            self.place.take_back();
-            self.following = before.map(|f| Following { has_consented: false, ..f });
-            return self.object(from, reaction.unwrap_err(), Alone::<D>::may_go_elsewhere(rod));
-        };
+        match self.reaction((from, rod), prepare) {
+            Ok(reaction) => {
+                self.follow(from, prepare, &reaction, before.is_some_and(|f| f.has_asked));
+            }
+            Err(refusal) => {
+                self.place.take_back();
+                self.following = before.map(|f| Following { has_consented: false, ..f });
+                self.object(from, refusal, Alone::<D>::may_go_elsewhere(rod));
+            }
+        }
+    }
+
+    /// Goes where its reaction takes it, and asks the next connector if that one has to react. It
+    /// may have asked that one in an earlier sub-step.
+    fn follow(
+        &mut self,
+        from: Side,
+        prepare: &Prepare<D>,
+        reaction: &Reaction<D>,
+        had_asked: bool,
+    ) {
+        let Reaction { at, ends, rotated, has_others, has_turned } = *reaction;
         self.place.now = at;
         let onward = from.other();
         let asks = !ends && self.rods[onward].is_some();
-        let has_asked = before.is_some_and(|f| f.has_asked) || asks;
-        let (request, sub_step) = (prepare.request, prepare.sub_step);
         self.following = Some(Following {
-            request,
-            sub_step,
+            request: prepare.request,
+            sub_step: prepare.sub_step,
             master: from,
-            has_asked,
+            has_asked: had_asked || asks,
             waits: asks,
             has_consented: !asks,
             rotated,
@@ -63,8 +79,7 @@ impl<const D: usize> ConnectorAgent<D> {
             has_turned,
         });
         if asks {
-            let prev = Some(crate::rods::wire::Place(prepare.mn));
-            let (mo, mn) = (self.place.base, at);
+            let (mo, mn, prev) = (self.place.base, at, Some(Place(prepare.mn)));
             let max_bend_rad = self.alone.max_bend_rad();
             self.say(onward, Message::Prepare(Prepare { mo, mn, prev, max_bend_rad, ..*prepare }));
         } else {
@@ -74,8 +89,11 @@ impl<const D: usize> ConnectorAgent<D> {
         }
     }
 
-    fn reaction(&mut self, from: Side, prepare: &Prepare<D>) -> Result<Reaction<D>, Refusal> {
-        let rod = self.rods[from].expect("a master is at the end of a rod");
+    fn reaction(
+        &mut self,
+        (from, rod): (Side, Rod),
+        prepare: &Prepare<D>,
+    ) -> Result<Reaction<D>, Refusal> {
         let onward = from.other();
         let next = self.beside[onward].map(|track| track.base).zip(self.rods[onward]);
         let pull = Pull {

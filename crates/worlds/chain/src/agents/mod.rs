@@ -9,6 +9,7 @@
 //! connector.rs             the agent: one connector, its links, and the part it plays
 //!   follow.rs, lead.rs     as a slave of a master; as the initiator of one motion
 //!   climb.rs               as a leader, by the ladder of `motion::replan`
+//!   clock.rs               time, packets on their way out, and the end of a cycle
 //! link.rs                  makes messages between two neighbors arrive, once and in order
 //! message.rs               the messages, and the checks of what comes over the network
 //! network.rs               a network's faults, and the traffic on it
@@ -21,6 +22,7 @@
 //! the rod. So a vetoed motion leaves every connector where it was, whatever is lost.
 
 mod climb;
+mod clock;
 mod connector;
 mod control;
 mod follow;

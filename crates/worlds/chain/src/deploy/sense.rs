@@ -1,5 +1,6 @@
 //! Perception of the connectors of a chain at the start of their talk.
 
+use crate::agents::network::Network;
 use crate::agents::{Role, Seen, Side, Sight};
 use crate::driver::Task;
 use crate::rods::obstacle::{Obstacles, around};
