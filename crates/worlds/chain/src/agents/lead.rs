@@ -50,9 +50,9 @@ enum Lengths {
 impl<const D: usize> ConnectorAgent<D> {
     /// Begins to lead a motion.
     pub(super) fn lead(&mut self, order: Order<D>, orderer: Option<Side>) {
-        let from = self.place.base;
         self.begin_motion();
         self.following = None;
+        let from = self.place.base;
         let Ok(n) = self.alone.sub_steps(from, order.to, order.is_empty) else {
             return self.is_answered(orderer, None);
         };

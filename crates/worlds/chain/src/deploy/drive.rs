@@ -108,7 +108,7 @@ pub(super) fn run<const D: usize>(
         interrupt::look();
         let timers = agents.iter().filter_map(ConnectorAgent::next_timer);
         let next = timers.chain(air.memory.next_arrival()).min();
-        tick = next.expect("agents that are not done wait for something");
+        tick = tick.max(next.expect("agents that are not done wait for something"));
         agents.iter_mut().enumerate().for_each(|(k, agent)| air.step(k, agent, tick));
     }
     agents.iter().map(ConnectorAgent::control).collect()

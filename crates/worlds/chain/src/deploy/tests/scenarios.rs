@@ -180,7 +180,8 @@ fn a_chain_stands_in_a_cycle_in_which_a_decision_does_not_come() {
 
 #[test]
 fn what_no_connector_of_a_team_sees_is_refused_with_the_key_and_the_reason() {
-    let chain = "[[chains]]\nconnectors = 4\nrod_m = 1.0\n[[chains.tasks]]\nkind = \"rest\"\nlasts_s = 1\n";
+    let chain =
+        "[[chains]]\nconnectors = 4\nrod_m = 1.0\n[[chains.tasks]]\nkind = \"rest\"\nlasts_s = 1\n";
     let limits = |limit: &str| format!("{chain}[[chains.limits]]\nconnector = 3\n{limit}\n");
     let change = |what: &str| format!("{chain}[[chains.changes]]\nat_s = 1\n{what}\n");
     let task = |what: &str| format!("{chain}[[chains.tasks]]\n{what}\n");
@@ -207,7 +208,8 @@ fn what_no_connector_of_a_team_sees_is_refused_with_the_key_and_the_reason() {
 
 #[test]
 fn a_network_needs_connectors_that_exist_and_times_that_fit() {
-    let chain = "[[chains]]\nconnectors = 4\nrod_m = 1.0\n[[chains.tasks]]\nkind = \"rest\"\nlasts_s = 1\n";
+    let chain =
+        "[[chains]]\nconnectors = 4\nrod_m = 1.0\n[[chains.tasks]]\nkind = \"rest\"\nlasts_s = 1\n";
     let wrong = [
         ("loss = 1.5", "give 0 or more and less than 1"),
         ("latency_s = 0.01", "at most an eighth of the deadline"),
