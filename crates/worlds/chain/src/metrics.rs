@@ -1,6 +1,6 @@
 //! Metrics of a run.
 
-use super::agents::Traffic;
+use super::agents::network::Traffic;
 use super::motion::escape::Escaped;
 use super::motion::replan::Climbed;
 use super::rods::veto::{Moved, Reason};

@@ -13,7 +13,7 @@ mod recipe;
 mod starts;
 mod tasks;
 
-use super::deploy::Deployment;
+use super::deploy::kind::Deployment;
 use super::ground::{Movers, Site};
 use super::motion::escape::{Escape, Method};
 use super::motion::replan::Rungs;

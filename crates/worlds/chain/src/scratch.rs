@@ -1,6 +1,6 @@
 //! A worker's buffers, kept between tasks, and the obstacles at a given moment.
 
-use super::deploy::Shown;
+use super::agents::sight::Shown;
 use super::events::Event;
 use super::formation::Solid;
 use super::motion::escape::Escaper;
@@ -43,7 +43,7 @@ pub struct Scratch<const D: usize> {
     pub(crate) events: Vec<Event>,
     /// Notes for somebody who asks about a chain; none in a run.
     pub(crate) notes: Option<Box<Notes<D>>>,
-    /// What connectors perceive, for somebody who asks; none in a run.
+    /// Perceptions of connectors, for somebody who asks; none in a run.
     pub(crate) shown: Option<Vec<Shown<D>>>,
 }
 

@@ -1,6 +1,6 @@
 //! The changing state of a run, and its snapshot.
 
-use super::agents::Control;
+use super::agents::control::Control;
 use super::driver::external::External;
 use super::driver::{Driving, Task};
 use super::formation::{Robot, Solid};
@@ -126,7 +126,7 @@ pub struct Snapshot {
     pub(crate) ways_out: Vec<(u32, WayOut)>,
     /// Orders from outside and answers, of chains that have any, by id.
     pub(crate) externals: Vec<(u32, External)>,
-    /// Who is lost, as connectors know, of chains in which somebody is, by id.
+    /// Lost connectors, as those of their chain know, of chains in which somebody is lost; by id.
     pub(crate) missing: Vec<(u32, Vec<Missing>)>,
 }
 

@@ -1,6 +1,6 @@
 //! Texts for people: a scenario's contents, a run's outcome, and all positions.
 
-use super::deploy::Deployment;
+use super::deploy::kind::Deployment;
 use super::metrics::{ChainGivenUp, Metrics, RobotMetrics};
 use super::scenario::Compiled;
 use super::state::Snapshot;

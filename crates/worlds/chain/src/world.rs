@@ -2,7 +2,7 @@
 
 use super::agents::network::Network;
 use super::arms::arm::Arm;
-use super::deploy::Deployment;
+use super::deploy::kind::Deployment;
 use super::driver::{Driver, Driving, Task};
 use super::formation::{Robot, Robots};
 use super::ground::Movers;

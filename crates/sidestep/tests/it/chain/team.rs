@@ -4,7 +4,7 @@
 use super::*;
 use std::path::Path;
 
-/// What makes a team possible, and what the reference needs to have in common with it.
+/// Settings that make a team possible, and that the reference needs to have in common with it.
 const LOCAL: [&str; 3] =
     ["chain.self_collision=false", "chain.backtracks=0", "chain.escape=\"off\""];
 

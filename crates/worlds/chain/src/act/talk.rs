@@ -2,8 +2,10 @@
 //! talk, and who is no longer heard.
 
 use super::Acting;
-use crate::agents::{Ended, Role, Side, Wish};
-use crate::deploy::{Deployment, settled};
+use crate::agents::side::Side;
+use crate::agents::{Ended, Role, Wish};
+use crate::deploy::kind::Deployment;
+use crate::deploy::settled;
 use crate::driver::Task;
 use crate::events::EventKind;
 use crate::motion::replan::Climbed;

@@ -1,14 +1,16 @@
 //! The agent of one connector: its identity, its links, its clock, and the end of its cycle.
 
-use super::climb::Climbing;
+mod climb;
+mod clock;
+mod follow;
+mod lead;
+
 use super::control::{Ended, Led};
-use super::follow::Following;
-use super::lead::Leading;
 use super::link::Link;
 use super::message::{Message, Packet};
 use super::network::{Patience, Traffic};
+use super::side::{Both, Side};
 use super::sight::{Role, Sight};
-use super::{Both, Side};
 use crate::motion::replan::Rungs;
 use crate::rods::chain::{Chain, Rod};
 use crate::rods::geometry::Point;
@@ -16,6 +18,9 @@ use crate::rods::obstacle::Obstacles;
 use crate::rods::propagate::alone::Alone;
 use crate::rods::rules::Rules;
 use crate::world::ChainWorld;
+use climb::Climbing;
+use follow::Following;
+use lead::Leading;
 use sidestep_kernel::{Cycle, EntityId, InputError};
 
 /// Most packets that wait for the beginning of their cycle.
@@ -29,47 +34,47 @@ const MOST_HELD: usize = 64;
 #[derive(Debug, Clone)]
 pub struct ConnectorAgent<const D: usize> {
     /// Number of its connector in its chain of `n`, and the id of connector 0 on the network.
-    pub(super) me: u32,
-    pub(super) n: u32,
-    pub(super) first_id: EntityId,
-    pub(super) radio: Option<Radio>,
-    pub(super) rungs: Rungs,
+    me: u32,
+    n: u32,
+    first_id: EntityId,
+    radio: Option<Radio>,
+    rungs: Rungs,
     /// The rods to its neighbors.
-    pub(super) rods: Both<Option<Rod>>,
-    pub(super) alone: Alone<D>,
-    /// What its sensors see in this cycle.
-    pub(super) obstacles: Obstacles<D>,
+    rods: Both<Option<Rod>>,
+    alone: Alone<D>,
+    /// Obstacles that its sensors see in this cycle.
+    obstacles: Obstacles<D>,
     /// The cycle; none before the first.
-    pub(super) cycle: Option<Cycle>,
-    pub(super) began: u64,
-    pub(super) now: u64,
-    pub(super) place: Track<D>,
-    pub(super) beside: Both<Option<Track<D>>>,
-    pub(super) links: Both<Option<Link<Message<D>>>>,
-    pub(super) missing: Both<Option<u32>>,
+    cycle: Option<Cycle>,
+    began: u64,
+    now: u64,
+    place: Track<D>,
+    beside: Both<Option<Track<D>>>,
+    links: Both<Option<Link<Message<D>>>>,
+    missing: Both<Option<u32>>,
     /// Packets of cycles that have not begun here yet.
     held: Vec<(Side, Packet<D>)>,
-    pub(super) following: Option<Following>,
-    pub(super) leading: Option<Leading<D>>,
-    pub(super) climbing: Option<Climbing<D>>,
+    following: Option<Following>,
+    leading: Option<Leading<D>>,
+    climbing: Option<Climbing<D>>,
     /// Number of the motion that it makes in this cycle.
-    pub(super) goes_in: Option<u32>,
-    pub(super) led: Option<Led>,
-    pub(super) ended: Option<Ended<D>>,
-    pub(super) is_silent: bool,
+    goes_in: Option<u32>,
+    led: Option<Led>,
+    ended: Option<Ended<D>>,
+    is_silent: bool,
     /// Whether the leader has finished, and whether time is up.
-    pub(super) is_over: bool,
-    pub(super) is_closed: bool,
-    pub(super) is_late: bool,
-    pub(super) traffic: Traffic,
+    is_over: bool,
+    is_closed: bool,
+    is_late: bool,
+    traffic: Traffic,
 }
 
 /// The time that it waits for others, where messages may get lost.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Radio {
+struct Radio {
     patience: Patience,
     /// Number of ticks after which the talk of a cycle ends.
-    pub(super) ticks: u64,
+    ticks: u64,
 }
 
 /// A packet on its way out.
@@ -83,13 +88,13 @@ pub struct Outgoing {
 
 /// A place while a motion is prepared.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Track<const D: usize> {
+struct Track<const D: usize> {
     /// The place outside of motions,
-    pub(super) settled: Point<D>,
+    settled: Point<D>,
     /// after the sub-steps that are accepted,
-    pub(super) base: Point<D>,
+    base: Point<D>,
     /// and after the present one.
-    pub(super) now: Point<D>,
+    now: Point<D>,
 }
 
 impl<const D: usize> Track<D> {
@@ -98,22 +103,22 @@ impl<const D: usize> Track<D> {
     }
 
     /// Begins another motion.
-    pub(super) fn begin(&mut self) {
+    fn begin(&mut self) {
         *self = Self::at(self.settled);
     }
 
     /// Accepts the present sub-step.
-    pub(super) fn accept(&mut self) {
+    fn accept(&mut self) {
         self.base = self.now;
     }
 
     /// Takes the present sub-step back.
-    pub(super) fn take_back(&mut self) {
+    fn take_back(&mut self) {
         self.now = self.base;
     }
 
     /// Ends the motion.
-    pub(super) fn settle(&mut self, goes: bool) {
+    fn settle(&mut self, goes: bool) {
         *self = Self::at(if goes { self.now } else { self.settled });
     }
 }
@@ -299,7 +304,7 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Notes who is lost on one side, and tells the other side if that is news. A leader stops.
-    pub(super) fn misses(&mut self, side: Side, missing: Option<u32>) {
+    fn misses(&mut self, side: Side, missing: Option<u32>) {
         if self.missing[side] == missing {
             return;
         }
@@ -314,20 +319,20 @@ impl<const D: usize> ConnectorAgent<D> {
         }
     }
 
-    pub(super) fn nearest_missing(&self) -> Option<u32> {
+    fn nearest_missing(&self) -> Option<u32> {
         let both = Side::ALL.into_iter().filter_map(|side| self.missing[side]);
         both.min_by_key(|k| k.abs_diff(self.me))
     }
 
     /// Says something to a neighbor, if there is one.
-    pub(super) fn say(&mut self, to: Side, message: Message<D>) {
+    fn say(&mut self, to: Side, message: Message<D>) {
         if let Some(link) = &mut self.links[to] {
             link.say(message);
         }
     }
 
     /// Ends the cycle, as the leader does or says.
-    pub(super) fn finish(&mut self, from: Option<Side>) {
+    fn finish(&mut self, from: Option<Side>) {
         self.give_up_leading();
         self.is_over = true;
         for side in Side::ALL.into_iter().filter(|side| Some(*side) != from) {
@@ -336,7 +341,7 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Does what can be done before the next message.
-    pub(super) fn run(&mut self) {
+    fn run(&mut self) {
         while self.go_on_leading() || self.climb_on() {}
     }
 }

@@ -7,7 +7,7 @@ use crate::rods::veto::Veto;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::Cycle;
 
-/// What a connector does in a cycle, and what came of its talk.
+/// A connector's motion in a cycle, and the outcome of its talk.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Control<const D: usize> {
     /// The connector's number in its chain.

@@ -7,7 +7,7 @@ use crate::rods::obstacle::Obstacle;
 use crate::rods::veto::Source;
 use crate::rods::wire::Place;
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::{Cycle, InputError};
+use sidestep_kernel::{Cycle, EntityId, InputError};
 use std::f64::consts::PI;
 
 /// A connector's perception at the start of a cycle.
@@ -31,6 +31,9 @@ pub struct Sight<const D: usize> {
     pub role: Role<D>,
 }
 
+/// Perception of the connectors of a chain, by connector.
+pub type Shown<const D: usize> = (EntityId, Vec<Sight<D>>);
+
 /// The part of a connector in a cycle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Role<const D: usize> {
@@ -45,9 +48,9 @@ pub enum Role<const D: usize> {
 /// A leader's wish in a cycle: on its own account, or on the order of a planner or an operator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Wish<const D: usize> {
-    /// Where it wants to be at the end of the cycle, meters.
+    /// Its target: where it wants to be at the end of the cycle, meters.
     pub to: Place<D>,
-    /// Where the wish comes from.
+    /// The source of the wish.
     pub source: Source,
     /// Its knowledge beside its neighborhood.
     pub situation: Situation,

@@ -22,7 +22,7 @@ use super::swarm::follower::pace;
 use super::swarm::leader::{Layer, LeaderState};
 use super::swarm::{Drive, Follower, Leader, Pose};
 use super::world::{ChainSpec, ChainWorld};
-use crate::deploy::Deployment;
+use crate::deploy::kind::Deployment;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed, Simulation};

@@ -7,13 +7,12 @@
 //!   refused (`crate::scenario::deployment`).
 //!
 //! A deployment shows the connectors of a chain what they perceive (`sense.rs`), lets their agents
-//! talk over a network in memory (`drive.rs`) or elsewhere (`processes.rs`), and carries their decisions
+//! talk over a network in memory (`drive.rs`) or elsewhere (`elsewhere.rs` of the world), and carries their decisions
 //! out (`outcome.rs`).
 
 mod drive;
-mod kind;
+pub(crate) mod kind;
 mod outcome;
-mod processes;
 mod sense;
 #[cfg(test)]
 mod tests;
@@ -22,7 +21,6 @@ use crate::agents::{ConnectorAgent, Control, Sight};
 use crate::world::ChainWorld;
 pub use kind::Deployment;
 pub(crate) use outcome::settled;
-pub use processes::Shown;
 use sidestep_kernel::{Cycle, EntityId};
 
 impl<const D: usize> ChainWorld<D> {

@@ -1,4 +1,4 @@
-//! What comes of the decisions of a chain's connectors.
+//! The outcome of the decisions of a chain's connectors.
 
 use crate::agents::{Control, Goes, Led};
 use crate::rods::chain::{Chain, is_in_range};

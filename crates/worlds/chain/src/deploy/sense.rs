@@ -1,7 +1,8 @@
 //! Perception of the connectors of a chain at the start of their talk.
 
 use crate::agents::network::Network;
-use crate::agents::{Role, Seen, Side, Sight};
+use crate::agents::side::Side;
+use crate::agents::{Role, Seen, Sight};
 use crate::driver::Task;
 use crate::rods::obstacle::{Obstacles, around};
 use crate::rods::wire::Place;

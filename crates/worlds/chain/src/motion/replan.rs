@@ -125,7 +125,7 @@ pub struct Ladder {
 
 /// The chain, as its initiator moves it: all of it at once, or by asking its neighbors.
 pub(crate) trait Moves<const D: usize> {
-    /// Why a request has no outcome.
+    /// Reason for which a request has no outcome.
     type Failure;
 
     /// Returns the place of a connector that leads.

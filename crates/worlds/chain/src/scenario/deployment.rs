@@ -1,7 +1,7 @@
 //! Scenarios whose chains agents can move that know nothing but their neighbors and what they see.
 
 use super::{ChainSpec, Compiler};
-use crate::deploy::Deployment;
+use crate::deploy::kind::Deployment;
 use crate::driver::Driver;
 use crate::rods::chain::Mobility;
 use crate::rods::rules::Rules;

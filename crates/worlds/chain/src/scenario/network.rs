@@ -2,7 +2,7 @@
 
 use super::{ChainSpec, Compiler};
 use crate::agents::network::{Network, OneWay, Silence};
-use crate::deploy::Deployment;
+use crate::deploy::kind::Deployment;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -10,7 +10,7 @@ use sidestep_kernel::{EntityId, InputError};
 use sidestep_scenario::{FromBelow, NonNegative, Number, Positive, Rule, Spanned};
 use std::ops::Range;
 
-/// What a packet takes, unless it is given, s: a bus along the chain.
+/// Time that a packet takes, unless it is given, s: that of a bus along the chain.
 const LATENCY_S: f64 = 1e-5;
 /// Share of a cycle in which its talk ends, unless it is given.
 const DEADLINE: f64 = 0.9;

@@ -7,7 +7,7 @@ use serde_json::Value;
 use sidestep_kernel::{Digest, Simulation};
 use sidestep_scenario::Source;
 
-/// What is the same in all scenarios here.
+/// The part that is the same in all scenarios here.
 fn text(deployment: &str, more: &str) -> String {
     format!(
         "format = 1\nworld = \"chain\"\nseed = 3\n[chain]\ndt_s = 0.05\nself_collision = false\n\

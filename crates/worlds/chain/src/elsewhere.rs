@@ -5,20 +5,17 @@
 //! that until nobody is shown anything more: chains that may meet move one after the other. Then it
 //! advances the run by a cycle. A chain for which nothing was handed over talks in memory.
 
-use crate::agents::{Control, Ended, Sight};
-use crate::motion::replan::Climbed;
-use crate::perceive::Looking;
-use crate::rods::veto::Veto;
-use crate::scratch::Scratch;
-use crate::state::ChainState;
-use crate::world::ChainWorld;
-use crate::{act, claim, join};
+use super::agents::{Control, Ended, Shown};
+use super::motion::replan::Climbed;
+use super::perceive::Looking;
+use super::rods::veto::Veto;
+use super::scratch::Scratch;
+use super::state::ChainState;
+use super::world::ChainWorld;
+use super::{act, claim, join};
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::ports::ManualClock;
 use sidestep_kernel::{Cycle, EntityId, InputError, Slot, Turn};
-
-/// What the connectors of a chain perceive, by connector.
-pub type Shown<const D: usize> = (EntityId, Vec<Sight<D>>);
 
 impl<const D: usize> ChainWorld<D> {
     /// Returns what the connectors of chains perceive in the cycle to come, `now`: of those chains whose

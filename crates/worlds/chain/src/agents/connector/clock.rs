@@ -1,10 +1,10 @@
 //! The clock of an agent, its packets on their way out, and the end of its cycle.
 
-use super::Side;
-use super::connector::{ConnectorAgent, Outgoing};
-use super::control::{Control, Goes};
-use super::link::Link;
-use super::message::Packet;
+use super::{ConnectorAgent, Outgoing};
+use crate::agents::control::{Control, Goes};
+use crate::agents::link::Link;
+use crate::agents::message::Packet;
+use crate::agents::side::Side;
 
 impl<const D: usize> ConnectorAgent<D> {
     /// Looks at the clock: sends again what was not confirmed, and gives up who never confirms.

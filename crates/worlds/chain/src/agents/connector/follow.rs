@@ -1,8 +1,8 @@
 //! A connector as a slave: it reacts to its master, and is the master of the next one.
 
-use super::Side;
-use super::connector::ConnectorAgent;
-use super::message::{Consent, Message, Objection, Prepare};
+use super::ConnectorAgent;
+use crate::agents::message::{Consent, Message, Objection, Prepare};
+use crate::agents::side::Side;
 use crate::rods::chain::Rod;
 use crate::rods::geometry::distance;
 use crate::rods::propagate::alone::{Alone, Pull, Reaction};

@@ -5,11 +5,11 @@
 //! the climb starts again with every answer, takes the answers that are there already, and stops
 //! where the next one is wanting. It is short, and the same code leads a chain that is moved at once.
 
-use super::Side;
-use super::connector::ConnectorAgent;
-use super::control::Ended;
-use super::message::{Message, Order};
-use super::sight::Wish;
+use super::ConnectorAgent;
+use crate::agents::control::Ended;
+use crate::agents::message::{Message, Order};
+use crate::agents::side::Side;
+use crate::agents::sight::Wish;
 use crate::motion::replan::{Climbed, End, Ladder, Moves, farther_end};
 use crate::rods::geometry::{Point, sub, unit};
 use crate::rods::veto::{Mode, Motion, Outcome, Reason, Request, Veto};
@@ -48,7 +48,7 @@ enum Question<const D: usize> {
     End,
 }
 
-/// Why a climb does not go on.
+/// Reason for which a climb does not go on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Halt<const D: usize> {
     Asks(Question<D>),

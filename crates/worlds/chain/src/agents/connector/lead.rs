@@ -1,10 +1,10 @@
 //! A connector as the initiator of one motion: sub-step after sub-step it asks both sides, and then
 //! says whether the motion is carried out.
 
-use super::connector::ConnectorAgent;
-use super::control::Led;
-use super::message::{Consent, Message, Objection, Order, Prepare};
-use super::{Both, Side};
+use super::ConnectorAgent;
+use crate::agents::control::Led;
+use crate::agents::message::{Consent, Message, Objection, Order, Prepare};
+use crate::agents::side::{Both, Side};
 use crate::rods::geometry::{Point, between};
 use crate::rods::scene::Refusal;
 use crate::rods::veto::{Moved, Outcome, Veto};
@@ -25,7 +25,7 @@ pub(super) struct Leading<const D: usize> {
     moved: Moved<D>,
 }
 
-/// What is next in a motion.
+/// The next thing to do in a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stage {
     /// The next sub-step, if there is one.
