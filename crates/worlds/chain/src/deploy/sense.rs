@@ -39,8 +39,7 @@ impl<const D: usize> ChainWorld<D> {
             let half_m = sees_m + connector.radius_m;
             obstacles.visit(&around(at, half_m), |obstacle| seen.push(Seen::of(obstacle)));
             let neighbor = |side: Side| side.of(k, n).map(|j| Place(points[j as usize]));
-            let is_silent =
-                |network: &crate::agents::network::Network| network.is_silent(chain, k, at_s);
+            let is_silent = |network: &Network| network.is_silent(chain, k, at_s);
             Sight {
                 cycle: now,
                 at: Place(at),
