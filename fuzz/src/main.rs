@@ -19,11 +19,14 @@ use sidestep::worlds::airspace::agents::contact::Contacts;
 use sidestep::worlds::airspace::agents::packet::{Draft, open};
 use sidestep::worlds::airspace::pilot::{Fleet, Packet, Pilot, Sight};
 use sidestep::worlds::airspace::{AirspaceWorld, airspace_run};
+use sidestep::worlds::chain::ChainState;
+use sidestep::worlds::chain::agents::ConnectorAgent;
+use sidestep::worlds::chain::scenario::Compiled;
 use sidestep_record::sweep::read_journal;
 use sidestep_record::{McapRun, RunView, read_table};
 use sidestep_server::protocol::Edit;
-use std::fs;
 use std::collections::VecDeque;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 
@@ -35,6 +38,7 @@ const TARGETS: [Target; 30] = [
     ("override", |data| text(data, overridden)),
     ("edit", |data| text(data, edited)),
     ("script", |data| text(data, script)),
+    ("chain_packets", chain_packets),
     ("sweep", |data| text(data, |t| drop(Sweep::parse(&Source::new("f", t, ""))))),
     ("ascii_map", |data| text(data, |t| drop(ascii::parse("f", t, 0.25)))),
     ("movingai_map", |data| text(data, |t| drop(movingai::parse_map("f", t, 0.25)))),
@@ -127,6 +131,34 @@ fn script(script: &str) {
     let script = serde_json::Value::from(script).to_string();
     // JSON and TOML write strings alike, but for the escape of a slash and of what is above 16 bits.
     scenario(&format!("{chain}script = {script}\n"));
+}
+
+/// Hands packets to the agent of a connector in the middle of a chain: each begins with its sender and its
+/// length. Whatever they are, the agent comes to a decision once time is up.
+fn chain_packets(mut data: &[u8]) {
+    static TEAM: LazyLock<Compiled<2>> = LazyLock::new(|| {
+        let text = "format = 1\nworld = \"chain\"\n[chain]\nself_collision = false\nbacktracks = 0\n\
+                    deployment = \"team\"\nnetwork = { loss = 0.1 }\n[[obstacles]]\nat_m = [0.5, 0.3]\n\
+                    radius_m = 0.2\n[[chains]]\nconnectors = 5\nrod_m = [0.4, 0.5]\n[[chains.tasks]]\n\
+                    kind = \"wander\"\nconnector = 2\n";
+        Compiled::new(&Source::new("f", text, "")).expect("our own team")
+    });
+    let world = &*TEAM.world;
+    let state = ChainState::new(world).expect("a team at its start");
+    let (chain, mut sights) = world.sights_at(&state, 0).remove(0);
+    let mut agent = ConnectorAgent::new(world, chain, 2);
+    agent.begin(sights.remove(2), 0).expect("a sight");
+    let mut tick = 0;
+    while let Some((&[from, length], rest)) = data.split_first_chunk() {
+        let (packet, rest) = rest.split_at(rest.len().min(usize::from(length)));
+        tick += 1;
+        agent.on_packet(u32::from(from), packet, tick);
+        agent.on_timer(tick);
+        agent.take_packets();
+        data = rest;
+    }
+    agent.on_timer(u64::MAX);
+    assert!(agent.control().is_some(), "time is up");
 }
 
 fn srdf(text: &str) {

@@ -291,3 +291,34 @@ fn a_run_of_no_cycles_and_a_chain_of_one_connector_are_runs() {
     let one = place.json(&["run", "two.toml", "--set", "chains.1.connectors=1"]);
     assert_eq!(one["robots"], 7, "{one}");
 }
+
+#[test]
+fn a_team_of_agents_runs_is_recorded_and_replayed_and_says_who_was_lost() {
+    let place = Place::new();
+    let team = format!("{FOLDER}/team.toml");
+    assert_eq!(place.json(&["check", &team])["deployment"], "team");
+    assert!(place.run(&["check", &team]).out().contains("an agent per connector"));
+    let told = place.json(&["run", &team, "--cycles", "320", "--out", "r"]);
+    let metrics = &told["metrics"];
+    assert_eq!((&metrics["contacts_lost"], &metrics["dropped"]), (&json!(1), &json!(0)));
+    assert!(metrics["stood"].as_u64() >= Some(59), "three seconds of 0.05 s: {metrics}");
+    assert!(metrics["messages"].as_u64() > Some(10_000), "{metrics}");
+    assert_eq!(place.json(&["replay", "r", "--cycle", "320"])["digest"], told["digest"]);
+    let words = place.run(&["run", &team, "--cycles", "320", "--workers", "2"]).out();
+    assert!(words.contains("1 contacts lost") && words.contains(" bytes"), "{words}");
+    let events = read_table(&place.path("r"), "events", ..).expect("a table").rows();
+    assert!(events >= 2, "somebody is lost, and heard again");
+}
+
+#[test]
+fn a_team_that_would_have_to_see_the_whole_chain_is_refused_with_the_key() {
+    let place = place();
+    let ended = place.run(&["run", "two.toml", "--set", "chain.deployment=team", "--out", "r"]);
+    let told = ended.err();
+    assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{told}");
+    assert!(
+        told.contains("self_collision") && told.contains("which no connector of a team sees"),
+        "{told}"
+    );
+    assert_eq!(place.names(), ["s.toml", "two.toml"], "nothing is written");
+}

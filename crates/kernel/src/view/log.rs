@@ -91,6 +91,8 @@ happenings! {
     Orbit = "orbit",
     /// A body has not heard another one in spite of asking.
     Unheard = "unheard",
+    /// A body that was not heard is heard again.
+    Heard = "heard",
     /// Time was up before a body had decided.
     Deadline = "deadline",
     /// A body stays as it is because not all others have agreed to its wish.

@@ -84,6 +84,15 @@ fn assert_robust(text: &str) {
 }
 
 #[test]
+fn no_number_in_the_scenario_of_a_team_panics() {
+    assert_robust(&shipped("team.toml").replace("from_s = 12.0", "from_s = 0.05").replace(
+        "loss = 0.05",
+        "loss = 0.05\nduplication = 0.1\nlatency_s = 1e-5\npatience_s = 2e-4\ndeadline_s = 0.04\n\
+         one_way = [{ sender = 1, receiver = 2, chain = 0, from_s = 0.0, until_s = 0.1 }]",
+    ));
+}
+
+#[test]
 fn no_number_in_the_scenario_of_an_arm_panics() {
     assert_robust(&shipped("arm.toml"));
 }

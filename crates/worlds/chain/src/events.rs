@@ -52,11 +52,17 @@ pub enum EventKind {
     Planned,
     /// A planner has found no way to a target; the value is the target's number.
     NotPlanned,
+    /// A neighbor no longer hears the connector, and the chain stands; the value is the neighbor.
+    Unheard,
+    /// The neighbor hears the connector again, and the chain goes on; the value is the neighbor.
+    Heard,
+    /// Time was up before the leader had finished its talk.
+    Deadline,
 }
 
 impl EventKind {
     /// All kinds.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 22] = [
         Self::Veto,
         Self::Penetration,
         Self::Clear,
@@ -76,6 +82,9 @@ impl EventKind {
         Self::GivenUp,
         Self::Planned,
         Self::NotPlanned,
+        Self::Unheard,
+        Self::Heard,
+        Self::Deadline,
     ];
 
     /// Returns the kind that it is for viewers, which know no world.
@@ -100,6 +109,9 @@ impl EventKind {
             Self::GivenUp => Happening::GivenUp,
             Self::Planned => Happening::Planned,
             Self::NotPlanned => Happening::NotPlanned,
+            Self::Unheard => Happening::Unheard,
+            Self::Heard => Happening::Heard,
+            Self::Deadline => Happening::Deadline,
         }
     }
 
@@ -125,6 +137,9 @@ impl EventKind {
             Self::GivenUp => "given-up",
             Self::Planned => "planned",
             Self::NotPlanned => "not-planned",
+            Self::Unheard => "unheard",
+            Self::Heard => "heard",
+            Self::Deadline => "deadline",
         }
     }
 }

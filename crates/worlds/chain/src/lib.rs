@@ -7,6 +7,7 @@
 //! ```text
 //! rods/:   chains, constraints, propagation, search      arms/:   joints as rods, inverse kinematics
 //! motion/: after a veto, out of the way                  script/: a turtle language for initiators
+//! agents/: the program aboard a connector                deploy/: agents on a network in memory; elsewhere.rs
 //! ground/: sources of obstacles                          swarm/:  robots on wheels that follow a leader
 //!
 //! scenario.rs -> world.rs (immutable), state.rs (bodies), driver.rs (tasks)
@@ -17,12 +18,15 @@
 //! cycles.
 
 mod act;
+pub mod agents;
 pub mod arms;
 mod bundle;
 mod claim;
 mod clearance;
 pub mod convoy;
+mod deploy;
 mod driver;
+mod elsewhere;
 mod events;
 mod formation;
 pub mod ground;
@@ -54,6 +58,7 @@ mod words;
 mod world;
 
 pub use arms::{ik, kinematics};
+pub use deploy::Deployment;
 pub use kind::Chains;
 pub use motion::escape::{Escape, Escaped, Escaper, Method, WayOut};
 pub use motion::replan::{Climbed, Ladder, Rungs, Situation};

@@ -170,6 +170,42 @@ pub(super) const MEANINGS: &[Meaning] = &[
         meaning: "vetoes against moves out of the way that were due to the speed limit alone",
     },
     Meaning {
+        name: "messages",
+        words: "messages",
+        unit: "",
+        meaning: "packets between the agents of connectors; 0 where one process moves the chains",
+    },
+    Meaning {
+        name: "bytes",
+        words: "size of all messages",
+        unit: "bytes",
+        meaning: "bytes of these packets",
+    },
+    Meaning {
+        name: "dropped",
+        words: "messages that made no sense",
+        unit: "",
+        meaning: "packets that came and were dropped, because they made no sense",
+    },
+    Meaning {
+        name: "contacts_lost",
+        words: "contacts lost",
+        unit: "",
+        meaning: "times that a connector was no longer heard by a neighbor",
+    },
+    Meaning {
+        name: "deadlines_missed",
+        words: "deadlines missed",
+        unit: "",
+        meaning: "times that time was up before a leader had finished",
+    },
+    Meaning {
+        name: "stood",
+        words: "time stood for the network",
+        unit: "cycles",
+        meaning: "steps in which a chain stood because a connector was lost, or time was up",
+    },
+    Meaning {
         name: "robots.bumper_events",
         words: "bumpers pressed",
         unit: "",

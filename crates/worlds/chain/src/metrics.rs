@@ -1,5 +1,6 @@
 //! Metrics of a run.
 
+use super::agents::network::Traffic;
 use super::motion::escape::Escaped;
 use super::motion::replan::Climbed;
 use super::rods::veto::{Moved, Reason};
@@ -59,6 +60,18 @@ pub struct Tally {
     pub rungs: RungTally,
     /// Counts of parts that got out of the way.
     pub escapes: EscapeTally,
+    /// Packets between its agents,
+    pub messages: u64,
+    /// their bytes,
+    pub bytes: u64,
+    /// and packets that came and made no sense.
+    pub dropped: u64,
+    /// Number of times that a connector was no longer heard,
+    pub contacts_lost: u64,
+    /// and that time was up before the leader had finished.
+    pub deadlines_missed: u64,
+    /// Steps in which the chain stood because of that.
+    pub stood: u64,
 }
 
 /// Number of climbs that each rung of the ladder ended.
@@ -204,6 +217,13 @@ impl Tally {
         self.max_slave_step_m = self.max_slave_step_m.max(moved.max_slave_step_m);
     }
 
+    /// Adds packets of an agent.
+    pub(crate) fn add_traffic(&mut self, traffic: Traffic) {
+        self.messages += traffic.messages;
+        self.bytes += traffic.bytes;
+        self.dropped += traffic.dropped;
+    }
+
     /// Adds a veto.
     pub(crate) fn add_veto(&mut self, reason: Reason) {
         self.vetoes[reason.number()] += 1;
@@ -235,6 +255,12 @@ impl Default for Tally {
             robots: RobotTally::default(),
             rungs: RungTally::default(),
             escapes: EscapeTally::default(),
+            messages: 0,
+            bytes: 0,
+            dropped: 0,
+            contacts_lost: 0,
+            deadlines_missed: 0,
+            stood: 0,
         }
     }
 }
@@ -305,6 +331,18 @@ pub struct Metrics {
     pub rungs: RungTally,
     /// Counts of parts that got out of the way.
     pub escapes: EscapeTally,
+    /// Number of packets between the agents of connectors; 0 where one process moves the chains.
+    pub messages: u64,
+    /// Number of bytes of those packets.
+    pub bytes: u64,
+    /// Number of packets that came and made no sense.
+    pub dropped: u64,
+    /// Number of times that a connector was no longer heard by a neighbor.
+    pub contacts_lost: u64,
+    /// Number of times that time was up before a leader had finished.
+    pub deadlines_missed: u64,
+    /// Steps in which a chain stood because a connector was lost, or time was up.
+    pub stood: u64,
     /// Metrics of robots on wheels, if there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robots: Option<RobotMetrics>,
@@ -406,6 +444,12 @@ impl Metrics {
             given_up: given_up.collect(),
             rungs: tallies.iter().fold(RungTally::default(), |all, t| all.add(&t.rungs)),
             escapes: tallies.iter().fold(EscapeTally::default(), |all, t| all.joined(&t.escapes)),
+            messages: sum(|t| t.messages),
+            bytes: sum(|t| t.bytes),
+            dropped: sum(|t| t.dropped),
+            contacts_lost: sum(|t| t.contacts_lost),
+            deadlines_missed: sum(|t| t.deadlines_missed),
+            stood: sum(|t| t.stood),
             robots: RobotMetrics::of(
                 &tallies.iter().fold(RobotTally::default(), |all, t| all.add(&t.robots)),
             ),

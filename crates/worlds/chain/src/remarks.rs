@@ -2,12 +2,41 @@
 
 use super::arms::freedom::Freedom;
 use super::scenario::Compiled;
-use super::world::ChainSpec;
+use super::world::{ChainSpec, ChainWorld};
 use sidestep_scenario::Remark;
 
 /// Returns the remarks, in the order of the chains.
 pub(super) fn remarks<const D: usize>(compiled: &Compiled<D>) -> Vec<Remark> {
-    compiled.world.chains.iter().enumerate().filter_map(stiff).collect()
+    let chains = || compiled.world.chains.iter().enumerate();
+    let slow = chains().find_map(|chain| slow(&compiled.world, chain));
+    chains().filter_map(stiff).chain(slow).collect()
+}
+
+/// Returns a warning on a chain whose agents talk too slowly to move all of it in a cycle.
+fn slow<const D: usize>(
+    world: &ChainWorld<D>,
+    (k, spec): (usize, &ChainSpec<D>),
+) -> Option<Remark> {
+    let network = world.network.as_ref()?;
+    let rods = spec.start.rods().len();
+    let led_m = spec.tasks.iter().map(|task| task.speed_m_s * world.dt_s).fold(0.0, f64::max);
+    let is_empty = world.obstacles.is_empty() && world.movers.is_empty() && world.chains.len() == 1;
+    let step_m = match world.rules.step_m {
+        Some(step_m) => step_m,
+        None if is_empty => f64::INFINITY,
+        None => spec.start.step_m(),
+    };
+    let steps = (led_m / step_m).ceil().max(1.0);
+    let talk_s = steps * 2.0 * rods as f64 * network.latency_s;
+    (talk_s > network.deadline_s).then(|| {
+        let words = format!(
+            "a motion that moves all of chain {k} takes at least {talk_s} s of talk ({steps} sub-steps, each there \
+             and back along {rods} rods), and a talk ends after {} s: such a motion is not carried out; \
+             give messages less time, or cycles more",
+            network.deadline_s
+        );
+        Remark::warning("chain.network.latency_s", words)
+    })
 }
 
 /// Returns a warning on an arm that moves as its chain does and not as its joints can.
@@ -41,6 +70,24 @@ mod tests {
         let links: String = (0..=hinges).map(link).collect();
         let joints: String = (0..hinges).map(joint).collect();
         format!("<robot name=\"planar\">{links}{joints}</robot>")
+    }
+
+    #[test]
+    fn a_team_that_talks_too_slowly_to_move_all_is_told() {
+        let remarks_of = |network: &str| {
+            let text = format!(
+                "format = 1\nworld = \"chain\"\n[chain]\nself_collision = false\nbacktracks = 0\n\
+                 deployment = \"team\"\nnetwork = {{ {network} }}\n[[chains]]\nconnectors = 20\n\
+                 rod_m = 0.5\n[[chains.tasks]]\nkind = \"script\"\nscript = \"forward 1\"\n"
+            );
+            remarks(&Compiled::<2>::new(&Source::new("s.toml", text, "")).expect("valid"))
+        };
+        assert_eq!(remarks_of("loss = 0.1").len(), 0);
+        let [told] = &remarks_of("latency_s = 5e-4, patience_s = 2e-3")[..] else {
+            panic!("one remark")
+        };
+        assert_eq!(told.key, "chain.network.latency_s");
+        assert!(told.words.contains("0.019 s of talk (1 sub-steps"), "{}", told.words);
     }
 
     #[test]

@@ -3,14 +3,17 @@
 mod arms;
 mod chains;
 mod changes;
+mod deployment;
 mod leads;
 mod mobility;
 mod navigators;
+mod network;
 mod obstacles;
 mod recipe;
 mod starts;
 mod tasks;
 
+use super::deploy::kind::Deployment;
 use super::ground::{Movers, Site};
 use super::motion::escape::{Escape, Method};
 use super::motion::replan::Rungs;
@@ -18,6 +21,7 @@ use super::rods::geometry::{Bounds, norm};
 use super::rods::rules::{Rotation, Rules};
 use super::world::{ChainSpec, ChainWorld};
 use chains::ChainSection;
+use network::NetworkSection;
 use obstacles::{FieldSection, Ground, GroundSection, ObstacleSection, fitted};
 pub(crate) use recipe::Recipe;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
@@ -211,6 +215,8 @@ struct RulesSection {
     escape_speed_m_s: Option<Measure>,
     escape_ahead_s: Option<Measure>,
     may_start_inside: bool,
+    deployment: Deployment,
+    network: Option<Spanned<NetworkSection>>,
 }
 
 /// The time at which chains get out of the way of moving obstacles.
@@ -364,6 +370,8 @@ impl<const D: usize> Compiler<'_, D> {
         let joint_speed_m_s = self.joint_speed_m_s(&chains);
         let slave_step_max_m = self.slave_step_max_m(&chains, &ground, escape.as_ref(), dt_s);
         let rules = Rules { slave_step_max_m, ..self.rules(joint_speed_m_s * dt_s) };
+        let network = self.network(dt_s, &chains)?;
+        self.is_local(&chains, &rules, escape.is_some())?;
         let world = ChainWorld {
             chains,
             cycles,
@@ -376,6 +384,8 @@ impl<const D: usize> Compiler<'_, D> {
             look_m: section.look_m.map_or(look_m, f64::from),
             streams: Streams::new(Seed(self.head.seed)),
             teams: Arc::default(),
+            deployment: section.deployment,
+            network,
         };
         let teams = match self.known {
             Some(known) => Arc::clone(&known.teams),

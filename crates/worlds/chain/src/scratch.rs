@@ -1,5 +1,6 @@
 //! A worker's buffers, kept between tasks, and the obstacles at a given moment.
 
+use super::agents::sight::Shown;
 use super::events::Event;
 use super::formation::Solid;
 use super::motion::escape::Escaper;
@@ -42,6 +43,8 @@ pub struct Scratch<const D: usize> {
     pub(crate) events: Vec<Event>,
     /// Notes for somebody who asks about a chain; none in a run.
     pub(crate) notes: Option<Box<Notes<D>>>,
+    /// Perceptions of connectors, for somebody who asks; none in a run.
+    pub(crate) shown: Option<Vec<Shown<D>>>,
 }
 
 impl<const D: usize> Scratch<D> {
@@ -63,6 +66,7 @@ impl<const D: usize> Scratch<D> {
             escaped: Vec::new(),
             events: Vec::new(),
             notes: None,
+            shown: None,
         }
     }
 

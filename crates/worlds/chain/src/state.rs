@@ -1,5 +1,6 @@
 //! The changing state of a run, and its snapshot.
 
+use super::agents::control::Control;
 use super::driver::external::External;
 use super::driver::{Driving, Task};
 use super::formation::{Robot, Solid};
@@ -61,6 +62,10 @@ pub struct Body<const D: usize> {
     pub(crate) external: External,
     /// The way that it follows because local rules came no nearer.
     pub(crate) plan: Option<Plan<D>>,
+    /// The nearest lost connectors below and above, as each connector knows; empty while nobody is lost.
+    pub(crate) missing: Vec<Missing>,
+    /// Decisions of its agents for this cycle, if they run elsewhere.
+    pub(crate) handed: Option<Vec<Option<Control<D>>>>,
     /// Motions that the chain has yet to follow; none whenever somebody looks.
     pub(crate) put_off: PutOff<D>,
 }
@@ -121,7 +126,12 @@ pub struct Snapshot {
     pub(crate) ways_out: Vec<(u32, WayOut)>,
     /// Orders from outside and answers, of chains that have any, by id.
     pub(crate) externals: Vec<(u32, External)>,
+    /// Lost connectors, as those of their chain know, of chains in which somebody is lost; by id.
+    pub(crate) missing: Vec<(u32, Vec<Missing>)>,
 }
+
+/// The nearest lost connectors below and above, as a connector knows.
+pub(crate) type Missing = [Option<u32>; 2];
 
 impl<const D: usize> Body<D> {
     /// Returns a chain at its start.
@@ -139,6 +149,8 @@ impl<const D: usize> Body<D> {
             motions: Vec::new(),
             external: External::default(),
             plan: None,
+            missing: Vec::new(),
+            handed: None,
             put_off: PutOff::default(),
         };
         body.motions = spec.motions(&body.driving)?;
@@ -266,6 +278,15 @@ impl<const D: usize> ChainState<D> {
             let is_its_own = external.is_within(body.chain.points().len());
             body.external = is_its_own.then_some(*external).ok_or(CheckpointError::Damaged)?;
         }
+        for (slot, missing) in &snapshot.missing {
+            let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
+            let n = body.chain.points().len();
+            let is_its_own = |k: &u32| (*k as usize) < n;
+            if missing.len() != n || !missing.iter().flatten().flatten().all(is_its_own) {
+                return Err(CheckpointError::Damaged);
+            }
+            body.missing = missing.clone();
+        }
         Ok(Self::of(bodies.into_iter()))
     }
 
@@ -329,12 +350,14 @@ impl<const D: usize> ChainState<D> {
         let plan = |slot| Some(self.body(slot).plan.as_ref()?.record(slot as EntityId));
         let ways_out = slots.clone().map(|slot| (slot as EntityId, self.body(slot).way_out));
         let externals = slots.clone().map(|slot| (slot as EntityId, self.body(slot).external));
+        let missing = slots.clone().map(|slot| (slot as EntityId, self.body(slot).missing.clone()));
         Snapshot {
             cycle,
             chains: slots.clone().map(|slot| self.body(slot).record()).collect(),
             plans: slots.filter_map(plan).collect(),
             ways_out: ways_out.filter(|(_, way_out)| !way_out.is_none()).collect(),
             externals: externals.filter(|(_, external)| !external.is_none()).collect(),
+            missing: missing.filter(|(_, missing)| !missing.is_empty()).collect(),
         }
     }
 
@@ -369,6 +392,7 @@ impl Snapshot {
         add_any(&mut hasher, &self.plans);
         add_any(&mut hasher, &self.ways_out);
         add_any(&mut hasher, &self.externals);
+        add_any(&mut hasher, &self.missing);
         hasher.finish()
     }
 }

@@ -270,6 +270,11 @@ fn told(event: &Event) -> (Level, &'static str, String) {
         EventKind::GivenUp => (Level::Warning, "", format!("has given up task {value}")),
         EventKind::Planned => (Level::Info, "", format!("follows a plan of {value} pieces")),
         EventKind::NotPlanned => (Level::Warning, "", format!("has no plan to target {value}")),
+        EventKind::Unheard => {
+            (Level::Warning, "", format!("is not heard by connector {value}: the chain stands"))
+        }
+        EventKind::Heard => (Level::Info, "", format!("is heard by connector {value} again")),
+        EventKind::Deadline => (Level::Warning, NO_VALUE, "is out of time".into()),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Texts for people: a scenario's contents, a run's outcome, and all positions.
 
+use super::deploy::kind::Deployment;
 use super::metrics::{ChainGivenUp, Metrics, RobotMetrics};
 use super::scenario::Compiled;
 use super::state::Snapshot;
@@ -24,17 +25,30 @@ pub(super) fn contents<const D: usize>(compiled: &Compiled<D>) -> Said {
         "movers": world.movers.len(),
         "dimensions": D,
         "dt_s": world.dt_s,
+        "deployment": world.deployment,
     });
     let count = |n: usize| grouped(n as u64);
     let (chains, dt_s) = (count(world.chains.len()), world.dt_s);
     let parts = count(connectors);
     let (still, moving) = (count(world.obstacles.still().len()), count(world.movers.len()));
     let (cycles, lasts_s) = (grouped(plan.cycles), plan.cycles as f64 * dt_s);
-    let lines = [
+    let mut lines = vec![
         line("chains", format!("{chains}, of {parts} connectors in {D} dimensions")),
         line("obstacles", format!("{still}, and {moving} that move")),
         line("run", format!("{cycles} cycles of {dt_s} s ({lasts_s} s), seed {}", plan.seed)),
     ];
+    if world.deployment == Deployment::Team {
+        let network = match &world.network {
+            None => "loses nothing".into(),
+            Some(n) => format!(
+                "{} s a message, loses {} %, a cycle's talk ends after {} s",
+                n.latency_s,
+                100.0 * n.loss,
+                n.deadline_s
+            ),
+        };
+        lines.push(line("deployment", format!("an agent per connector; the network: {network}")));
+    }
     Said { json, text: aligned(&lines) }
 }
 
@@ -59,6 +73,7 @@ pub(super) fn outcome(m: &Metrics) -> Lines {
     let mut lines = motion(m);
     lines.extend(m.robots.as_ref().map(robots));
     lines.extend(after_vetoes(m));
+    lines.extend(network(m));
     if m.reformed > 0 {
         lines.push(line("re-formed", format!("{} times", grouped(m.reformed))));
     }
@@ -170,6 +185,27 @@ fn after_vetoes(m: &Metrics) -> Lines {
     ]);
     let went_on = went_on.map(|said| line("after vetoes", said));
     went_on.into_iter().chain(escaped.map(|said| line("escapes", said))).collect()
+}
+
+/// Returns the traffic on the network of the agents, and its faults; no lines where there are no agents.
+fn network(m: &Metrics) -> Lines {
+    let mut lines = Lines::new();
+    if m.messages > 0 {
+        let sent = format!("{}, {} bytes", grouped(m.messages), grouped(m.bytes));
+        lines.push(line("messages", sent));
+    }
+    let counts = [
+        (m.contacts_lost, "contacts lost"),
+        (m.deadlines_missed, "leaders out of time"),
+        (m.stood, "steps stood because of that"),
+        (m.dropped, "messages that made no sense"),
+    ];
+    let said = counts.iter().filter(|(n, _)| *n > 0);
+    let said: Vec<String> = said.map(|(n, what)| format!("{} {what}", grouped(*n))).collect();
+    if !said.is_empty() {
+        lines.push(line("network", said.join(", ")));
+    }
+    lines
 }
 
 /// Distance below which bodies touch, meters.

@@ -1,6 +1,8 @@
 //! A compiled world of chains: everything that never changes during a run.
 
+use super::agents::network::Network;
 use super::arms::arm::Arm;
+use super::deploy::kind::Deployment;
 use super::driver::{Driver, Driving, Task};
 use super::formation::{Robot, Robots};
 use super::ground::Movers;
@@ -34,6 +36,8 @@ pub(crate) mod purpose {
     pub(crate) const PLAN: Purpose = Purpose(6);
     /// Errors of a laser.
     pub(crate) const LASER: Purpose = Purpose(4);
+    /// Faults of messages.
+    pub(crate) const NETWORK: Purpose = Purpose(7);
 }
 
 /// Cutoff of a random throw, in standard deviations.
@@ -66,6 +70,10 @@ pub struct ChainWorld<const D: usize> {
     pub(crate) streams: Streams,
     /// Chains that observe, and may be ordered, alike.
     pub(crate) teams: Arc<Teams>,
+    /// Deployment of the rules.
+    pub(crate) deployment: Deployment,
+    /// The network that carries the agents' messages, if it is unreliable.
+    pub(crate) network: Option<Network>,
 }
 
 /// One chain and its tasks.

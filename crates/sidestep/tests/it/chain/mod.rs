@@ -1,6 +1,6 @@
 //! D1 for chains: the same build, scenario and seed give identical bits for 1, 2, 3 and 8
 //! workers, recorded or not, resumed or not (bits.rs); laws and metrics (recount.rs); what a run says of
-//! itself (told.rs); targets of arms (arms.rs).
+//! itself (told.rs); targets of arms (arms.rs); an agent per connector (team.rs).
 
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Recorder, Values};
@@ -14,6 +14,7 @@ use std::ops::{Deref, DerefMut};
 mod arms;
 mod bits;
 mod recount;
+mod team;
 mod told;
 mod wheels;
 

@@ -27,14 +27,17 @@ impl<const D: usize> Acting<'_, D> {
     pub(super) fn go(&mut self, task: &Task<D>, to: Point<D>) -> Went {
         let at = self.body.chain.points()[task.agent];
         let climbed = match self.puts_off {
-            true => self.lead(task, to),
-            false => self.climb(task, to),
+            true => Some(self.lead(task, to)),
+            false if self.is_team() => self.climb_as_team(task, to),
+            false => Some(self.climb(task, to)),
         };
-        self.note(|notes| notes.climbed = Some(climbed.clone()));
+        self.note(|notes| notes.climbed.clone_from(&climbed));
         let way = sub(self.body.chain.points()[task.agent], at);
         self.body.driving.way_m.wanted += distance(at, to);
         self.body.driving.way_m.gone += norm(way);
         self.body.tally.way_m += norm(way);
+        // A chain that stands because somebody is lost does not lose its patience.
+        let Some(climbed) = climbed else { return Went::Nowhere };
         self.take_note(task, &climbed, way)
     }
 
@@ -83,7 +86,7 @@ impl<const D: usize> Acting<'_, D> {
     }
 
     /// Returns an initiator's knowledge beside its neighborhood.
-    fn situation(&self, task: &Task<D>) -> Situation {
+    pub(super) fn situation(&self, task: &Task<D>) -> Situation {
         let at = self.body.chain.points()[task.agent];
         let near_m = self.world.look_m + MOVER_NEAR_M;
         let is_near =

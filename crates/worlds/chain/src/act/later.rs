@@ -13,6 +13,7 @@ impl<const D: usize> Acting<'_, D> {
     pub(super) fn may_put_off(&self) -> bool {
         let (world, body) = (self.world, &*self.body);
         world.is_open()
+            && !self.is_team()
             && world.rules.step_m.is_none()
             && self.spec.robots.is_none()
             && body.scattered.is_none()

@@ -5,6 +5,7 @@
 //!           -> bounds.rs (back into the claim) -> follow.rs -> measure.rs
 //! broken.rs -> drive.rs -> go.rs, later.rs         where nothing can object
 //!              drive.rs -> plan.rs                 where local rules come no nearer
+//!              go.rs -> talk.rs                    where each connector has an agent
 //! ```
 
 mod bounds;
@@ -16,6 +17,7 @@ mod later;
 mod measure;
 mod obey;
 mod plan;
+mod talk;
 mod wheels;
 
 use super::driver::Task;
@@ -50,6 +52,8 @@ pub(crate) struct Acting<'a, const D: usize> {
     scratch: &'a mut Scratch<D>,
     /// Whether only the initiator moves for now.
     puts_off: bool,
+    /// Whether its agents have talked in this cycle.
+    has_talked: bool,
 }
 
 /// Lets the chains of one conflict group act, one after the other.
@@ -84,6 +88,7 @@ pub(crate) fn act_one<const D: usize>(
         body: &mut body,
         scratch: turn.scratch,
         puts_off: false,
+        has_talked: false,
     };
     acting.act();
 }
@@ -108,6 +113,7 @@ impl<'a, const D: usize> Acting<'a, D> {
         } else {
             self.get_out_of_the_way();
             self.drive();
+            self.rest_as_team();
             self.keep_to_bounds();
             self.answer();
         }

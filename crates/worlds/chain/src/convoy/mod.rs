@@ -22,6 +22,7 @@ use super::swarm::follower::pace;
 use super::swarm::leader::{Layer, LeaderState};
 use super::swarm::{Drive, Follower, Leader, Pose};
 use super::world::{ChainSpec, ChainWorld};
+use crate::deploy::kind::Deployment;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed, Simulation};
@@ -270,6 +271,8 @@ impl Plan {
             look_m: LOOK_M,
             streams: Streams::new(Seed(around.seed)),
             teams: Arc::default(),
+            deployment: Deployment::Direct,
+            network: None,
         }
     }
 }

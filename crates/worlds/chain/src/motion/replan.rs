@@ -19,6 +19,7 @@ use crate::rods::obstacle::Obstacles;
 use crate::rods::propagate::Propagator;
 use crate::rods::veto::{Mode, Motion, Moved, Outcome, Request, Source, Veto};
 pub(crate) use memory::Memory;
+use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin};
 
@@ -51,7 +52,7 @@ impl Default for Rungs {
 }
 
 /// An initiator's knowledge beside its neighborhood.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Situation {
     /// Distance of its goal, if it has one, meters. Without a goal there is no progress to miss,
     /// and detours through the same place are not counted.
@@ -66,7 +67,7 @@ pub struct Situation {
 }
 
 /// Outcome of a climb. The chain has moved only in the variants that hold a motion.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Climbed<const D: usize> {
     /// As wanted.
     Straight(Moved<D>),
@@ -122,20 +123,79 @@ pub struct Ladder {
     pub memory: Memory,
 }
 
-/// The working data of a climb.
-struct Climb<'a, const D: usize> {
+/// The chain, as its initiator moves it: all of it at once, or by asking its neighbors.
+pub(crate) trait Moves<const D: usize> {
+    /// Reason for which a request has no outcome.
+    type Failure;
+
+    /// Returns the place of a connector that leads.
+    fn place(&self, k: usize) -> Point<D>;
+
+    /// Makes a motion: all of it, or nothing moves.
+    fn request(&mut self, request: &Request<D>) -> Result<Outcome<D>, Self::Failure>;
+
+    /// Returns the objection to a motion, if there is one; nothing moves.
+    fn objection(&mut self, request: &Request<D>) -> Result<Option<Veto<D>>, Self::Failure>;
+
+    /// Returns the end farther from an initiator; `None` if there is none that could lead.
+    fn other_end(&mut self, k: usize) -> Result<Option<End<D>>, Self::Failure>;
+}
+
+/// An end of a chain that may lead.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct End<const D: usize> {
+    /// The connector.
+    pub(crate) by: usize,
+    /// Its place.
+    pub(crate) at: Point<D>,
+    /// The direction in which its rod points out of the chain, a unit vector.
+    pub(crate) ahead: Point<D>,
+}
+
+/// A chain that is moved at once.
+struct AtOnce<'a, const D: usize> {
     chain: &'a mut Chain<D>,
     obstacles: &'a Obstacles<D>,
     propagator: &'a mut Propagator<D>,
+}
+
+impl<const D: usize> Moves<D> for AtOnce<'_, D> {
+    type Failure = InputError;
+
+    fn place(&self, k: usize) -> Point<D> {
+        self.chain.points()[k]
+    }
+
+    fn request(&mut self, request: &Request<D>) -> Result<Outcome<D>, InputError> {
+        go(self.propagator, self.chain, self.obstacles, request)
+    }
+
+    fn objection(&mut self, request: &Request<D>) -> Result<Option<Veto<D>>, InputError> {
+        let tried = go(self.propagator, &mut self.chain.clone(), self.obstacles, request)?;
+        Ok(tried.veto().copied())
+    }
+
+    fn other_end(&mut self, k: usize) -> Result<Option<End<D>>, InputError> {
+        let points = self.chain.points();
+        let by = farther_end(k, points.len());
+        let neighbor = if by == 0 { points.get(1) } else { points.get(by - 1) };
+        let ahead = neighbor.and_then(|neighbor| unit(sub(points[by], *neighbor)));
+        Ok(ahead.map(|ahead| End { by, at: points[by], ahead }))
+    }
+}
+
+/// The working data of a climb.
+struct Climb<'a, M, const D: usize> {
+    by: &'a mut M,
     wanted: Request<D>,
     vetoes: Vec<Veto<D>>,
 }
 
-impl<const D: usize> Climb<'_, D> {
+impl<M: Moves<D>, const D: usize> Climb<'_, M, D> {
     /// Tries all of a motion, or none.
-    fn attempt(&mut self, motion: Motion<D>) -> Result<Option<Moved<D>>, InputError> {
+    fn attempt(&mut self, motion: Motion<D>) -> Result<Option<Moved<D>>, M::Failure> {
         let request = Request { motion, mode: Mode::Exact, ..self.wanted };
-        Ok(match go(self.propagator, self.chain, self.obstacles, &request)? {
+        Ok(match self.by.request(&request)? {
             Outcome::Moved(moved) => Some(moved),
             Outcome::Vetoed(veto) => {
                 self.note(veto);
@@ -153,8 +213,10 @@ impl<const D: usize> Climb<'_, D> {
 
     /// Returns the wanted motion with another way from the initiator's place.
     fn varied(&self, way: impl Fn(Point<D>) -> Point<D>) -> Motion<D> {
-        let at = self.chain.points();
-        let to = |k: usize, to: Point<D>| add(at[k], way(sub(to, at[k])));
+        let to = |k: usize, to: Point<D>| {
+            let at = self.by.place(k);
+            add(at, way(sub(to, at)))
+        };
         match self.wanted.motion {
             Motion::Connector { k, to: t } => Motion::Connector { k, to: to(k, t) },
             Motion::Rod { i, to: t } => Motion::Rod { i, to: [to(i, t[0]), to(i + 1, t[1])] },
@@ -164,7 +226,7 @@ impl<const D: usize> Climb<'_, D> {
     /// Returns the initiator and its wanted way.
     fn wanted_way(&self) -> (usize, Point<D>) {
         let (k, to) = head(&self.wanted.motion);
-        (k, sub(to, self.chain.points()[k]))
+        (k, sub(to, self.by.place(k)))
     }
 }
 
@@ -203,14 +265,24 @@ impl Ladder {
         wanted: &Request<D>,
         situation: &Situation,
     ) -> Result<(Climbed<D>, Option<Veto<D>>), InputError> {
+        self.climb_by(&mut AtOnce { chain, obstacles, propagator }, wanted, situation)
+    }
+
+    /// Climbs with a chain that is moved in any way, and also returns the objection to the wanted motion itself,
+    /// if there was one.
+    pub(crate) fn climb_by<M: Moves<D>, const D: usize>(
+        &mut self,
+        by: &mut M,
+        wanted: &Request<D>,
+        situation: &Situation,
+    ) -> Result<(Climbed<D>, Option<Veto<D>>), M::Failure> {
         if wanted.source != Source::Autonomous {
-            return Ok(match go(propagator, chain, obstacles, wanted)? {
+            return Ok(match by.request(wanted)? {
                 Outcome::Moved(moved) => (Climbed::Straight(moved), None),
                 Outcome::Vetoed(veto) => (Climbed::Vetoed(veto), Some(veto)),
             });
         }
-        let vetoes = Vec::new();
-        let mut climb = Climb { chain, obstacles, propagator, wanted: *wanted, vetoes };
+        let mut climb = Climb { by, wanted: *wanted, vetoes: Vec::new() };
         self.memory.note_goal(situation.goal_distance_m);
         if self.memory.pulling_back > 0 {
             return Ok((self.pull_back(&mut climb)?, None));
@@ -224,11 +296,11 @@ impl Ladder {
     }
 
     /// Tries the rungs one after the other.
-    fn after_a_veto<const D: usize>(
+    fn after_a_veto<M: Moves<D>, const D: usize>(
         &mut self,
-        climb: &mut Climb<'_, D>,
+        climb: &mut Climb<'_, M, D>,
         situation: &Situation,
-    ) -> Result<Climbed<D>, InputError> {
+    ) -> Result<Climbed<D>, M::Failure> {
         if let Some(came) = shorter(climb)? {
             self.memory.moved_on();
             return Ok(came);
@@ -240,11 +312,11 @@ impl Ladder {
     }
 
     /// Tries other headings, first those on the side where one was good.
-    fn sideways<const D: usize>(
+    fn sideways<M: Moves<D>, const D: usize>(
         &mut self,
-        climb: &mut Climb<'_, D>,
+        climb: &mut Climb<'_, M, D>,
         situation: &Situation,
-    ) -> Result<Option<Climbed<D>>, InputError> {
+    ) -> Result<Option<Climbed<D>>, M::Failure> {
         let (k, way) = climb.wanted_way();
         let Some(u) = unit(way).filter(|_| !situation.keeps_heading) else { return Ok(None) };
         let axes = axes_across(u);
@@ -252,7 +324,7 @@ impl Ladder {
             let turn = |v| turned(v, u, axes[plane], turn_rad);
             let Some(moved) = climb.attempt(climb.varied(turn))? else { continue };
             self.memory.went_sideways(plane, turn_rad);
-            let place = memory::place(climb.chain.points()[k], u);
+            let place = memory::place(climb.by.place(k), u);
             if self.memory.visit(place, situation.goal_distance_m) > self.rungs.visits {
                 self.memory.pulling_back = self.rungs.pull_back;
             }
@@ -262,11 +334,11 @@ impl Ladder {
     }
 
     /// Tries the rungs for an initiator that cannot move at all.
-    fn without_a_way<const D: usize>(
+    fn without_a_way<M: Moves<D>, const D: usize>(
         &mut self,
-        climb: &mut Climb<'_, D>,
+        climb: &mut Climb<'_, M, D>,
         situation: &Situation,
-    ) -> Result<Climbed<D>, InputError> {
+    ) -> Result<Climbed<D>, M::Failure> {
         let memory = &mut self.memory;
         if situation.can_turn && memory.turns < self.rungs.turns {
             memory.turns += 1;
@@ -281,18 +353,19 @@ impl Ladder {
     }
 
     /// Lets the other end go on along its rod, or beside it; the initiator is dragged.
-    fn pull_back<const D: usize>(
+    fn pull_back<M: Moves<D>, const D: usize>(
         &mut self,
-        climb: &mut Climb<'_, D>,
-    ) -> Result<Climbed<D>, InputError> {
+        climb: &mut Climb<'_, M, D>,
+    ) -> Result<Climbed<D>, M::Failure> {
         let (k, way) = climb.wanted_way();
         let begins = self.memory.pulling_back == self.rungs.pull_back;
         if begins && self.memory.hand_overs >= self.rungs.hand_overs {
             return self.stuck(climb);
         }
         self.memory.hand_overs += u32::from(begins);
-        let Some((by, u)) = other_end(climb.chain, k) else { return self.stuck(climb) };
-        let at = climb.chain.points()[by];
+        let Some(End { by, at, ahead: u }) = climb.by.other_end(k)? else {
+            return self.stuck(climb);
+        };
         let axes = axes_across(u);
         let step = scaled(u, norm(way));
         let ways = fan(&Memory::default(), D - 1);
@@ -306,24 +379,24 @@ impl Ladder {
         self.stuck(climb)
     }
 
-    fn stuck<const D: usize>(
+    fn stuck<M: Moves<D>, const D: usize>(
         &mut self,
-        climb: &mut Climb<'_, D>,
-    ) -> Result<Climbed<D>, InputError> {
+        climb: &mut Climb<'_, M, D>,
+    ) -> Result<Climbed<D>, M::Failure> {
         self.memory.starts_afresh();
         if climb.vetoes.is_empty() {
             // Its detours have led nowhere, and it has tried nothing since, so ask what is in the
             // way.
             let request = Request { mode: Mode::Exact, ..climb.wanted };
-            let mut chain = climb.chain.clone();
-            let tried = go(climb.propagator, &mut chain, climb.obstacles, &request)?;
-            tried.veto().into_iter().for_each(|veto| climb.note(*veto));
+            climb.by.objection(&request)?.into_iter().for_each(|veto| climb.note(veto));
         }
         Ok(Climbed::Stuck { vetoes: std::mem::take(&mut climb.vetoes) })
     }
 }
 
-fn shorter<const D: usize>(climb: &mut Climb<'_, D>) -> Result<Option<Climbed<D>>, InputError> {
+fn shorter<M: Moves<D>, const D: usize>(
+    climb: &mut Climb<'_, M, D>,
+) -> Result<Option<Climbed<D>>, M::Failure> {
     for part in PARTS {
         if let Some(moved) = climb.attempt(climb.varied(|way| scaled(way, part)))? {
             return Ok(Some(Climbed::Shorter { part, moved }));
@@ -339,13 +412,9 @@ fn head<const D: usize>(motion: &Motion<D>) -> (usize, Point<D>) {
     }
 }
 
-/// Returns the end farther from an initiator, and the direction in which its rod points out of the
-/// chain; `None` for a chain of one connector.
-fn other_end<const D: usize>(chain: &Chain<D>, k: usize) -> Option<(usize, Point<D>)> {
-    let last = chain.points().len() - 1;
-    let (by, neighbor) = if 2 * k <= last { (last, last.checked_sub(1)?) } else { (0, 1) };
-    let u = unit(sub(chain.points()[by], chain.points()[neighbor]))?;
-    Some((by, u))
+/// Returns the end of a chain of `n` connectors that is farther from connector `k`.
+pub(crate) fn farther_end(k: usize, n: usize) -> usize {
+    if 2 * k < n { n - 1 } else { 0 }
 }
 
 /// Returns planes and turns in the order in which they are tried. If no side is known to be good,

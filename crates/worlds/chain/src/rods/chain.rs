@@ -15,7 +15,7 @@ pub(crate) const MAX_COORDINATE_M: f64 = 1e6;
 
 /// Whether a connector may be at a point at all: it must be finite, and at most 1e6 m from the
 /// origin along every axis.
-pub(super) fn is_in_range<const D: usize>(point: &Point<D>) -> bool {
+pub(crate) fn is_in_range<const D: usize>(point: &Point<D>) -> bool {
     point.iter().all(|x| x.abs() <= MAX_COORDINATE_M)
 }
 
@@ -216,6 +216,18 @@ impl<const D: usize> Chain<D> {
         let at = |i: usize| geometry::along(start, u, rod.max_m * i as f64);
         let points = (0..=n_rods).map(at).collect();
         Self::new(points, vec![connector; n_rods + 1], vec![rod; n_rods])
+    }
+
+    /// Returns a chain of connector `k` alone, to which moves and steps count as in this one.
+    pub(super) fn alone(&self, k: usize) -> Self {
+        let connector = self.connectors[k];
+        Self {
+            points: vec![self.points[k]],
+            connectors: vec![connector],
+            rods: Vec::new(),
+            special: usize::from(!connector.is_plain()),
+            still: self.still,
+        }
     }
 
     /// Returns the positions of the connectors.

@@ -9,6 +9,7 @@
 //!                 open.rs, pass.rs, leeway.rs   the same where nothing is in the way, or comes near
 //! wavefront.rs: many motions at once            passage.rs: passages between two states
 //! reach.rs: a base that keeps its place         rebuild.rs, span.rs: broken chains
+//! propagate/alone.rs: one connector by itself   wire.rs: points in messages
 //! ```
 
 mod candidates;
@@ -32,6 +33,7 @@ mod span;
 pub(crate) mod sweep;
 pub(crate) mod veto;
 pub mod wavefront;
+pub(crate) mod wire;
 
 pub use chain::{Chain, Connector, Mobility, Rod};
 pub use obstacle::{Obstacle, Obstacles};

@@ -13,7 +13,7 @@ use super::open::{self, Stays};
 use super::own_body::OwnBody;
 use super::pass::{Direction, Tally};
 use super::rules::{Rotation, Rules};
-use super::scene::{Overlay, Refusal, Scene, Step, TOLERANCE_M, fits, needed_m};
+use super::scene::{Name, Overlay, Refusal, Scene, Step, TOLERANCE_M, fits, needed_m};
 use super::veto::{Mode, Motion, Moved, Outcome, Reason, Request, Veto};
 use sidestep_kernel::InputError;
 use std::ops::Range;
@@ -122,21 +122,7 @@ impl<const D: usize> Propagator<D> {
         from: [Point<D>; 2],
     ) -> Result<usize, InputError> {
         let way_m = distance(from[0], heads.to[0]).max(distance(from[1], heads.to[heads.n - 1]));
-        let is_open = obstacles.is_empty() && !self.rules.self_collision;
-        let step_m = match self.rules.step_m {
-            Some(step_m) if step_m > 0.0 => step_m,
-            _ if is_open => f64::INFINITY,
-            _ => chain.step_m(),
-        };
-        let n = (way_m / step_m).ceil().max(1.0);
-        if n > MAX_SUB_STEPS {
-            return Err(InputError::new(
-                "target",
-                format!("is {way_m} m away, which takes {n} steps of {step_m} m"),
-                "go there in several requests",
-            ));
-        }
-        Ok(n as usize)
+        n_sub_steps(&self.rules, chain.step_m(), obstacles.is_empty(), way_m)
     }
 
     fn stopped(&mut self, chain: &mut Chain<D>, mode: Mode, veto: Veto<D>) -> Outcome<D> {
@@ -418,6 +404,29 @@ impl<const D: usize> Propagator<D> {
     }
 }
 
+/// Returns the number of sub-steps of a way. `is_empty` says that there is no obstacle.
+fn n_sub_steps(
+    rules: &Rules,
+    least_step_m: f64,
+    is_empty: bool,
+    way_m: f64,
+) -> Result<usize, InputError> {
+    let step_m = match rules.step_m {
+        Some(step_m) if step_m > 0.0 => step_m,
+        _ if is_empty && !rules.self_collision => f64::INFINITY,
+        _ => least_step_m,
+    };
+    let n = (way_m / step_m).ceil().max(1.0);
+    if n > MAX_SUB_STEPS {
+        return Err(InputError::new(
+            "target",
+            format!("is {way_m} m away, which takes {n} steps of {step_m} m"),
+            "go there in several requests",
+        ));
+    }
+    Ok(n as usize)
+}
+
 /// Whether a second try finds slaves more places: rods of other lengths, and in the plane also the
 /// other side.
 fn may_go_elsewhere<const D: usize>(chain: &Chain<D>, head: usize, direction: Direction) -> bool {
@@ -461,7 +470,7 @@ impl<const D: usize> Scene<'_, D> {
         let from = self.chain.points()[k];
         let radius_m = self.chain.connectors()[k].radius_m;
         let near = swept([from, from, to, to], radius_m);
-        let mut worst: Option<(f64, Refusal)> = None;
+        let mut worst: Option<(f64, Name, Reason)> = None;
         self.visit_blocks(&near, (None, k), |block| {
             let keep_m = block.radius_m + radius_m;
             if !block.stops_tip || block.core.is_clear_of_segment([from, to], needed_m(keep_m)) {
@@ -474,11 +483,13 @@ impl<const D: usize> Scene<'_, D> {
                 return;
             }
             let reason = if was_inside { Reason::Inside } else { Reason::TargetBlocked };
-            if worst.as_ref().is_none_or(|(depth_m, _)| after_m > *depth_m) {
-                worst = Some((after_m, Refusal::by(reason, block.name)));
+            let deeper =
+                worst.is_none_or(|(w, name, _)| after_m > w || (after_m == w && block.name < name));
+            if deeper {
+                worst = Some((after_m, block.name, reason));
             }
         });
-        worst.map_or(Ok(()), |(_, refusal)| Err(refusal))
+        worst.map_or(Ok(()), |(_, name, reason)| Err(Refusal::by(reason, name)))
     }
 }
 
@@ -536,6 +547,7 @@ fn check<const D: usize>(chain: &Chain<D>, heads: &Heads<D>) -> Result<(), Input
     heads.to.iter().find(|to| !is_in_range(to)).map_or(Ok(()), |to| Err(out_of_range(to)))
 }
 
+pub(crate) mod alone;
 mod apart;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

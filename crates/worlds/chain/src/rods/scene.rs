@@ -83,9 +83,9 @@ impl Name {
 
 /// An objection, before the length of the motion is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Refusal {
-    pub(super) reason: Reason,
-    pub(super) obstacle: Option<u32>,
+pub(crate) struct Refusal {
+    pub(crate) reason: Reason,
+    pub(crate) obstacle: Option<u32>,
 }
 
 impl Refusal {

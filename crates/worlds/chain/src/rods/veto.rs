@@ -9,7 +9,7 @@ use std::fmt;
 use std::ops::Range;
 
 /// Source of a request (slide R4).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Source {
     /// The connector itself.
     Autonomous,
@@ -155,7 +155,7 @@ impl fmt::Display for Reason {
 }
 
 /// An objection.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Veto<const D: usize> {
     /// The connector that objects; the path of the veto is from the initiator to it.
     pub by: usize,
@@ -166,6 +166,7 @@ pub struct Veto<const D: usize> {
     /// The obstacle concerned, if any.
     pub obstacle: Option<u32>,
     /// The place that the initiator could have reached.
+    #[serde(with = "super::wire")]
     pub reached: Point<D>,
 }
 
@@ -180,7 +181,7 @@ impl<const D: usize> fmt::Display for Veto<D> {
 }
 
 /// A motion that took place.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Moved<const D: usize> {
     /// Connectors that reacted, including the initiator.
     pub touched: Range<usize>,
@@ -195,7 +196,7 @@ pub struct Moved<const D: usize> {
 }
 
 /// Outcome of a request.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Outcome<const D: usize> {
     /// The chain moved.
     Moved(Moved<D>),

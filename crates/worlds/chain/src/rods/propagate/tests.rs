@@ -39,7 +39,7 @@ mod apart;
 mod corridor;
 mod degenerate;
 mod laws;
-mod random_worlds;
+pub(crate) mod random_worlds;
 mod symmetry;
 mod tunnel;
 

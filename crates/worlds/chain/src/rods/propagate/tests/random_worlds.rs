@@ -6,16 +6,16 @@ use crate::scenes::own_clearance_m;
 use std::f64::consts::PI;
 
 /// A chain, what is around it, and how it reacts. Nothing is wrong in it at the start.
-pub(super) struct AnyWorld<const D: usize> {
-    pub(super) chain: Chain<D>,
+pub(crate) struct AnyWorld<const D: usize> {
+    pub(crate) chain: Chain<D>,
     pub(super) all: Vec<Obstacle<D>>,
-    pub(super) obstacles: Obstacles<D>,
-    pub(super) rules: Rules,
-    pub(super) numbers: Numbers,
+    pub(crate) obstacles: Obstacles<D>,
+    pub(crate) rules: Rules,
+    pub(crate) numbers: Numbers,
 }
 
 impl<const D: usize> AnyWorld<D> {
-    pub(super) fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         let mut numbers = Numbers::new(seed);
         let mut chain = any_chain(seed, &mut numbers);
         constrain(&mut chain, &mut numbers);
@@ -30,7 +30,7 @@ impl<const D: usize> AnyWorld<D> {
     }
 
     /// Somewhere within `half_m` of where a connector is, or a rod moved rigidly.
-    pub(super) fn any_request(&mut self, half_m: f64) -> Request<D> {
+    pub(crate) fn any_request(&mut self, half_m: f64) -> Request<D> {
         let numbers = &mut self.numbers;
         let n = self.chain.points().len();
         let k = (numbers.unit() * n as f64) as usize;

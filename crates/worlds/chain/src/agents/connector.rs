@@ -1,0 +1,347 @@
+//! The agent of one connector: its identity, its links, its clock, and the end of its cycle.
+
+mod climb;
+mod clock;
+mod follow;
+mod lead;
+
+use super::control::{Ended, Led};
+use super::link::Link;
+use super::message::{Message, Packet};
+use super::network::{Patience, Traffic};
+use super::side::{Both, Side};
+use super::sight::{Role, Sight};
+use crate::motion::replan::Rungs;
+use crate::rods::chain::{Chain, Rod};
+use crate::rods::geometry::Point;
+use crate::rods::obstacle::Obstacles;
+use crate::rods::propagate::alone::Alone;
+use crate::rods::rules::Rules;
+use crate::world::ChainWorld;
+use climb::Climbing;
+use follow::Following;
+use lead::Leading;
+use sidestep_kernel::{Cycle, EntityId, InputError};
+
+/// Most packets that wait for the beginning of their cycle.
+const MOST_HELD: usize = 64;
+
+/// The program aboard one connector of a chain.
+///
+/// Packets and ticks go in, packets come out; [`Self::control`] is there when its cycle is over. It
+/// never panics on what comes from the network. It keeps nothing from one cycle to the next that a
+/// result depends on, so one that was killed may be started anew.
+#[derive(Debug, Clone)]
+pub struct ConnectorAgent<const D: usize> {
+    /// Number of its connector in its chain of `n`, and the id of connector 0 on the network.
+    me: u32,
+    n: u32,
+    first_id: EntityId,
+    radio: Option<Radio>,
+    rungs: Rungs,
+    /// The rods to its neighbors.
+    rods: Both<Option<Rod>>,
+    alone: Alone<D>,
+    /// Obstacles that its sensors see in this cycle.
+    obstacles: Obstacles<D>,
+    /// The cycle; none before the first.
+    cycle: Option<Cycle>,
+    began: u64,
+    now: u64,
+    place: Track<D>,
+    beside: Both<Option<Track<D>>>,
+    links: Both<Option<Link<Message<D>>>>,
+    missing: Both<Option<u32>>,
+    /// Packets of cycles that have not begun here yet.
+    held: Vec<(Side, Packet<D>)>,
+    following: Option<Following>,
+    leading: Option<Leading<D>>,
+    climbing: Option<Climbing<D>>,
+    /// Number of the motion that it makes in this cycle.
+    goes_in: Option<u32>,
+    led: Option<Led>,
+    ended: Option<Ended<D>>,
+    is_silent: bool,
+    /// Whether the leader has finished, and whether time is up.
+    is_over: bool,
+    is_closed: bool,
+    is_late: bool,
+    traffic: Traffic,
+}
+
+/// The time that it waits for others, where messages may get lost.
+#[derive(Debug, Clone, Copy)]
+struct Radio {
+    patience: Patience,
+    /// Number of ticks after which the talk of a cycle ends.
+    ticks: u64,
+}
+
+/// A packet on its way out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Outgoing {
+    /// Id of the neighbor that it is for.
+    pub to: EntityId,
+    /// Its bytes.
+    pub payload: Vec<u8>,
+}
+
+/// A place while a motion is prepared.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Track<const D: usize> {
+    /// The place outside of motions,
+    settled: Point<D>,
+    /// after the sub-steps that are accepted,
+    base: Point<D>,
+    /// and after the present one.
+    now: Point<D>,
+}
+
+impl<const D: usize> Track<D> {
+    fn at(place: Point<D>) -> Self {
+        Self { settled: place, base: place, now: place }
+    }
+
+    /// Begins another motion.
+    fn begin(&mut self) {
+        *self = Self::at(self.settled);
+    }
+
+    /// Accepts the present sub-step.
+    fn accept(&mut self) {
+        self.base = self.now;
+    }
+
+    /// Takes the present sub-step back.
+    fn take_back(&mut self) {
+        self.now = self.base;
+    }
+
+    /// Ends the motion.
+    fn settle(&mut self, goes: bool) {
+        *self = Self::at(if goes { self.now } else { self.settled });
+    }
+}
+
+impl<const D: usize> ConnectorAgent<D> {
+    /// Returns the agent of a connector in a compiled world, all of which it is told being its own
+    /// limits, its rods and the rules of its chain.
+    ///
+    /// # Panics
+    /// When the world has no such connector.
+    pub fn new(world: &ChainWorld<D>, chain: EntityId, connector: u32) -> Self {
+        let spec = &world.chains[chain as usize];
+        let mut agent = Self::of(&spec.start, connector, &world.rules, world.rungs);
+        agent.first_id = world.first_id(chain);
+        agent.radio = world
+            .network
+            .as_ref()
+            .map(|network| Radio { patience: network.patience(), ticks: network.deadline_ticks() });
+        agent
+    }
+
+    /// Returns the agent of connector `k` of a chain, on a network that loses nothing.
+    pub(crate) fn of(chain: &Chain<D>, k: u32, rules: &Rules, rungs: Rungs) -> Self {
+        let n = chain.points().len() as u32;
+        let rod = |side: Side| side.of(k, n).map(|j| chain.rod_between(k as usize, j as usize));
+        Self {
+            me: k,
+            n,
+            first_id: 0,
+            radio: None,
+            rungs,
+            rods: Both::of(rod),
+            alone: Alone::new(chain, k as usize, rules),
+            obstacles: Obstacles::default(),
+            cycle: None,
+            began: 0,
+            now: 0,
+            place: Track::at(chain.points()[k as usize]),
+            beside: Both::default(),
+            links: Both::default(),
+            missing: Both::default(),
+            held: Vec::new(),
+            following: None,
+            leading: None,
+            climbing: None,
+            goes_in: None,
+            led: None,
+            ended: None,
+            is_silent: false,
+            is_over: false,
+            is_closed: false,
+            is_late: false,
+            traffic: Traffic::default(),
+        }
+    }
+
+    /// Returns the same agent on a network that may lose messages.
+    #[cfg(test)]
+    pub(crate) fn on(self, network: Option<&super::network::Network>) -> Self {
+        let radio = network
+            .map(|network| Radio { patience: network.patience(), ticks: network.deadline_ticks() });
+        Self { radio, ..self }
+    }
+
+    /// Returns its id on the network.
+    pub fn id(&self) -> EntityId {
+        self.first_id + self.me
+    }
+
+    /// Begins a cycle, whose talk starts in a tick. Packets are to be taken after it.
+    ///
+    /// # Errors
+    /// When a number of the sight makes no sense; then the agent is as before.
+    pub fn begin(&mut self, sight: Sight<D>, tick: u64) -> Result<(), InputError> {
+        self.obstacles.set_moving(&sight.checked(self.me, self.n)?)?;
+        self.alone.set_max_bend_rad(sight.max_bend_rad)?;
+        (self.cycle, self.began, self.now) = (Some(sight.cycle), tick, tick);
+        self.place = Track::at(sight.at.0);
+        let [below, above] = sight.neighbors;
+        let track = |side| if side == Side::Below { below } else { above };
+        self.beside = Both::of(|side| track(side).map(|place| Track::at(place.0)));
+        let [below, above] = sight.missing;
+        self.missing = Both::of(|side| if side == Side::Below { below } else { above });
+        (self.following, self.leading, self.climbing) = (None, None, None);
+        (self.goes_in, self.led, self.ended) = (None, None, None);
+        self.is_silent = sight.is_silent;
+        (self.is_over, self.is_closed, self.is_late) = (false, sight.is_silent, false);
+        self.traffic = Traffic::default();
+        self.begin_links();
+        self.play(sight.role);
+        self.take_held(sight.cycle);
+        Ok(())
+    }
+
+    fn begin_links(&mut self) {
+        let (me, n, missing) = (self.me, self.n, self.missing);
+        let patience = self.radio.map(|radio| radio.patience);
+        self.links = Both::of(|side| {
+            let neighbor = side.of(me, n)?;
+            let mut link = Link::new(patience, missing[side] == Some(neighbor));
+            // Where messages get lost, neighbors find out in every cycle whether they are in touch.
+            if patience.is_some() {
+                link.say(Message::Here);
+            }
+            Some(link)
+        });
+    }
+
+    /// Takes up its part in this cycle.
+    fn play(&mut self, role: Role<D>) {
+        let missing = self.nearest_missing().or(self.is_silent.then_some(self.me));
+        match (role, missing) {
+            (Role::Follows, _) => return,
+            (Role::Rests, _) => self.ended = Some(Ended::Rested),
+            (Role::Leads(_), Some(missing)) => self.ended = Some(Ended::Stands { missing }),
+            (Role::Leads(wish), None) => {
+                self.climbing = Some(Climbing::new(wish, self.place.base));
+                return self.run();
+            }
+        }
+        self.finish(None);
+    }
+
+    /// Takes the packets that came before the cycle had begun here.
+    fn take_held(&mut self, cycle: Cycle) {
+        let held = std::mem::take(&mut self.held);
+        for (side, packet) in held {
+            match packet.cycle.cmp(&cycle) {
+                std::cmp::Ordering::Less => {}
+                std::cmp::Ordering::Equal => self.take(side, packet),
+                std::cmp::Ordering::Greater => self.held.push((side, packet)),
+            }
+        }
+    }
+
+    /// Takes a packet. One that comes from no neighbor, cannot be read or makes no sense is counted
+    /// and dropped.
+    pub fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
+        self.now = self.now.max(tick);
+        let neighbor = |side: &Side| side.of(self.me, self.n).map(|k| self.first_id + k);
+        let side = Side::ALL.into_iter().find(|side| neighbor(side) == Some(from));
+        let packet = Packet::read(bytes, self.n);
+        let (Some(side), Some(packet)) = (side, packet) else {
+            self.traffic.dropped += 1;
+            return;
+        };
+        match self.cycle {
+            Some(cycle) if packet.cycle == cycle => self.take(side, packet),
+            Some(cycle) if packet.cycle < cycle => {}
+            _ if self.held.len() < MOST_HELD => self.held.push((side, packet)),
+            _ => self.traffic.dropped += 1,
+        }
+    }
+
+    fn take(&mut self, side: Side, packet: Packet<D>) {
+        if self.is_silent {
+            return;
+        }
+        let Some(link) = &mut self.links[side] else { return };
+        let messages = link.take(packet.parcel);
+        let beyond = packet.missing.filter(|k| side.has(*k, self.me));
+        self.misses(side, beyond);
+        for message in messages {
+            self.on_message(side, message);
+        }
+        self.run();
+    }
+
+    fn on_message(&mut self, from: Side, message: Message<D>) {
+        if self.is_over || self.is_closed {
+            return;
+        }
+        match message {
+            Message::Here => {}
+            Message::Prepare(prepare) => self.on_prepare(from, &prepare),
+            Message::Consent(consent) => self.on_consent(from, &consent),
+            Message::Object(objection) => self.on_objection(from, objection),
+            Message::Settle { request, goes } => self.on_settle(from, request, goes),
+            Message::Over => self.finish(Some(from)),
+            Message::AskEnd | Message::Order(_) => self.on_order(from, message),
+            Message::End(..) | Message::Done(_) => self.on_answer(from, message),
+        }
+    }
+
+    /// Notes who is lost on one side, and tells the other side if that is news. A leader stops.
+    fn misses(&mut self, side: Side, missing: Option<u32>) {
+        if self.missing[side] == missing {
+            return;
+        }
+        self.missing[side] = missing;
+        self.say(side.other(), Message::Here);
+        if let Some(missing) = missing {
+            self.give_up_leading();
+            if self.climbing.take().is_some() {
+                self.ended = Some(Ended::Stands { missing });
+                self.finish(None);
+            }
+        }
+    }
+
+    fn nearest_missing(&self) -> Option<u32> {
+        let both = Side::ALL.into_iter().filter_map(|side| self.missing[side]);
+        both.min_by_key(|k| k.abs_diff(self.me))
+    }
+
+    /// Says something to a neighbor, if there is one.
+    fn say(&mut self, to: Side, message: Message<D>) {
+        if let Some(link) = &mut self.links[to] {
+            link.say(message);
+        }
+    }
+
+    /// Ends the cycle, as the leader does or says.
+    fn finish(&mut self, from: Option<Side>) {
+        self.give_up_leading();
+        self.is_over = true;
+        for side in Side::ALL.into_iter().filter(|side| Some(*side) != from) {
+            self.say(side, Message::Over);
+        }
+    }
+
+    /// Does what can be done before the next message.
+    fn run(&mut self) {
+        while self.go_on_leading() || self.climb_on() {}
+    }
+}

@@ -1,0 +1,98 @@
+//! The clock of an agent, its packets on their way out, and the end of its cycle.
+
+use super::{ConnectorAgent, Outgoing};
+use crate::agents::control::{Control, Goes};
+use crate::agents::link::Link;
+use crate::agents::message::Packet;
+use crate::agents::side::Side;
+
+impl<const D: usize> ConnectorAgent<D> {
+    /// Looks at the clock: sends again what was not confirmed, and gives up who never confirms.
+    pub fn on_timer(&mut self, tick: u64) {
+        self.now = self.now.max(tick);
+        for side in Side::ALL {
+            let link = self.links[side].as_mut().filter(|_| !self.is_silent);
+            if link.is_some_and(|link| link.on_timer(tick)) {
+                self.misses(side, side.of(self.me, self.n));
+            }
+        }
+        if !self.is_done() && self.deadline().is_some_and(|deadline| deadline <= tick) {
+            self.close();
+        }
+        self.run();
+    }
+
+    /// Ends the cycle because time is up. Who has not been heard at all is lost.
+    fn close(&mut self) {
+        for side in Side::ALL {
+            if self.links[side].as_ref().is_some_and(|link| !link.is_heard()) {
+                self.misses(side, side.of(self.me, self.n));
+            }
+        }
+        self.give_up_leading();
+        self.climbing = None;
+        self.is_late = !self.is_over && self.nearest_missing().is_none();
+        self.is_closed = true;
+    }
+
+    /// Returns the next tick in which it has to look at the clock, if there is one.
+    pub fn next_timer(&self) -> Option<u64> {
+        if self.is_done() {
+            return None;
+        }
+        let links = Side::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
+        links.filter_map(Link::due).chain(self.deadline()).min()
+    }
+
+    /// Returns the tick in which its cycle ends in any case; none where messages never get lost.
+    pub fn deadline(&self) -> Option<u64> {
+        self.radio.map(|radio| self.began.saturating_add(radio.ticks))
+    }
+
+    /// Returns the packets that it sends now.
+    pub fn take_packets(&mut self) -> Vec<Outgoing> {
+        let (Some(cycle), false) = (self.cycle, self.is_silent) else { return Vec::new() };
+        let mut out = Vec::new();
+        for side in Side::ALL {
+            let Some(neighbor) = side.of(self.me, self.n) else { continue };
+            let missing = self.missing[side.other()];
+            let Some(parcel) = self.links[side].as_mut().and_then(|link| link.parcel(self.now))
+            else {
+                continue;
+            };
+            let payload = Packet { cycle, missing, parcel }.bytes();
+            self.traffic.count(payload.len());
+            out.push(Outgoing { to: self.first_id + neighbor, payload });
+        }
+        out
+    }
+
+    /// Whether its cycle is over. It goes on answering questions.
+    pub fn is_done(&self) -> bool {
+        let mut links = Side::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
+        self.is_closed || self.is_over && links.all(Link::is_quiet)
+    }
+
+    /// Returns what its connector does in this cycle; none before the cycle is over.
+    pub fn control(&self) -> Option<Control<D>> {
+        let cycle = self.cycle.filter(|_| self.is_done())?;
+        let doubt = self.following.as_ref().filter(|following| following.has_consented);
+        let goes = match (self.goes_in, doubt) {
+            (Some(request), _) => Goes::To { request, to: self.place.settled },
+            (None, Some(following)) => {
+                Goes::WithItsMaster { request: following.request, to: self.place.now }
+            }
+            (None, None) => Goes::Stays,
+        };
+        Some(Control {
+            connector: self.me,
+            cycle,
+            goes,
+            led: self.led,
+            ended: self.ended.clone(),
+            missing: Side::ALL.map(|side| self.missing[side]),
+            is_late: self.is_late,
+            traffic: self.traffic,
+        })
+    }
+}

@@ -1,0 +1,202 @@
+//! A connector as a slave: it reacts to its master, and is the master of the next one.
+
+use super::ConnectorAgent;
+use crate::agents::message::{Consent, Message, Objection, Prepare};
+use crate::agents::side::Side;
+use crate::rods::chain::Rod;
+use crate::rods::geometry::distance;
+use crate::rods::propagate::alone::{Alone, Pull, Reaction};
+use crate::rods::scene::Refusal;
+use crate::rods::veto::Reason;
+use crate::rods::wire::Place;
+
+/// A motion in which a connector is a slave.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Following {
+    /// Number of the motion in its cycle.
+    pub(super) request: u32,
+    sub_step: u32,
+    master: Side,
+    /// Whether it has asked the connector beyond it,
+    has_asked: bool,
+    /// and waits for the answer.
+    waits: bool,
+    /// Whether it has consented to the present sub-step.
+    pub(super) has_consented: bool,
+    rotated: bool,
+    has_others: bool,
+    has_turned: bool,
+}
+
+impl<const D: usize> ConnectorAgent<D> {
+    /// Answers a master, or asks the next connector first.
+    pub(super) fn on_prepare(&mut self, from: Side, prepare: &Prepare<D>) {
+        let Some(rod) = self.rods[from].filter(|_| self.leading.is_none()) else { return };
+        let before = self.following.take().filter(|f| f.request == prepare.request);
+        if before.is_none() {
+            self.begin_motion();
+        }
+        if before.as_ref().is_none_or(|f| f.sub_step != prepare.sub_step) {
+            self.accept();
+        }
+        if let Some(master) = &mut self.beside[from] {
+            (master.base, master.now) = (prepare.mo, prepare.mn);
+        }
+        match self.reaction((from, rod), prepare) {
+            Ok(reaction) => {
+                self.follow(from, prepare, &reaction, before.is_some_and(|f| f.has_asked));
+            }
+            Err(refusal) => {
+                self.place.take_back();
+                self.following = before.map(|f| Following { has_consented: false, ..f });
+                self.object(from, refusal, Alone::<D>::may_go_elsewhere(rod));
+            }
+        }
+    }
+
+    /// Goes where its reaction takes it, and asks the next connector if that one has to react. It
+    /// may have asked that one in an earlier sub-step.
+    fn follow(
+        &mut self,
+        from: Side,
+        prepare: &Prepare<D>,
+        reaction: &Reaction<D>,
+        had_asked: bool,
+    ) {
+        let Reaction { at, ends, rotated, has_others, has_turned } = *reaction;
+        self.place.now = at;
+        let onward = from.other();
+        let asks = !ends && self.rods[onward].is_some();
+        self.following = Some(Following {
+            request: prepare.request,
+            sub_step: prepare.sub_step,
+            master: from,
+            has_asked: had_asked || asks,
+            waits: asks,
+            has_consented: !asks,
+            rotated,
+            has_others,
+            has_turned,
+        });
+        if asks {
+            let (mo, mn, prev) = (self.place.base, at, Some(Place(prepare.mn)));
+            let max_bend_rad = self.alone.max_bend_rad();
+            self.say(onward, Message::Prepare(Prepare { mo, mn, prev, max_bend_rad, ..*prepare }));
+        } else {
+            let nobody = Consent { at, touched: 0, changed: 0, rotated: 0, longest_m: 0.0 };
+            let consent = if ends { nobody } else { self.joined(&nobody, rotated) };
+            self.say(from, Message::Consent(consent));
+        }
+    }
+
+    fn reaction(
+        &mut self,
+        (from, rod): (Side, Rod),
+        prepare: &Prepare<D>,
+    ) -> Result<Reaction<D>, Refusal> {
+        let onward = from.other();
+        let next = self.beside[onward].map(|track| track.base).zip(self.rods[onward]);
+        let pull = Pull {
+            mo: prepare.mo,
+            mn: prepare.mn,
+            prev: prepare.prev.map(|place| place.0),
+            max_bend_rad: prepare.max_bend_rad,
+            is_open: prepare.is_open,
+            all_lengths: prepare.all_lengths,
+        };
+        self.alone.react((self.place.base, rod), next, &self.obstacles, &pull)
+    }
+
+    fn object(&mut self, to: Side, refusal: Refusal, may_go_elsewhere: bool) {
+        let Refusal { reason, obstacle } = refusal;
+        let by = self.me;
+        let objection = Objection { by, reason, obstacle, has_turned: false, may_go_elsewhere };
+        self.say(to, Message::Object(objection));
+    }
+
+    /// Adds this connector's part to the sums of a consent.
+    fn joined(&self, beyond: &Consent<D>, rotated: bool) -> Consent<D> {
+        let way_m = distance(self.place.base, self.place.now);
+        Consent {
+            at: self.place.now,
+            touched: beyond.touched + 1,
+            changed: beyond.changed + u32::from(self.place.base != self.place.now),
+            rotated: beyond.rotated + u32::from(rotated),
+            longest_m: beyond.longest_m.max(way_m),
+        }
+    }
+
+    /// Passes a consent on to its master, or to the motion that it leads.
+    pub(super) fn on_consent(&mut self, from: Side, consent: &Consent<D>) {
+        let waiting = self.following.as_mut().filter(|f| f.waits && f.master == from.other());
+        if let Some(following) = waiting {
+            (following.waits, following.has_consented) = (false, true);
+            let (master, rotated) = (following.master, following.rotated);
+            self.is_beside(from, consent);
+            let joined = self.joined(consent, rotated);
+            self.say(master, Message::Consent(joined));
+        } else if self.is_led_past(from, consent) {
+            self.is_beside(from, consent);
+        }
+    }
+
+    fn is_beside(&mut self, side: Side, consent: &Consent<D>) {
+        if let Some(beside) = &mut self.beside[side] {
+            beside.now = consent.at;
+        }
+    }
+
+    /// Passes an objection on to its master, or to the motion that it leads. Where this connector could have
+    /// gone elsewhere, the search for a way is what has ended.
+    pub(super) fn on_objection(&mut self, from: Side, objection: Objection) {
+        let waiting = self.following.as_mut().filter(|f| f.waits && f.master == from.other());
+        let Some(following) = waiting else { return self.is_led_against(from, &objection) };
+        following.waits = false;
+        let Following { master, has_others, has_turned, .. } = *following;
+        self.place.take_back();
+        if let Some(beside) = &mut self.beside[from] {
+            beside.take_back();
+        }
+        let may_go_elsewhere = self.rods[master].is_some_and(Alone::<D>::may_go_elsewhere);
+        let reason = if has_others { Reason::Limit } else { objection.reason };
+        let objection = Objection {
+            reason,
+            has_turned: objection.has_turned || has_turned,
+            may_go_elsewhere: objection.may_go_elsewhere || may_go_elsewhere,
+            ..objection
+        };
+        self.say(master, Message::Object(objection));
+    }
+
+    /// Goes, or stays where it was before the motion, and passes that on.
+    pub(super) fn on_settle(&mut self, from: Side, request: u32, goes: bool) {
+        let is_its = |f: &mut Following| {
+            (f.request, f.master) == (request, from) && (f.has_consented || !goes)
+        };
+        let Some(following) = self.following.take_if(is_its) else { return };
+        self.settle_motion(goes.then_some(request));
+        if following.has_asked {
+            self.say(from.other(), Message::Settle { request, goes });
+        }
+    }
+
+    /// Begins another motion, from the places where all are.
+    pub(super) fn begin_motion(&mut self) {
+        self.place.begin();
+        self.beside.each(|_, beside| beside.iter_mut().for_each(|track| track.begin()));
+    }
+
+    /// Accepts the present sub-step of a motion.
+    pub(super) fn accept(&mut self) {
+        self.place.accept();
+        self.beside.each(|_, beside| beside.iter_mut().for_each(|track| track.accept()));
+    }
+
+    /// Ends a motion, which is carried out if it has a number here.
+    pub(super) fn settle_motion(&mut self, request: Option<u32>) {
+        let goes = request.is_some();
+        self.place.settle(goes);
+        self.beside.each(|_, beside| beside.iter_mut().for_each(|track| track.settle(goes)));
+        self.goes_in = request.or(self.goes_in);
+    }
+}

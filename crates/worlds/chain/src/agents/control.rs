@@ -1,0 +1,84 @@
+//! Decision of an agent at the end of a cycle.
+
+use super::network::Traffic;
+use crate::motion::replan::{Climbed, Memory};
+use crate::rods::geometry::Point;
+use crate::rods::veto::Veto;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::Cycle;
+
+/// A connector's motion in a cycle, and the outcome of its talk.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Control<const D: usize> {
+    /// The connector's number in its chain.
+    pub connector: u32,
+    /// The cycle.
+    pub cycle: Cycle,
+    /// Its motion.
+    pub goes: Goes<D>,
+    /// The motion that it led and that is carried out, if there is one.
+    pub led: Option<Led>,
+    /// The end of its wish, if it leads the chain; none where time was up before.
+    pub ended: Option<Ended<D>>,
+    /// The nearest lost connectors below and above.
+    pub missing: [Option<u32>; 2],
+    /// Whether time was up before its leader had finished.
+    pub is_late: bool,
+    /// The count of its packets.
+    pub traffic: Traffic,
+}
+
+/// Motion of a connector.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Goes<const D: usize> {
+    /// It stays.
+    Stays,
+    /// It goes, in the motion with a number.
+    To {
+        /// The number.
+        request: u32,
+        /// Its new place, meters.
+        #[serde(with = "crate::rods::wire")]
+        to: Point<D>,
+    },
+    /// It has consented to a motion and heard no more of it: it goes if its master goes.
+    WithItsMaster {
+        /// The number of the motion.
+        request: u32,
+        /// Its new place, meters.
+        #[serde(with = "crate::rods::wire")]
+        to: Point<D>,
+    },
+}
+
+/// A motion that is carried out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Led {
+    /// Its number.
+    pub request: u32,
+    /// The first connector that takes part,
+    pub first: u32,
+    /// and the last.
+    pub last: u32,
+}
+
+/// End of a leader's wish.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Ended<const D: usize> {
+    /// It was carried out, or not, by the ladder.
+    Climbed {
+        /// The rung.
+        climbed: Climbed<D>,
+        /// The objection to the wish itself, if there was one.
+        objection: Option<Veto<D>>,
+        /// Its memory after that.
+        memory: Memory,
+    },
+    /// The chain stands, because a connector is lost.
+    Stands {
+        /// The connector.
+        missing: u32,
+    },
+    /// There was no wish.
+    Rested,
+}

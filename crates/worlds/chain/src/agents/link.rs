@@ -1,0 +1,148 @@
+//! Messages between two neighbors over a network that loses, delays, doubles and reorders packets:
+//! each arrives once, and in the order in which they were sent.
+//!
+//! Messages are numbered, and kept until the neighbor has confirmed them. What is not confirmed in
+//! time is sent again; a neighbor that does not confirm anything, although sent to so often that it
+//! can hardly be alive and in touch, counts as lost, until something comes from it.
+
+use super::network::Patience;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, VecDeque};
+
+/// Most messages that are kept because an earlier one is missing.
+const MOST_EARLY: u32 = 256;
+
+/// One end of a link, for the time of a cycle.
+#[derive(Debug, Clone)]
+pub(super) struct Link<M> {
+    /// None where nothing is ever lost: then nothing is confirmed or sent again either.
+    patience: Option<Patience>,
+    /// Repetitions until the neighbor counts as lost.
+    tries: u32,
+    /// Messages that are not confirmed, the first of which has the number `first`.
+    said: VecDeque<M>,
+    first: u32,
+    /// Number of them that have been sent.
+    sent: usize,
+    /// Number of the next message to come, and those that came before their time.
+    next: u32,
+    early: BTreeMap<u32, M>,
+    /// Whether to confirm what has come, and whether to send everything again.
+    owes: bool,
+    again: bool,
+    /// Tick since which it waits for a confirmation, and the number of repetitions since something came.
+    since: u64,
+    unanswered: u32,
+    is_lost: bool,
+    /// Whether anything has come in this cycle.
+    is_heard: bool,
+}
+
+/// Messages on their way, with a confirmation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Parcel<M> {
+    /// Number of its first message.
+    pub(super) first: u32,
+    /// Number of the first message of the other that has not come yet.
+    pub(super) next: u32,
+    /// The messages.
+    pub(super) messages: Vec<M>,
+}
+
+impl<M: Clone> Link<M> {
+    /// Returns a link over which nothing has gone yet. A neighbor that was lost in the cycle before is
+    /// given up sooner.
+    pub(super) fn new(patience: Option<Patience>, was_lost: bool) -> Self {
+        let tries = patience.map_or(0, |p| if was_lost { p.first_tries } else { p.tries });
+        Self {
+            patience,
+            tries,
+            said: VecDeque::new(),
+            first: 0,
+            sent: 0,
+            next: 0,
+            early: BTreeMap::new(),
+            owes: false,
+            again: false,
+            since: 0,
+            unanswered: 0,
+            is_lost: false,
+            is_heard: false,
+        }
+    }
+
+    /// Says something, which the next parcel carries.
+    pub(super) fn say(&mut self, message: M) {
+        self.said.push_back(message);
+    }
+
+    /// Takes a parcel; returns the messages that are new, in order.
+    pub(super) fn take(&mut self, parcel: Parcel<M>) -> Vec<M> {
+        (self.is_heard, self.is_lost, self.unanswered) = (true, false, 0);
+        let confirmed = (parcel.next.saturating_sub(self.first) as usize).min(self.sent);
+        self.said.drain(..confirmed);
+        (self.first, self.sent) = (self.first + confirmed as u32, self.sent - confirmed);
+        self.owes |= !parcel.messages.is_empty();
+        let numbered = parcel.messages.into_iter().enumerate();
+        for (k, message) in numbered.take(MOST_EARLY as usize) {
+            let number = parcel.first.saturating_add(k as u32);
+            if number >= self.next && number - self.next < MOST_EARLY {
+                self.early.entry(number).or_insert(message);
+            }
+        }
+        let mut new = Vec::new();
+        while let Some(message) = self.early.remove(&self.next) {
+            self.next += 1;
+            new.push(message);
+        }
+        new
+    }
+
+    /// Returns the tick in which its patience ends; none while it waits for nothing.
+    pub(super) fn due(&self) -> Option<u64> {
+        let Patience { ticks, .. } = self.patience.filter(|_| self.sent > 0 && !self.is_lost)?;
+        Some(self.since.saturating_add(ticks))
+    }
+
+    /// Looks at the clock; returns whether the neighbor is lost from now on.
+    pub(super) fn on_timer(&mut self, tick: u64) -> bool {
+        if self.due().is_none_or(|due| due > tick) {
+            return false;
+        }
+        self.is_lost = self.unanswered >= self.tries;
+        self.again = !self.is_lost;
+        self.unanswered += 1;
+        self.is_lost
+    }
+
+    /// Returns the parcel that is to be sent now, if there is anything to say or to confirm.
+    pub(super) fn parcel(&mut self, tick: u64) -> Option<Parcel<M>> {
+        let from = if self.again { 0 } else { self.sent };
+        let confirms = self.owes && self.patience.is_some();
+        if from == self.said.len() && !confirms {
+            return None;
+        }
+        let messages: Vec<M> = self.said.range(from..).cloned().collect();
+        let parcel = Parcel { first: self.first + from as u32, next: self.next, messages };
+        if self.again || self.sent == 0 {
+            self.since = tick;
+        }
+        (self.owes, self.again, self.sent) = (false, false, self.said.len());
+        if self.patience.is_none() {
+            self.first += self.said.len() as u32;
+            self.said.clear();
+            self.sent = 0;
+        }
+        Some(parcel)
+    }
+
+    /// Whether everything has arrived, or the neighbor is lost.
+    pub(super) fn is_quiet(&self) -> bool {
+        self.is_lost || self.said.is_empty()
+    }
+
+    /// Whether anything has come from the neighbor in this cycle.
+    pub(super) fn is_heard(&self) -> bool {
+        self.is_heard
+    }
+}

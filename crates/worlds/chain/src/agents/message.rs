@@ -1,0 +1,181 @@
+//! The messages of neighbors, and their form on the network. Whatever comes from there is checked
+//! here, once, before an agent sees it.
+
+use super::link::Parcel;
+use crate::rods::chain::is_in_range;
+use crate::rods::geometry::Point;
+use crate::rods::veto::{Outcome, Reason, Source, Veto};
+use crate::rods::wire::Place;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::Cycle;
+use std::f64::consts::PI;
+
+/// First byte of every packet: another number is another protocol.
+const VERSION: u8 = 1;
+/// Largest packet that is read, bytes; the largest that is ever sent is a fraction of it.
+const MOST_BYTES: usize = 1 << 16;
+
+/// A packet: what an agent tells a neighbor in one go.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Packet<const D: usize> {
+    /// The cycle that it belongs to.
+    pub(super) cycle: Cycle,
+    /// The nearest lost connector beyond the sender, as the receiver sees it.
+    pub(super) missing: Option<u32>,
+    pub(super) parcel: Parcel<Message<D>>,
+}
+
+/// A message between neighbors.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) enum Message<const D: usize> {
+    /// "I am here." The packet around it says who is lost.
+    Here,
+    /// From a master: "I am to go there. Can you follow?"
+    Prepare(Prepare<D>),
+    /// From a slave: "I can, and so can all beyond me that have to."
+    Consent(Consent<D>),
+    /// From a slave: "I cannot, or somebody beyond me cannot."
+    Object(Objection),
+    /// From a master: "All of that motion is carried out", or none of it.
+    Settle {
+        /// Number of the motion.
+        request: u32,
+        /// Whether it is carried out.
+        goes: bool,
+    },
+    /// From a leader to the far end: "Where are you, and where does your rod point?"
+    AskEnd,
+    /// The answer: place, and direction out of the chain.
+    End(Place<D>, Option<Place<D>>),
+    /// From a leader to the far end: "Lead a motion."
+    Order(Order<D>),
+    /// The answer: its outcome; none if the target is beyond all coordinates.
+    Done(Option<Outcome<D>>),
+    /// From a leader to all: "I have finished this cycle."
+    Over,
+}
+
+/// A master's motion in a sub-step.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Prepare<const D: usize> {
+    /// Number of the motion in its cycle.
+    pub(super) request: u32,
+    /// Number of the sub-step; the one before is accepted.
+    pub(super) sub_step: u32,
+    /// The master before the sub-step,
+    #[serde(with = "crate::rods::wire")]
+    pub(super) mo: Point<D>,
+    /// and after.
+    #[serde(with = "crate::rods::wire")]
+    pub(super) mn: Point<D>,
+    /// The connector on the master's other side, if its place is settled.
+    pub(super) prev: Option<Place<D>>,
+    /// Bend limit of the master, rad.
+    pub(super) max_bend_rad: f64,
+    /// Whether nothing in the world can object.
+    pub(super) is_open: bool,
+    /// Whether rods that turn try all their lengths.
+    pub(super) all_lengths: bool,
+}
+
+/// A slave's consent to a sub-step, with sums over all that react from it outward.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Consent<const D: usize> {
+    /// The slave's place after the sub-step.
+    #[serde(with = "crate::rods::wire")]
+    pub(super) at: Point<D>,
+    /// Number of connectors that react, from the slave outward; 0 if it need not move.
+    pub(super) touched: u32,
+    /// Number of those that move,
+    pub(super) changed: u32,
+    /// and whose rods turn.
+    pub(super) rotated: u32,
+    /// Longest way of one of them, meters.
+    pub(super) longest_m: f64,
+}
+
+/// An objection on its way to the initiator.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Objection {
+    /// The connector that objects.
+    pub(super) by: u32,
+    pub(super) reason: Reason,
+    pub(super) obstacle: Option<u32>,
+    /// Whether a rod before it has found a way by turning,
+    pub(super) has_turned: bool,
+    /// and whether one could go elsewhere if it tried all its lengths.
+    pub(super) may_go_elsewhere: bool,
+}
+
+/// A motion that another connector is to lead.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Order<const D: usize> {
+    /// Number of the motion in its cycle.
+    pub(super) request: u32,
+    /// The target.
+    #[serde(with = "crate::rods::wire")]
+    pub(super) to: Point<D>,
+    pub(super) source: Source,
+    /// Whether there is no obstacle anywhere, and whether nothing in the world can object.
+    pub(super) is_empty: bool,
+    pub(super) is_open: bool,
+    /// Whether to ask only, and not to move.
+    pub(super) only_asks: bool,
+}
+
+impl<const D: usize> Packet<D> {
+    /// Returns its form on the network.
+    pub(super) fn bytes(&self) -> Vec<u8> {
+        postcard::to_stdvec(&(VERSION, self)).expect("a packet is plain data")
+    }
+
+    /// Returns the packet that some bytes are, in a chain of `n` connectors; none if they are no
+    /// packet, or one that no agent sends.
+    pub(super) fn read(bytes: &[u8], n: u32) -> Option<Self> {
+        if bytes.len() > MOST_BYTES || bytes.first() != Some(&VERSION) {
+            return None;
+        }
+        let (packet, rest) = postcard::take_from_bytes::<Self>(&bytes[1..]).ok()?;
+        let is_right = rest.is_empty()
+            && packet.missing.is_none_or(|k| k < n)
+            && packet.parcel.messages.iter().all(|message| message.is_right(n));
+        is_right.then_some(packet)
+    }
+}
+
+fn is_length(length_m: f64) -> bool {
+    length_m.is_finite() && length_m >= 0.0
+}
+
+impl<const D: usize> Message<D> {
+    /// Whether its numbers make sense in a chain of `n` connectors.
+    fn is_right(&self, n: u32) -> bool {
+        let is_place = |place: &Option<Place<D>>| place.is_none_or(|Place(at)| is_in_range(&at));
+        match self {
+            Self::Here | Self::AskEnd | Self::Over | Self::Done(None) | Self::Settle { .. } => true,
+            Self::Prepare(p) => {
+                let is_bend = p.max_bend_rad > 0.0 && p.max_bend_rad <= PI;
+                is_bend && is_in_range(&p.mo) && is_in_range(&p.mn) && is_place(&p.prev)
+            }
+            Self::Consent(c) => {
+                let counts = [c.touched, c.changed, c.rotated];
+                counts.iter().all(|&k| k < n) && is_in_range(&c.at) && is_length(c.longest_m)
+            }
+            Self::Object(objection) => objection.by < n,
+            Self::End(at, ahead) => is_in_range(&at.0) && is_place(ahead),
+            Self::Order(order) => is_in_range(&order.to),
+            Self::Done(Some(Outcome::Vetoed(veto))) => is_veto(veto, n),
+            Self::Done(Some(Outcome::Moved(moved))) => {
+                let touched = &moved.touched;
+                touched.start <= touched.end
+                    && touched.end <= n as usize
+                    && is_length(moved.max_slave_step_m)
+                    && moved.cut_short.as_ref().is_none_or(|veto| is_veto(veto, n))
+            }
+        }
+    }
+}
+
+fn is_veto<const D: usize>(veto: &Veto<D>, n: u32) -> bool {
+    veto.by.max(veto.from) < n as usize && is_in_range(&veto.reached)
+}

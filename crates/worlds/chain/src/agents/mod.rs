@@ -1,0 +1,37 @@
+//! Agents: the programs aboard the connectors of a chain, each with its own data.
+//!
+//! An agent knows its own connector, what its two neighbors tell it, and what its own sensors see
+//! ([`Sight`]). It is a state machine without a clock, a socket or a thread: packets and ticks in,
+//! packets out, and at the end of a cycle what its connector does ([`Control`]).
+//!
+//! ```text
+//! sight.rs, control.rs     in and out of a cycle
+//! connector.rs             the agent: one connector, its links, and the part it plays
+//!   connector/follow.rs    as a slave of a master,
+//!   connector/lead.rs      as the initiator of one motion,
+//!   connector/climb.rs     as a leader, by the ladder of `motion::replan`
+//!   connector/clock.rs     time, packets on their way out, and the end of a cycle
+//! link.rs                  makes messages between two neighbors arrive, once and in order
+//! message.rs               the messages, and the checks of what comes over the network
+//! network.rs               a network's faults, and the traffic on it
+//! side.rs                  below and above along the chain
+//! ```
+//!
+//! A motion is a wave. Its initiator asks one neighbor, which asks the next, until one need not
+//! move or the chain ends; consent or a veto comes back the same way. Then it asks the other one.
+//! So it prepares sub-step after sub-step, and nobody moves. Once all have consented it says
+//! "go", after a veto "stay". Who has consented and hears neither goes if its master goes: it feels
+//! the rod. So a vetoed motion leaves every connector where it was, whatever is lost.
+
+mod connector;
+pub(crate) mod control;
+mod link;
+mod message;
+pub(crate) mod network;
+pub(crate) mod side;
+pub(crate) mod sight;
+
+pub use connector::{ConnectorAgent, Outgoing};
+pub use control::{Control, Ended, Goes, Led};
+pub use network::Traffic;
+pub use sight::{Role, Seen, Shown, Sight, Wish};

@@ -1,0 +1,81 @@
+//! The two sides of a connector: below, toward connector 0, and above.
+
+use serde::{Deserialize, Serialize};
+
+/// One of the two directions along a chain, and the neighbor there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum Side {
+    /// Toward connector 0.
+    Below,
+    /// Toward the last connector.
+    Above,
+}
+
+impl Side {
+    /// Both sides.
+    pub(crate) const ALL: [Self; 2] = [Self::Below, Self::Above];
+
+    /// Returns the opposite direction.
+    pub(crate) fn other(self) -> Self {
+        match self {
+            Self::Below => Self::Above,
+            Self::Above => Self::Below,
+        }
+    }
+
+    /// Returns the neighbor there of connector `k` of `n`, if there is one.
+    pub(crate) fn of(self, k: u32, n: u32) -> Option<u32> {
+        match self {
+            Self::Below => k.checked_sub(1),
+            Self::Above => (k + 1 < n).then_some(k + 1),
+        }
+    }
+
+    /// Whether connector `other` is on this side of connector `k`.
+    pub(crate) fn has(self, other: u32, k: u32) -> bool {
+        match self {
+            Self::Below => other < k,
+            Self::Above => other > k,
+        }
+    }
+}
+
+/// One thing for each side.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Both<T> {
+    below: T,
+    above: T,
+}
+
+impl<T> Both<T> {
+    /// Returns something for each side.
+    pub(crate) fn of(mut make: impl FnMut(Side) -> T) -> Self {
+        Self { below: make(Side::Below), above: make(Side::Above) }
+    }
+
+    /// Visits both.
+    pub(crate) fn each(&mut self, mut visit: impl FnMut(Side, &mut T)) {
+        visit(Side::Below, &mut self.below);
+        visit(Side::Above, &mut self.above);
+    }
+}
+
+impl<T> std::ops::Index<Side> for Both<T> {
+    type Output = T;
+
+    fn index(&self, side: Side) -> &T {
+        match side {
+            Side::Below => &self.below,
+            Side::Above => &self.above,
+        }
+    }
+}
+
+impl<T> std::ops::IndexMut<Side> for Both<T> {
+    fn index_mut(&mut self, side: Side) -> &mut T {
+        match side {
+            Side::Below => &mut self.below,
+            Side::Above => &mut self.above,
+        }
+    }
+}

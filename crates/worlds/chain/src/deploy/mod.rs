@@ -1,0 +1,42 @@
+//! Deployments of the rules by which a chain moves: the same rules, run in several places.
+//!
+//! - `direct`: one process moves a whole chain. The reference.
+//! - `team`: an agent per connector ([`crate::agents`]), which knows its own connector, its two
+//!   neighbors and what its sensors see. On a faultless network every connector is where `direct`
+//!   puts it, bit for bit, because nobody needs to know more: scenarios in which somebody would are
+//!   refused (`crate::scenario::deployment`).
+//!
+//! A deployment shows the connectors of a chain what they perceive (`sense.rs`), lets their agents
+//! talk over a network in memory (`drive.rs`) or elsewhere (`elsewhere.rs` of the world), and carries their decisions
+//! out (`outcome.rs`).
+
+mod drive;
+pub(crate) mod kind;
+mod outcome;
+mod sense;
+#[cfg(test)]
+mod tests;
+
+use crate::agents::{ConnectorAgent, Control, Sight};
+use crate::world::ChainWorld;
+pub use kind::Deployment;
+pub(crate) use outcome::settled;
+use sidestep_kernel::{Cycle, EntityId};
+
+impl<const D: usize> ChainWorld<D> {
+    /// Lets the agents of a chain talk in a cycle; returns their decisions, by connector, of those that
+    /// have come to one.
+    pub(crate) fn talked(
+        &self,
+        (chain, now): (EntityId, Cycle),
+        sights: Vec<Sight<D>>,
+    ) -> Vec<Option<Control<D>>> {
+        let mut agents = self.agents_of(chain);
+        drive::run(drive::Talk::new(self, chain, now), &mut agents, sights)
+    }
+
+    fn agents_of(&self, chain: EntityId) -> Vec<ConnectorAgent<D>> {
+        let n = self.chains[chain as usize].start.points().len() as u32;
+        (0..n).map(|k| ConnectorAgent::new(self, chain, k)).collect()
+    }
+}

@@ -1,0 +1,35 @@
+//! The outcome of the decisions of a chain's connectors.
+
+use crate::agents::{Control, Goes, Led};
+use crate::rods::chain::{Chain, is_in_range};
+use crate::rods::geometry::{Point, distance};
+use crate::rods::scene::fits;
+
+/// Returns the new places of a chain's connectors. At most one motion is carried out, all of it: where
+/// the decision of somebody who takes part in it is missing, is another one, or would tear a rod,
+/// nobody moves.
+pub(crate) fn settled<const D: usize>(
+    chain: &Chain<D>,
+    controls: &[Option<Control<D>>],
+) -> Option<Vec<Point<D>>> {
+    let mut led = controls.iter().flatten().filter_map(|control| control.led);
+    let (Led { request, first, last }, None) = (led.next()?, led.next()) else { return None };
+    let mut points = chain.points().to_vec();
+    for k in first..=last {
+        let control = controls.get(k as usize)?.as_ref().filter(|c| c.connector == k)?;
+        let (Goes::To { request: its, to } | Goes::WithItsMaster { request: its, to }) =
+            control.goes
+        else {
+            return None;
+        };
+        if its != request || !is_in_range(&to) {
+            return None;
+        }
+        *points.get_mut(k as usize)? = to;
+    }
+    let rods = chain.rods().iter().zip(points.windows(2).zip(chain.points().windows(2)));
+    // A rod that was out of its limits before, as in a chain that was broken, may stay so.
+    let mut torn =
+        rods.filter(|(rod, (new, old))| new != old && !fits(**rod, distance(new[0], new[1])));
+    torn.next().is_none().then_some(points)
+}

@@ -1,0 +1,69 @@
+//! Perception of the connectors of a chain at the start of their talk.
+
+use crate::agents::network::Network;
+use crate::agents::side::Side;
+use crate::agents::{Role, Seen, Sight};
+use crate::driver::Task;
+use crate::rods::obstacle::{Obstacles, around};
+use crate::rods::wire::Place;
+use crate::state::Body;
+use crate::world::{ChainSpec, ChainWorld};
+use sidestep_kernel::{Cycle, EntityId};
+
+/// Distance beyond all that a motion needs, meters: far more than tolerances and rounding.
+const SPARE_M: f64 = 1e-3;
+
+impl<const D: usize> ChainWorld<D> {
+    /// Returns the id on the network of a chain's connector 0; the others follow.
+    pub(crate) fn first_id(&self, chain: EntityId) -> EntityId {
+        let before = self.chains[..chain as usize].iter().map(|spec| spec.start.points().len());
+        before.sum::<usize>() as EntityId
+    }
+
+    /// Returns what the connectors of a chain perceive; `leader` has a part of its own.
+    pub(crate) fn sights(
+        &self,
+        (chain, now): (EntityId, Cycle),
+        body: &Body<D>,
+        obstacles: &Obstacles<D>,
+        (leader, role): (usize, &Role<D>),
+    ) -> Vec<Sight<D>> {
+        let points = body.chain.points();
+        let n = points.len() as u32;
+        let at_s = self.starts_s(now);
+        let sees_m = self.sees_m(&self.chains[chain as usize]);
+        let sight = |k: u32| {
+            let connector = body.chain.connectors()[k as usize];
+            let at = points[k as usize];
+            let mut seen = Vec::new();
+            let half_m = sees_m + connector.radius_m;
+            obstacles.visit(&around(at, half_m), |obstacle| seen.push(Seen::of(obstacle)));
+            let neighbor = |side: Side| side.of(k, n).map(|j| Place(points[j as usize]));
+            let is_silent = |network: &Network| network.is_silent(chain, k, at_s);
+            Sight {
+                cycle: now,
+                at: Place(at),
+                neighbors: Side::ALL.map(neighbor),
+                max_bend_rad: connector.max_bend_rad,
+                seen,
+                is_silent: self.network.as_ref().is_some_and(is_silent),
+                missing: body.missing.get(k as usize).copied().unwrap_or_default(),
+                role: if k as usize == leader { role.clone() } else { Role::Follows },
+            }
+        };
+        (0..n).map(sight).collect()
+    }
+
+    /// Returns the distance in which a connector's sensors see all that a motion of a cycle may bring
+    /// its rods near to, meters. Its master is at most a rod's length away, its own place at most
+    /// another one, and both go on for as many sub-steps as the initiator makes.
+    fn sees_m(&self, spec: &ChainSpec<D>) -> f64 {
+        let chain = &spec.start;
+        let longest_m = chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
+        let way_m = |task: &Task<D>| task.speed_m_s * self.dt_s;
+        let led_m = spec.tasks.iter().map(way_m).fold(0.0, f64::max);
+        let step_m = self.rules.step_m.unwrap_or(chain.step_m());
+        let steps = (led_m / step_m).ceil() + 1.0;
+        2.0 * longest_m + 2.0 * led_m.max(steps * self.rules.slave_step_max_m) + SPARE_M
+    }
+}

@@ -1,0 +1,156 @@
+//! A team does what one process does, bit for bit, and nothing at all where it cannot be sure.
+
+mod hostile;
+mod scenarios;
+mod silence;
+
+use super::drive::{Talk, run};
+use super::settled;
+use crate::agents::network::Network;
+use crate::agents::side::Side;
+use crate::agents::{ConnectorAgent, Control, Ended, Role, Seen, Sight, Wish};
+use crate::motion::replan::{Climbed, Memory, Rungs, Situation};
+use crate::rods::chain::Chain;
+use crate::rods::geometry::Point;
+use crate::rods::obstacle::Obstacles;
+use crate::rods::propagate::Propagator;
+use crate::rods::propagate::tests::random_worlds::AnyWorld;
+use crate::rods::rules::Rules;
+use crate::rods::veto::{Mode, Motion, Outcome, Request, Source};
+use crate::rods::wire::Place;
+use proptest::prelude::*;
+use sidestep_kernel::Seed;
+use sidestep_kernel::stream::Streams;
+
+/// A network with some faults, whose talks have all the time they need.
+fn network(loss: f64, delay: f64, duplication: f64, deadline: f64) -> Network {
+    Network {
+        loss,
+        duplication,
+        latency_s: 1e-3,
+        max_delay_s: 1e-3 * delay,
+        patience_s: 3e-3 * (1.0 + delay),
+        deadline_s: 1e-3 * deadline,
+        silences: Vec::new(),
+        one_ways: Vec::new(),
+    }
+}
+
+/// Perception of all connectors of a chain, whose sensors see everything.
+fn sights<const D: usize>(
+    chain: &Chain<D>,
+    obstacles: &Obstacles<D>,
+    leader: usize,
+    wish: &Wish<D>,
+) -> Vec<Sight<D>> {
+    let (points, n) = (chain.points(), chain.points().len() as u32);
+    let all = obstacles.still().iter().chain(obstacles.moving());
+    let seen: Vec<Seen> = all.map(Seen::of).collect();
+    let sight = |k: u32| Sight {
+        cycle: 5,
+        at: Place(points[k as usize]),
+        neighbors: Side::ALL.map(|side| side.of(k, n).map(|j| Place(points[j as usize]))),
+        max_bend_rad: chain.connectors()[k as usize].max_bend_rad,
+        seen: seen.clone(),
+        is_silent: false,
+        missing: [None; 2],
+        role: if k as usize == leader { Role::Leads(wish.clone()) } else { Role::Follows },
+    };
+    (0..n).map(sight).collect()
+}
+
+/// A team that makes a motion; returns its decisions.
+fn talked<const D: usize>(
+    (chain, obstacles, rules): (&Chain<D>, &Obstacles<D>, &Rules),
+    (leader, to, source): (usize, Point<D>, Source),
+    network: Option<&Network>,
+    seed: u64,
+) -> Vec<Option<Control<D>>> {
+    let is_empty = obstacles.is_empty();
+    let wish = Wish {
+        to: Place(to),
+        source,
+        situation: Situation::default(),
+        memory: Memory::default(),
+        is_empty,
+        is_open: is_empty && chain.is_plain(),
+    };
+    let agent = |k: usize| ConnectorAgent::of(chain, k as u32, rules, Rungs::default()).on(network);
+    let mut agents: Vec<_> = (0..chain.points().len()).map(agent).collect();
+    let streams = Streams::new(Seed(seed));
+    let talk = Talk { network, streams, chain: 0, first_id: 0, now: 5, at_s: 0.0 };
+    run(talk, &mut agents, sights(chain, obstacles, leader, &wish))
+}
+
+/// Makes random motions by both; returns the number of those that moved something, and of the vetoes.
+fn compared<const D: usize>(seed: u64, network: Option<&Network>, tries: usize) -> (usize, usize) {
+    let mut world = AnyWorld::<D>::new(seed);
+    let rules = Rules { self_collision: false, backtracks: 0, ..world.rules };
+    let mut propagator = Propagator::new(rules);
+    let (mut moved, mut vetoed) = (0, 0);
+    for t in 0..tries {
+        let Request { motion: Motion::Connector { k, to }, .. } = world.any_request(0.15) else {
+            continue;
+        };
+        let source = Source::Operator;
+        let before = world.chain.clone();
+        let obstacles = &world.obstacles;
+        let controls =
+            talked((&before, obstacles, &rules), (k, to, source), network, seed + t as u64);
+        let request = Request { motion: Motion::Connector { k, to }, source, mode: Mode::Exact };
+        let outcome = propagator.propagate(&mut world.chain, &world.obstacles, &request).unwrap();
+        let points = settled(&before, &controls).unwrap_or(before.points().to_vec());
+        assert_eq!(points, world.chain.points(), "seed {seed}, motion {t}: {outcome:?}");
+        let ended = controls[k].as_ref().and_then(|control| control.ended.clone());
+        let climbed = match outcome.clone() {
+            Outcome::Moved(moved) => Climbed::Straight(moved),
+            Outcome::Vetoed(veto) => Climbed::Vetoed(veto),
+        };
+        match ended {
+            Some(Ended::Climbed { climbed: told, .. }) => {
+                assert_eq!(told, climbed, "seed {seed}, motion {t}")
+            }
+            other => panic!("seed {seed}, motion {t}: {other:?}"),
+        }
+        moved += usize::from(outcome.moved().is_some_and(|m| m.changed > 1));
+        vetoed += usize::from(outcome.veto().is_some());
+    }
+    (moved, vetoed)
+}
+
+/// The chain of a world after one process has moved it.
+fn compared_on<const D: usize>(
+    world: &mut AnyWorld<D>,
+    rules: &Rules,
+    (k, to): (usize, Point<D>),
+) -> Chain<D> {
+    let motion = Motion::Connector { k, to };
+    let request = Request { motion, source: Source::Operator, mode: Mode::Exact };
+    let moved = Propagator::new(*rules).propagate(&mut world.chain, &world.obstacles, &request);
+    assert!(moved.is_ok_and(|outcome| outcome.moved().is_some()));
+    world.chain.clone()
+}
+
+#[test]
+fn a_team_moves_as_one_process_does_bit_for_bit() {
+    let (mut moved, mut vetoed) = (0, 0);
+    for seed in 0..150 {
+        for (m, v) in [compared::<2>(seed, None, 12), compared::<3>(seed, None, 12)] {
+            (moved, vetoed) = (moved + m, vetoed + v);
+        }
+    }
+    assert!(moved > 500 && vetoed > 200, "{moved} moved, {vetoed} vetoed");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+    /// Packets that are lost, doubled and overtaken cost time and nothing else.
+    #[test]
+    fn losses_cost_time_and_not_agreement(
+        seed in 0u64..1000, loss in 0.0f64..0.3, delay in 0.0f64..5.0, duplication in 0.0f64..0.3,
+    ) {
+        let network = network(loss, delay, duplication, 1e6);
+        compared::<2>(seed, Some(&network), 3);
+        compared::<3>(seed, Some(&network), 3);
+    }
+}

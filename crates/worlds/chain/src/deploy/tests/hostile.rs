@@ -1,0 +1,135 @@
+//! Bytes that no agent sends: they are counted and dropped, whatever they are, and never a panic.
+
+use super::{network, sights};
+use crate::agents::{ConnectorAgent, Outgoing, Sight, Wish};
+use crate::motion::replan::{Memory, Rungs, Situation};
+use crate::rods::chain::{Chain, Connector, Rod};
+use crate::rods::geometry::Point;
+use crate::rods::obstacle::Obstacles;
+use crate::rods::rules::Rules;
+use crate::rods::veto::Source;
+use crate::rods::wire::Place;
+use proptest::prelude::*;
+
+const N: usize = 5;
+
+fn chain() -> Chain<2> {
+    let rod = Rod { min_m: 0.4, max_m: 0.5, radius_m: 0.02 };
+    Chain::straight([0.0, 0.0], [-1.0, 0.0], N - 1, rod, Connector::free(0.05)).expect("a chain")
+}
+
+fn shown(to: Point<2>) -> Vec<Sight<2>> {
+    let wish = Wish {
+        to: Place(to),
+        source: Source::Autonomous,
+        situation: Situation::default(),
+        memory: Memory::default(),
+        is_empty: false,
+        is_open: false,
+    };
+    sights(&chain(), &Obstacles::default(), 2, &wish)
+}
+
+fn agents() -> Vec<ConnectorAgent<2>> {
+    let network = network(0.1, 0.0, 0.0, 500.0);
+    let rules = Rules { backtracks: 0, ..Rules::default() };
+    let agent = |k| ConnectorAgent::of(&chain(), k, &rules, Rungs::default()).on(Some(&network));
+    (0..N as u32).map(agent).collect()
+}
+
+/// All packets of a talk without losses, with their senders.
+fn packets() -> Vec<(u32, Outgoing)> {
+    let mut agents = agents();
+    let mut all = Vec::new();
+    for (k, sight) in shown([-0.8, 0.6]).into_iter().enumerate() {
+        agents[k].begin(sight, 0).expect("a sight");
+    }
+    let mut waiting: Vec<(u32, Outgoing)> = Vec::new();
+    loop {
+        for agent in &mut agents {
+            let id = agent.id();
+            waiting.extend(agent.take_packets().into_iter().map(|out| (id, out)));
+        }
+        if waiting.is_empty() {
+            return all;
+        }
+        for (from, out) in std::mem::take(&mut waiting) {
+            agents[out.to as usize].on_packet(from, &out.payload, 0);
+            all.push((from, out));
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_read_and_who_is_no_neighbor_is_counted_and_dropped() {
+    let mut agent = agents().remove(2);
+    let sight = shown([-0.8, 0.6]).remove(2);
+    agent.begin(sight, 0).expect("a sight");
+    let (from, out) = packets().remove(0);
+    for (from, bytes) in
+        [(1, vec![]), (1, vec![7; 40]), (1, vec![1; 100_000]), (0, out.payload.clone())]
+    {
+        agent.on_packet(from, &bytes, 1);
+    }
+    let mut longer = out.payload;
+    longer.push(0);
+    agent.on_packet(from.max(1), &longer, 1);
+    agent.on_timer(1_000_000);
+    assert_eq!(agent.control().expect("time is up").traffic.dropped, 5);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+    #[test]
+    fn bytes_of_any_kind_never_panic(
+        k in 0usize..N, from in 0u32..6, bytes in prop::collection::vec(any::<u8>(), 0..80),
+        begins in any::<bool>(),
+    ) {
+        let mut agent = agents().remove(k);
+        if begins {
+            agent.begin(shown([-0.8, 0.6]).remove(k), 0).expect("a sight");
+        }
+        let mut versioned = vec![1];
+        versioned.extend(&bytes);
+        agent.on_packet(from, &bytes, 1);
+        agent.on_packet(from, &versioned, 1);
+        agent.take_packets();
+        agent.on_timer(1000);
+        prop_assert_eq!(agent.control().is_some(), begins);
+    }
+
+    /// Packets of a real talk, some of their bytes changed, in any order, to any neighbor: whoever lies or
+    /// repeats himself, agents come to a decision, and decide nothing but whether to go.
+    #[test]
+    fn packets_that_were_tampered_with_never_panic(
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<prop::sample::Index>(), any::<u8>(), 0usize..N), 1..60),
+    ) {
+        let real = packets();
+        let mut agents = agents();
+        for (k, sight) in shown([-0.8, 0.6]).into_iter().enumerate() {
+            agents[k].begin(sight, 0).expect("a sight");
+            agents[k].take_packets();
+        }
+        for (tick, (packet, at, byte, to)) in (1..).zip(changes) {
+            let (_, out) = &real[packet.index(real.len())];
+            let mut payload = out.payload.clone();
+            let at = at.index(payload.len());
+            payload[at] ^= byte;
+            for from in [to.checked_sub(1), Some(to + 1)].into_iter().flatten() {
+                agents[to].on_packet(from as u32, &payload, tick);
+                agents[to].on_timer(tick);
+                agents[to].take_packets();
+            }
+        }
+        for agent in &mut agents {
+            agent.on_timer(1_000_000);
+            prop_assert!(agent.control().is_some());
+        }
+        let controls: Vec<_> = agents.iter().map(ConnectorAgent::control).collect();
+        if let Some(points) = crate::deploy::settled(&chain(), &controls) {
+            let mut moved = chain();
+            moved.points_mut().copy_from_slice(&points);
+            prop_assert!(moved.max_rod_violation_m() < 1.1e-9, "no rod is torn, whoever lies");
+        }
+    }
+}
