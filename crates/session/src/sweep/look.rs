@@ -31,7 +31,7 @@ pub fn finished(folder: &Folder) -> Result<Finished, InputError> {
         return Ok(Finished { table, is_complete: true });
     }
     let mut rows = Rows::default();
-    gather(folder, None, |outcome| rows.push(outcome))?;
+    gather(folder, None, |outcome| rows.push(&outcome))?;
     if rows.is_empty() {
         let remedy = "run it first: sidestep resume DIR";
         return Err(InputError::new(folder.path().display(), "no run is finished yet", remedy));

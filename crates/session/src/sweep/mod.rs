@@ -4,6 +4,7 @@
 //! prepare.rs   every variant compiled, a plan     work.rs      cells -> outcomes, many at once
 //! journey.rs   from the plan to the table         effort.rs    the time that all took
 //! crew.rs      others who run cells            task.rs      cells that another process sends
+//! piles.rs     finished runs -> the table, in blocks
 //! told.rs      the results, for programs
 //! look.rs      finished runs, for reports
 //! ```
@@ -12,6 +13,7 @@ mod crew;
 mod effort;
 mod journey;
 mod look;
+mod piles;
 mod prepare;
 mod task;
 mod told;
