@@ -300,7 +300,7 @@ pub fn read<R: DeserializeOwned + Clone>(path: &Path) -> Result<WholeTable<R>, I
             }
         }
     })?;
-    whole.ok_or_else(|| damaged(path, "it has no columns".into()))
+    whole.ok_or_else(|| damaged(path, "it has no columns".to_string()))
 }
 
 /// Reads the table in the file at `path` block by block; a table without rows has one block without rows.

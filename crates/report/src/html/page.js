@@ -114,6 +114,28 @@
     fit();
   }
 
+  // ---- Runs ----
+
+  // In the frame of the studio, whoever asks for a variant gets its run of a seed, or its first: the studio
+  // hears of it, and looks for the run itself. A page of its own has no one to ask.
+  function withRuns(table) {
+    const heads = [...table.tHead.rows[0].cells].map((head) => head.textContent);
+    const [named, seeded] = [heads.indexOf("variant"), heads.indexOf("seed")];
+    for (const row of named < 0 ? [] : table.tBodies[0].rows) {
+      const cell = row.cells[named];
+      const [variant, seed] = [cell.textContent, seeded < 0 ? null : row.cells[seeded].textContent];
+      const button = document.createElement("button");
+      button.type = "button";
+      button.className = "open";
+      button.title = seed ? `Opens the run of seed ${seed}` : "Opens the first run";
+      button.append(...cell.childNodes);
+      button.addEventListener("click", () => window.parent.postMessage({ opens: { variant, seed } }, "*"));
+      cell.append(button);
+    }
+  }
+
+  if (window.parent !== window) document.querySelectorAll("table.sortable").forEach(withRuns);
+
   // A link to something folded opens it.
   function open() {
     const named = document.getElementById(decodeURIComponent(location.hash.slice(1)));

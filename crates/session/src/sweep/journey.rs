@@ -99,11 +99,12 @@ pub fn planned(
     watcher: &dyn Watcher,
 ) -> Result<Folder, Error> {
     Folder::create(out, VERSION, build(), |staging| {
-        let (plan, fingerprints) = prepare(worlds, sweep, workers, watcher, &|k, source, compiled| {
-            let Resolved { text, files } = compiled.resolve(source)?;
-            Folder::write_variant(staging, k, &text, &files)?;
-            Ok(fingerprint(text.as_bytes(), &files))
-        })?;
+        let (plan, fingerprints) =
+            prepare(worlds, sweep, workers, watcher, &|k, source, compiled| {
+                let Resolved { text, files } = compiled.resolve(source)?;
+                Folder::write_variant(staging, k, &text, &files)?;
+                Ok(fingerprint(text.as_bytes(), &files))
+            })?;
         let cells = cells(&plan).columns;
         Ok::<_, Error>((plan, fingerprints, cells))
     })
@@ -471,7 +472,8 @@ mod tests {
 
     /// A planned sweep of two times 300 runs, all of them in journals of two shares: made up, and in no order.
     fn folder(place: &Path) -> Folder {
-        let text = "format = 1\nworld = \"airspace\"\n[airspace.generator]\nkind = \"random\"\nn = 2\n";
+        let text =
+            "format = 1\nworld = \"airspace\"\n[airspace.generator]\nkind = \"random\"\nn = 2\n";
         let mut sweep = Sweep::of_source(Source::new("s.toml", text, place));
         sweep.design.factors = vec![Factor::parse("airspace.generator.n=2,3").expect("valid")];
         sweep.replicates = 300;
@@ -480,7 +482,8 @@ mod tests {
         cells.sort_by_key(|cell| cell.id.wrapping_mul(2_654_435_761) % 1009);
         for index in 0..2 {
             let share = Share { index, count: 2 };
-            let mut journal = folder.journal(share, |_: Outcome| ()).expect("opened").expect("open");
+            let mut journal =
+                folder.journal(share, |_: Outcome| ()).expect("opened").expect("open");
             for cell in cells.iter().filter(|cell| cell.id % 2 == u64::from(index)) {
                 journal.append(&outcome(*cell)).expect("written");
             }

@@ -5,7 +5,7 @@
 
 use super::journey::Folder;
 use crate::Error;
-use sidestep::experiment::sweep::{Outcome, Plan, RunTable, Rows, Shape, seeds::Trials};
+use sidestep::experiment::sweep::{Outcome, Plan, Rows, RunTable, Shape, seeds::Trials};
 use sidestep_record::sweep::Scratch;
 use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, Write};
@@ -94,7 +94,8 @@ impl<'a> Piles<'a> {
             file.into_inner().map_err(|e| Error::write(&pile(&scratch, k), e.error()))?;
         }
         for k in 0..count {
-            let rows = read_pile(&pile(&scratch, k)).map_err(|e| Error::write(scratch.path(), &e))?;
+            let rows =
+                read_pile(&pile(&scratch, k)).map_err(|e| Error::write(scratch.path(), &e))?;
             if k == 0 || !rows.is_empty() {
                 each(rows.block(self.plan, &self.shape, &self.trials)?)?;
             }

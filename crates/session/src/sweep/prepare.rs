@@ -15,8 +15,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 pub(super) type Prepared<T> = (Plan, Vec<T>);
 
 /// What is made of a variant, from its number, its scenario, and what that compiles to.
-pub(super) type Make<'a, T> =
-    &'a (dyn Fn(u32, &Source, &dyn Compiled) -> Result<T, Error> + Sync);
+pub(super) type Make<'a, T> = &'a (dyn Fn(u32, &Source, &dyn Compiled) -> Result<T, Error> + Sync);
 
 /// Compiles every variant on so many workers, makes of each what `make` makes, and returns it with the plan. Whatever the
 /// number of workers, the error is that of the first variant that has one.

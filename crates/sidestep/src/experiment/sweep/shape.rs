@@ -104,7 +104,8 @@ pub(super) fn widened(values: Values, ty: ColumnType) -> Values {
         }
         ColumnType::F64 => Values::F64((0..n).map(|row| values.number(row)).collect()),
         _ => {
-            let text = |row| (!values.is_missing(row)).then(|| super::rows::words(&values.json(row)));
+            let text =
+                |row| (!values.is_missing(row)).then(|| super::rows::words(&values.json(row)));
             Values::Text((0..n).map(text).collect())
         }
     }
