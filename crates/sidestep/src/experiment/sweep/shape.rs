@@ -47,10 +47,10 @@ impl Shape {
     pub(super) fn columns(&self) -> Vec<(Role, &str, ColumnType)> {
         let mut columns: Vec<_> = self.0.iter().collect();
         columns.sort_by_key(|((role, name), seen)| (*role, seen.first, name));
-        let column = |((role, name), seen): (&'_ (Role, String), &Seen)| {
-            (*role, name.as_str(), seen.ty.unwrap_or(ColumnType::F64))
-        };
-        columns.into_iter().map(column).collect()
+        columns
+            .into_iter()
+            .map(|((role, name), seen)| (*role, name.as_str(), seen.ty.unwrap_or(ColumnType::F64)))
+            .collect()
     }
 }
 
