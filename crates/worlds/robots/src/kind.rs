@@ -52,6 +52,10 @@ impl Kind for Robots {
         super::scenario::sections(&self.own)
     }
 
+    fn other_files(&self) -> Vec<(&'static str, serde_json::Value)> {
+        vec![("profile", super::scenario::profile_schema(self.default_scenario()))]
+    }
+
     fn draws(&self) -> &'static str {
         "errors (a regime other than reliable), random places and doors, and behaviors that draw"
     }

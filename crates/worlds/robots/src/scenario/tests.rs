@@ -231,7 +231,7 @@ fn seeds_decide_where_something_always_draws_and_otherwise_runs_tell() {
         let compiled = Compiled::new(&source, &Behaviours::new(), StorageOrder::Spatial);
         compiled.expect("valid").draws_always()
     };
-    let placed = "at = [[1, 1, \"north\"], [9, 1, \"west\"]]";
+    let placed = "at = [[1, 1, 1], [9, 1, 2]]";
     assert!(!draws(text("reliable", placed, "")));
     assert!(draws(text("reliable", "count = 2", "")), "places are drawn");
     assert!(draws(text("reliable", "at = [[1, 1], [9, 1]]", "")), "headings are drawn");
