@@ -1,13 +1,13 @@
 /** What is drawn, filled in and typed is what the program runs and writes. SIDESTEP_BINARY names the program. */
 
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { copyFileSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from "vitest";
 import { drawn, launch, openPage, WAIT_MS } from "../browser";
 import { Hand } from "../drawing";
-import { BINARY, Program } from "./program";
+import { BINARY, Program, SCENARIOS } from "./program";
 
 const HALL = `# A hall with one robot that goes east.
 
@@ -255,5 +255,54 @@ describe.skipIf(BINARY === "")("the real program", () => {
     expect(await page.getByTestId("agent-count").textContent()).toBe(free);
     await page.getByRole("tab", { name: "Text" }).click();
     await page.locator(".cm-line", { hasText: /^#{40,}$/ }).first().waitFor();
+  });
+
+  test("a polygon and a patrol are put with the mouse, and the program takes them", async () => {
+    ({ page, complaints } = await openPage(browser, program.url));
+    hand = new Hand(page);
+    await page.getByRole("button", { name: "chain", exact: true }).first().click();
+    await drawn(page);
+    await edit();
+    await hand.tool("Polygon");
+    await hand.drag([2, 5], [4, 5]);
+    await checked();
+    await hand.tool("Ball");
+    await hand.drag([7, 5], [7.3, 5]);
+    await checked();
+    await hand.tool("Patrol");
+    await hand.click(9, 5.5);
+    await checked();
+    await hand.click(9, 6.5);
+    await checked();
+    await page.getByRole("tab", { name: "Text" }).click();
+    await page.locator(".cm-line", { hasText: /^corners_m = \[\[2(\.\d+)?, 5/ }).first().waitFor();
+    await page.locator(".cm-line", { hasText: /^patrol_m = \[\[7.*\[9.*\[9/ }).first().waitFor();
+    expect(complaints).toEqual([]);
+  });
+
+  /** Runs to the end, and returns the digest that is told there. */
+  async function digest(): Promise<string> {
+    await page.getByLabel("Speed", { exact: true }).selectOption("fastest");
+    await page.getByRole("button", { name: "Play", exact: true }).click();
+    return (await page.locator(".banner .digest").textContent())!;
+  }
+
+  test.each(["building.toml", "office.toml"])("the walls of %s, taken into the text, give the run that they gave before", async (name) => {
+    const examples = join(SCENARIOS, "..", "examples");
+    for (const one of ["building.yaml", "building.png"]) copyFileSync(join(examples, one), join(folder, one));
+    const from = name === "building.toml" ? join(examples, name) : join(SCENARIOS, "robots", name);
+    writeFileSync(join(folder, name), readFileSync(from, "utf8").replace(/^cycles = .*$/m, "cycles = 300"));
+    await open(name);
+    const before = await digest();
+    expect(before).toMatch(/^[0-9a-f]{32}$/);
+    await page.getByRole("button", { name: "Edit", exact: true }).click();
+    await page.getByRole("button", { name: "Take the walls into the text" }).click();
+    await page.getByRole("button", { name: "Brush", exact: true }).waitFor();
+    await checked();
+    await page.getByRole("button", { name: "Run", exact: true }).click();
+    await page.locator("canvas.layer").waitFor({ state: "detached" });
+    await page.getByRole("button", { name: "Pause" }).click();
+    expect(await digest()).toBe(before);
+    expect(complaints).toEqual([]);
   });
 });
