@@ -5,7 +5,7 @@
 
   // The number that a cell begins with, `1 234.5 [1 200, 1 300]` or `-`; NaN where there is none.
   function leading(cell) {
-    const found = cell.trim().replaceAll("\u2212", "-").match(/^[-+]?\d+( \d{3})*(\.\d+)?(e[-+]?\d+)?/i);
+    const found = cell.trim().replaceAll("\u2212", "-").replaceAll("\u2060", "").match(/^[-+]?\d+( \d{3})*(\.\d+)?(e[-+]?\d+)?/i);
     return found ? Number(found[0].replaceAll(" ", "")) : NaN;
   }
 
