@@ -2,6 +2,7 @@
 
 use super::crew::Engine;
 use super::effort::Effort;
+use super::gather::{Folder, gather, share_of, table_of};
 use super::look::finished;
 use super::piles::{PILE, Piles};
 use super::prepare::{Make, prepare};
@@ -13,19 +14,13 @@ use crate::{Error, Watcher};
 use sidestep::VERSION;
 use sidestep::experiment::sweep::rounds::Rounds;
 use sidestep::experiment::sweep::seeds::Trials;
-use sidestep::experiment::sweep::{
-    Cell, Outcome, Plan, Role, Rows, RunTable, Shard, Sweep, rows::cells,
-};
+use sidestep::experiment::sweep::{Cell, Outcome, Plan, Rows, RunTable, Shard, Sweep, rows::cells};
 use sidestep::kernel::InputError;
 use sidestep::scenario::{Resolved, Source, Worlds};
-use sidestep_record::WholeTable;
-use sidestep_record::sweep::{Completion, Share, SweepFolder, fingerprint};
+use sidestep_record::sweep::{Completion, fingerprint};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// The folder of a sweep.
-pub type Folder = SweepFolder<Plan>;
 
 /// The result of working on a sweep, or on a share of one.
 pub enum Ended {
@@ -321,26 +316,6 @@ pub fn collect(folder: &Folder, watcher: &dyn Watcher) -> Result<Ended, Error> {
     joined(folder, PILE, Effort::default(), watcher)
 }
 
-/// Returns the table of runs in a file.
-pub(super) fn table_of(file: WholeTable<Role>) -> RunTable {
-    RunTable { columns: file.columns }
-}
-
-/// Converts a share to the type that folders use.
-fn share_of(shard: Shard) -> Share {
-    Share { index: shard.index, count: shard.count }
-}
-
-/// Passes on all finished runs, except those of the share `but`.
-pub(super) fn gather(
-    folder: &Folder,
-    but: Option<Shard>,
-    mut each: impl FnMut(Outcome),
-) -> Result<(), InputError> {
-    folder.parts(|part| table_of(part).outcomes(&mut each))?;
-    folder.journals(but.map(share_of), &mut each)
-}
-
 /// Passes on what is needed to run the cells of a folder.
 fn with_work(
     worlds: Worlds,
@@ -469,6 +444,7 @@ mod tests {
     use serde_json::json;
     use sidestep::experiment::sweep::Factor;
     use sidestep::worlds::WORLDS;
+    use sidestep_record::sweep::Share;
 
     /// A planned sweep of two times 300 runs, all of them in journals of two shares: made up, and in no order.
     fn folder(place: &Path) -> Folder {

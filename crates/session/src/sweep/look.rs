@@ -1,6 +1,6 @@
 //! The parts of a sweep that a report needs: its finished runs, and pictures of some.
 
-use super::journey::{Folder, gather, table_of};
+use super::gather::{Folder, gather, table_of};
 use super::work::recorded;
 use crate::watcher::Within;
 use crate::{Error, Watcher};

@@ -3,7 +3,7 @@
 //! Each outcome is laid on the pile of its cell: [`PILE`] cells that follow each other. A sweep of one pile is joined in
 //! memory; of more, piles are files, read one by one, and one below the other they are the table.
 
-use super::journey::Folder;
+use super::gather::Folder;
 use crate::Error;
 use sidestep::experiment::sweep::{Outcome, Plan, Rows, RunTable, Shape, seeds::Trials};
 use sidestep_record::sweep::Scratch;
@@ -24,7 +24,7 @@ pub(super) struct Piles<'a> {
     failure: Option<Error>,
 }
 
-/// Where the piles are.
+/// The place of the piles.
 enum Kept {
     /// In memory: there is one.
     Here(Rows),

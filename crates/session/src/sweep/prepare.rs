@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// A plan, and what was made of each variant, by its number.
 pub(super) type Prepared<T> = (Plan, Vec<T>);
 
-/// What is made of a variant, from its number, its scenario, and what that compiles to.
+/// A function that makes something of a variant: of its number, its scenario, and what that compiles to.
 pub(super) type Make<'a, T> = &'a (dyn Fn(u32, &Source, &dyn Compiled) -> Result<T, Error> + Sync);
 
 /// Compiles every variant on so many workers, makes of each what `make` makes, and returns it with the plan. Whatever the
@@ -64,7 +64,7 @@ pub(super) fn prepare<T: Send>(
     Ok((Plan { agents, name, ..plan }, made))
 }
 
-/// What is known of a variant once it was compiled.
+/// The findings of compiling a variant, and the thing that was made of it.
 struct One<T> {
     seeds: Seeds,
     agents: u64,

@@ -113,7 +113,7 @@ struct SweepFile {
     /// Metrics to report; all that vary if none is named.
     #[serde(default)]
     metrics: Vec<String>,
-    /// What the others are compared with: values of keys, or the name of a variant.
+    /// The variant that others are compared with: values of keys, or its name.
     #[schemars(with = "Option<BaselineValue>")]
     baseline: Option<Spanned<Value>>,
     /// Whether every run is recorded in a folder of its own.

@@ -3,18 +3,13 @@
 use super::cell::Outcome;
 use super::plan::{Plan, Shard};
 use super::seeds::Trials;
-use super::shape::{Shape, each_field, type_of, widened, wider};
+use super::shape::{CYCLES, FAILURE, Shape, each_field, type_of, widened, wider, words};
 use super::table::{Role, RunColumn, RunTable};
 use super::variant::Variant;
 use serde_json::Value;
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::{ColumnType, Values};
 use std::collections::BTreeMap;
-
-/// Name of the column of reasons why runs failed; it exists only if one did.
-pub(super) const FAILURE: &str = "failure";
-/// Name of the column of cycles done.
-pub(super) const CYCLES: &str = "cycles_run";
 
 /// A table that grows by outcomes. A number takes 8 or 9 bytes, so a million runs of 40 metrics fit
 /// into less than half a gigabyte.
@@ -254,10 +249,6 @@ fn add(values: &mut Values, value: &Value) {
         Values::Text(v) => v.push(Some(&words(value))),
         _ => unreachable!("`widen` makes columns of these four types"),
     }
-}
-
-pub(super) fn words(value: &Value) -> String {
-    value.as_str().map_or_else(|| value.to_string(), str::to_string)
 }
 
 /// Widens the column's type so that it can hold the value.

@@ -9,11 +9,16 @@ use serde_json::Value;
 use sidestep_kernel::ports::{ColumnType, Values};
 use std::collections::BTreeMap;
 
+/// Name of the column of reasons why runs failed; it exists only if one did.
+pub(super) const FAILURE: &str = "failure";
+/// Name of the column of cycles done.
+pub(super) const CYCLES: &str = "cycles_run";
+
 /// The columns of a table of runs: results of runs and the times that they took, with the types that hold all values.
 #[derive(Debug, Clone, Default)]
 pub struct Shape(BTreeMap<(Role, String), Seen>);
 
-/// What was seen of a column.
+/// The findings about a column, of the outcomes so far.
 #[derive(Debug, Clone, Copy)]
 struct Seen {
     /// Its type, once it has a value.
@@ -57,10 +62,10 @@ impl Shape {
 /// Passes on the fields of an outcome: role, name, value, and place among those of the outcome.
 pub(super) fn each_field(outcome: &Outcome, mut each: impl FnMut(Role, &str, &Value, usize)) {
     match &outcome.failure {
-        Some(why) => each(Role::Metric, super::rows::FAILURE, &why.as_str().into(), 0),
+        Some(why) => each(Role::Metric, FAILURE, &why.as_str().into(), 0),
         None => {
             each(Role::Digest, "digest", &outcome.digest.as_str().into(), 0);
-            each(Role::Metric, super::rows::CYCLES, &outcome.cycles.into(), 1);
+            each(Role::Metric, CYCLES, &outcome.cycles.into(), 1);
         }
     }
     for (role, fields) in [(Role::Metric, &outcome.metrics), (Role::Cost, &outcome.costs)] {
@@ -104,9 +109,13 @@ pub(super) fn widened(values: Values, ty: ColumnType) -> Values {
         }
         ColumnType::F64 => Values::F64((0..n).map(|row| values.number(row)).collect()),
         _ => {
-            let text =
-                |row| (!values.is_missing(row)).then(|| super::rows::words(&values.json(row)));
+            let text = |row| (!values.is_missing(row)).then(|| words(&values.json(row)));
             Values::Text((0..n).map(text).collect())
         }
     }
+}
+
+/// Returns a value as text.
+pub(super) fn words(value: &Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_string)
 }
