@@ -143,7 +143,7 @@ fn run(
     let (folder, plan, ended);
     match out {
         Some(out) => {
-            let there = sweep::planned_or_there(WORLDS, sweep, out, watcher)?;
+            let there = sweep::planned_or_there(WORLDS, sweep, out, engine.planners(), watcher)?;
             ended = sweep::go_on(WORLDS, &there, engine, watcher)?;
             plan = there.plan().clone();
             folder = Some(there);

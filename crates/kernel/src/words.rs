@@ -73,7 +73,7 @@ fn wrapped_line(text: &str, cols: usize) -> Vec<String> {
         return vec![text.into()];
     }
     let mut lines: Vec<String> = Vec::new();
-    for word in text.split(' ') {
+    for word in words(text) {
         match lines.last_mut() {
             Some(line) if line.chars().count() + 1 + word.chars().count() <= cols => {
                 line.push(' ');
@@ -85,9 +85,27 @@ fn wrapped_line(text: &str, cols: usize) -> Vec<String> {
     lines
 }
 
+/// Splits text at its spaces, but for one before a percent sign: a number keeps its unit.
+fn words(text: &str) -> Vec<&str> {
+    let mut words = Vec::new();
+    let mut start = 0;
+    for (at, _) in text.match_indices(' ').filter(|(at, _)| !text[at + 1..].starts_with('%')) {
+        words.push(&text[start..at]);
+        start = at + 1;
+    }
+    words.push(&text[start..]);
+    words
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_number_is_not_parted_from_its_percent_sign() {
+        assert_eq!(wrapped("claim 93 %, record 0 %", 20), ["claim 93 %, record", "0 %"]);
+        assert_eq!(wrapped("a b  c", 3), ["a b", " c"]);
+    }
 
     #[test]
     fn values_stand_below_each_other() {

@@ -179,7 +179,7 @@ impl Study {
             },
         )?;
         let mut rows = Rows::default();
-        outcomes.into_iter().for_each(|outcome| rows.push(outcome));
+        outcomes.iter().for_each(|outcome| rows.push(outcome));
         let table = rows.table(&plan)?;
         Ok(Results { table, variants: plan.variants })
     }

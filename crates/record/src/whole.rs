@@ -1,14 +1,14 @@
-//! Tables that fit in memory and may have missing cells: one row per run.
+//! Tables of which cells may be missing: one row per run.
 //!
 //! [`write()`] creates one Parquet file, completely or not at all; [`read()`] reads it back after
-//! comparing its checksums. Columns of runs are few and rows are some millions at most, so nothing
-//! here is streamed. Every column is optional in the file; its type is a 64-bit integer, a float, a
+//! comparing its checksums. Tables that do not fit are written by [`GrowingTable`] and read by
+//! [`read_blocks()`]. Every column is optional in the file; its type is a 64-bit integer, a float, a
 //! truth value or text.
 
 use std::fs::File;
 use std::io::{self, Write};
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use parquet::basic::{LogicalType, Repetition, Type as PhysicalType};
@@ -64,51 +64,110 @@ pub fn write<R: Serialize>(
     program_version: &str,
     extra: &[(&str, String)],
 ) -> Result<(), RecordError> {
-    let growing = disk::partial(path);
-    let written = File::create(&growing)
-        .map_err(ParquetError::from)
-        .and_then(|file| write_file(file, columns, program_version, extra));
-    written.map_err(|e| {
-        // On a full disk the half-written file must not keep its space.
-        let _ = std::fs::remove_file(&growing);
-        RecordError::new(path.display(), cause(e))
-    })?;
-    disk::rename(&growing, path)
+    let mut growing = GrowingTable::create(path, columns, program_version, extra)?;
+    growing.append(columns)?;
+    growing.finish()
 }
 
-fn write_file<R: Serialize>(
-    file: File,
-    columns: &[&RoleColumn<R>],
-    program_version: &str,
-    extra: &[(&str, String)],
-) -> ParquetResult<()> {
-    let hash = Hash::default();
-    let sink = Hashed { file, hash: hash.clone() };
-    let properties = WriterProperties::builder()
+/// A table that is written block by block, and appears once it is whole; dropped before, it leaves nothing.
+pub struct GrowingTable {
+    path: PathBuf,
+    growing: PathBuf,
+    hash: Hash,
+    checksums: Vec<u32>,
+    writer: Option<SerializedFileWriter<Hashed>>,
+}
+
+impl GrowingTable {
+    /// Creates a table with columns of these names, roles and types.
+    ///
+    /// # Errors
+    /// A column of a type that such files do not support; an I/O error.
+    pub fn create<R: Serialize>(
+        path: &Path,
+        columns: &[&RoleColumn<R>],
+        program_version: &str,
+        extra: &[(&str, String)],
+    ) -> Result<Self, RecordError> {
+        let growing = disk::partial(path);
+        let hash = Hash::default();
+        let create = || {
+            let sink = Hashed { file: File::create(&growing)?, hash: hash.clone() };
+            let pairs = key_values(columns, program_version, extra)?;
+            let schema = parquet_schema(columns)?;
+            let mut writer = SerializedFileWriter::new(sink, schema, Arc::new(properties(pairs)))?;
+            writer.flush()?;
+            Ok(writer)
+        };
+        let writer = create();
+        hash.take();
+        let mut table = Self {
+            path: path.into(),
+            growing: growing.clone(),
+            hash,
+            checksums: Vec::new(),
+            writer: None,
+        };
+        table.writer = Some(writer.map_err(|e: ParquetError| table.failed(e))?);
+        Ok(table)
+    }
+
+    /// Appends rows, in the columns with which it was created.
+    ///
+    /// # Errors
+    /// Another number or type of columns; an I/O error.
+    pub fn append<R>(&mut self, columns: &[&RoleColumn<R>]) -> Result<(), RecordError> {
+        self.append_groups(columns).map_err(|e| self.failed(e))
+    }
+
+    fn append_groups<R>(&mut self, columns: &[&RoleColumn<R>]) -> ParquetResult<()> {
+        let Some(writer) = &mut self.writer else { return Ok(()) };
+        let rows = columns.first().map_or(0, |c| c.values.len());
+        for start in (0..rows).step_by(GROUP_ROWS) {
+            let mut group = writer.next_row_group()?;
+            for column in columns {
+                write_column(&mut group, column, start..rows.min(start + GROUP_ROWS))?;
+            }
+            group.close()?;
+            writer.flush()?;
+            self.checksums.push(self.hash.take());
+        }
+        Ok(())
+    }
+
+    /// Completes the table, and gives it its name.
+    ///
+    /// # Errors
+    /// An I/O error. An earlier file stays then.
+    pub fn finish(mut self) -> Result<(), RecordError> {
+        if let Some(mut writer) = self.writer.take() {
+            let checksums = schema::checksums_to_text(&self.checksums);
+            writer.append_key_value_metadata(KeyValue::new(CHECKSUMS.to_string(), checksums));
+            let synced = writer.into_inner().and_then(|sink| Ok(sink.file.sync_all()?));
+            synced.map_err(|e| self.failed(e))?;
+        }
+        disk::rename(&self.growing, &self.path)
+    }
+
+    fn failed(&self, error: ParquetError) -> RecordError {
+        RecordError::new(self.path.display(), cause(error))
+    }
+}
+
+impl Drop for GrowingTable {
+    fn drop(&mut self) {
+        // On a full disk a half-written file must not keep its space; one that was finished has its name.
+        let _ = std::fs::remove_file(&self.growing);
+    }
+}
+
+fn properties(pairs: Vec<KeyValue>) -> WriterProperties {
+    WriterProperties::builder()
         .set_created_by(concat!("sidestep-record ", env!("CARGO_PKG_VERSION")).into())
         .set_statistics_enabled(EnabledStatistics::Chunk)
         .set_offset_index_disabled(true)
-        .set_key_value_metadata(Some(key_values(columns, program_version, extra)?))
-        .build();
-    let mut writer =
-        SerializedFileWriter::new(sink, parquet_schema(columns)?, Arc::new(properties))?;
-    writer.flush()?;
-    hash.take();
-    let rows = columns.first().map_or(0, |c| c.values.len());
-    let mut checksums = Vec::new();
-    for start in (0..rows).step_by(GROUP_ROWS) {
-        let mut group = writer.next_row_group()?;
-        for column in columns {
-            write_column(&mut group, column, start..rows.min(start + GROUP_ROWS))?;
-        }
-        group.close()?;
-        writer.flush()?;
-        checksums.push(hash.take());
-    }
-    let checksums = schema::checksums_to_text(&checksums);
-    writer.append_key_value_metadata(KeyValue::new(CHECKSUMS.to_string(), checksums));
-    writer.into_inner()?.file.sync_all()?;
-    Ok(())
+        .set_key_value_metadata(Some(pairs))
+        .build()
 }
 
 fn key_values<R: Serialize>(
@@ -231,7 +290,27 @@ impl Write for Hashed {
 ///
 /// # Errors
 /// A file that is missing, damaged, not a table of this kind, or of another major format.
-pub fn read<R: DeserializeOwned>(path: &Path) -> Result<WholeTable<R>, InputError> {
+pub fn read<R: DeserializeOwned + Clone>(path: &Path) -> Result<WholeTable<R>, InputError> {
+    let mut whole: Option<WholeTable<R>> = None;
+    read_blocks(path, |block| match &mut whole {
+        None => whole = Some(block),
+        Some(table) => {
+            for (column, more) in table.columns.iter_mut().zip(&block.columns) {
+                column.values.append(&more.values);
+            }
+        }
+    })?;
+    whole.ok_or_else(|| damaged(path, "it has no columns".to_string()))
+}
+
+/// Reads the table in the file at `path` block by block; a table without rows has one block without rows.
+///
+/// # Errors
+/// See [`read`]; blocks before a damaged one have been passed on.
+pub fn read_blocks<R: DeserializeOwned + Clone>(
+    path: &Path,
+    mut each: impl FnMut(WholeTable<R>),
+) -> Result<(), InputError> {
     let bytes = File::open(path).map_err(|e| {
         InputError::new(path.display(), e.to_string(), "name a table that a sweep wrote")
     })?;
@@ -245,17 +324,27 @@ pub fn read<R: DeserializeOwned>(path: &Path) -> Result<WholeTable<R>, InputErro
     let program_version = text(VERSION)?;
     let entries: Vec<ColumnEntry> = serde_json::from_str(&text(COLUMNS)?).map_err(|e| wrong(&e))?;
     let checksums = schema::checksums_from_text(&text(CHECKSUMS)?).map_err(|e| wrong(&e))?;
-    let mut values = empty_values(&file, &entries).map_err(failed)?;
+    let empty = empty_values(&file, &entries).map_err(failed)?;
+    let roles: Vec<Option<R>> =
+        entries.iter().map(|entry| serde_json::from_value(entry.role.clone()).ok()).collect();
+    let mut pass_on = |values: Vec<Values>| {
+        let column = |((entry, role), values): ((&ColumnEntry, &Option<R>), Values)| {
+            Some(RoleColumn { name: entry.name.clone(), role: role.clone()?, values })
+        };
+        let columns = entries.iter().zip(&roles).zip(values).filter_map(column).collect();
+        each(WholeTable { columns, program_version: program_version.clone() });
+    };
+    if file.num_row_groups() == 0 {
+        pass_on(empty.clone());
+    }
     for group in 0..file.num_row_groups() {
+        let mut values = empty.clone();
         check_bytes(&bytes, file.metadata(), group, &checksums).map_err(failed)?;
         read_group(file.get_row_group(group).map_err(failed)?.as_ref(), &mut values)
             .map_err(failed)?;
+        pass_on(values);
     }
-    let column = |(ColumnEntry { name, role }, values)| {
-        Some(RoleColumn { name, role: serde_json::from_value(role).ok()?, values })
-    };
-    let columns = entries.into_iter().zip(values).filter_map(column).collect();
-    Ok(WholeTable { columns, program_version })
+    Ok(())
 }
 
 /// Returns columns without rows, of the file's types.

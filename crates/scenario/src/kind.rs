@@ -27,6 +27,11 @@ pub trait Kind: Sync {
         serde_json::json!({ "additionalProperties": true })
     }
 
+    /// The files beside scenarios that this world reads, each by a word for it, with the JSON Schema of its keys.
+    fn other_files(&self) -> Vec<(&'static str, serde_json::Value)> {
+        Vec::new()
+    }
+
     /// The things that seeds decide in a scenario of this world, as a list of nouns with the keys that ask for it;
     /// empty where a world does not say.
     fn draws(&self) -> &'static str {

@@ -1,5 +1,6 @@
 //! Overrides: `key=value` set in the text of a scenario, keeping its comments and its order.
 
+use crate::edit::Refusal;
 use crate::source::{Source, WITH_OVERRIDES};
 use sidestep_kernel::InputError;
 use toml_edit::Value;
@@ -16,8 +17,14 @@ impl Source {
         if overrides.is_empty() {
             return Ok(self);
         }
-        for override_text in overrides {
-            set(&mut self, override_text)?;
+        let wanted: Vec<Wanted<'_>> =
+            overrides.iter().map(|text| parsed(text)).collect::<Result<_, _>>()?;
+        let given: Vec<(&str, String)> =
+            wanted.iter().map(|(_, key, value)| (*key, value.to_string().trim().into())).collect();
+        let others = self.replace_values(&given);
+        for (place, key, value) in others.into_iter().map(|k| &wanted[k]) {
+            let told = |refused: Refusal| InputError::new(place, refused.cause, refused.remedy);
+            self.set_to(key, value, told)?;
         }
         // Overrides may be applied in several steps.
         if !self.place.ends_with(WITH_OVERRIDES) {
@@ -27,24 +34,24 @@ impl Source {
     }
 }
 
-/// Sets one key.
-fn set(source: &mut Source, override_text: &str) -> Result<(), InputError> {
+/// The name of an override in errors, its key, and its value.
+type Wanted<'a> = (String, &'a str, Value);
+
+fn parsed(override_text: &str) -> Result<Wanted<'_>, InputError> {
     let place = format!("--set {override_text}");
-    let (key, value) = override_text.split_once('=').ok_or_else(|| {
-        InputError::new(
-            &place,
-            "there is no `=`",
-            "write --set key=value, e.g. --set robots.count=20",
-        )
-    })?;
+    let Some((key, value)) = override_text.split_once('=') else {
+        let remedy = "write --set key=value, e.g. --set robots.count=20";
+        return Err(InputError::new(place, "there is no `=`", remedy));
+    };
     // Text needs no quotes on a command line, so a value that is not TOML is text.
-    let value: Value = value.trim().parse().unwrap_or_else(|_| Value::from(value.trim()));
-    source.set_to(key, &value, |refused| InputError::new(&place, refused.cause, refused.remedy))
+    let value = value.trim().parse().unwrap_or_else(|_| Value::from(value.trim()));
+    Ok((place, key, value))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     fn with(text: &str, overrides: &[&str]) -> Result<String, InputError> {
         let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
@@ -61,6 +68,43 @@ mod tests {
         assert_eq!(table["map"]["box_size_m"].as_float(), Some(0.5));
         assert_eq!(table["regime"].as_str(), Some("both"));
     }
+
+    proptest! {
+        #[test]
+        fn overrides_together_are_what_they_are_one_after_the_other(
+            picks in proptest::collection::vec((0..KEYS.len(), 0..VALUES.len()), 1..6),
+        ) {
+            let text = "seed = 1 # why\nname = \"a\"\nopen = { b = 1, c.d = 2 }\n[map]\nside = [1, 2]\n\
+                        [[robots]]\ncount = 2\n[[robots]]\ncount = 3\n";
+            let overrides: Vec<String> =
+                picks.iter().map(|(k, v)| format!("{}={}", KEYS[*k], VALUES[*v])).collect();
+            let together = Source::new("s.toml", text, "").with(&overrides);
+            let first = Ok(Source::new("s.toml", text, ""));
+            let one_by_one = overrides.iter().fold(first, |source: Result<Source, _>, o| source?.with(&[o.clone()]));
+            match (together, one_by_one) {
+                (Ok(a), Ok(b)) => prop_assert_eq!(a.text, b.text),
+                (a, b) => prop_assert_eq!(a.is_err(), b.is_err()),
+            }
+        }
+    }
+
+    /// Keys that are there or not, alone or in lists, in braces, and above or below each other.
+    const KEYS: [&str; 13] = [
+        "seed",
+        "name",
+        "new",
+        "open",
+        "open.b",
+        "open.c.d",
+        "open.e",
+        "map.side",
+        "map.side.1",
+        "map",
+        "map.wide",
+        "robots.0.count",
+        "robots.1.count",
+    ];
+    const VALUES: [&str; 5] = ["7", "word", "[3, 4]", "{ x = 1 }", "\"two words\""];
 
     #[test]
     fn an_override_that_does_not_fit_says_so() {

@@ -171,12 +171,22 @@ impl Source {
     /// # Errors
     /// When either is missing or the format is another.
     pub fn preamble(&self) -> Result<Preamble, InputError> {
-        let preamble: Preamble = self.parse().map_err(|e| self.sweep_instead().unwrap_or(e))?;
+        let preamble = match toml::from_str::<Preamble>(self.top()) {
+            Ok(preamble) => preamble,
+            Err(_) => self.parse().map_err(|e| self.sweep_instead().unwrap_or(e))?,
+        };
         if *preamble.format.get_ref() == FORMAT {
             return Ok(preamble);
         }
         let cause = format!("scenario format {} is not known", preamble.format.get_ref());
         Err(self.error(Some(preamble.format.span()), cause, format!("write `format = {FORMAT}`")))
+    }
+
+    /// Returns the text above the first section, where the keys of all worlds stand; it may end in the middle of
+    /// something that has lines which look like a section.
+    fn top(&self) -> &str {
+        let section = if self.text.starts_with('[') { Some(0) } else { self.text.find("\n[") };
+        &self.text[..section.unwrap_or(self.text.len())]
     }
 
     /// Returns the error for a file that is not a scenario because it is a sweep.
@@ -297,6 +307,17 @@ mod tests {
         let (head, own) = read("format = 1\nn = 3\nworld = \"w\"\ncycles = 7\n").expect("right");
         assert_eq!((head.seed, head.cycles, head.name.as_str()), (1, Some(7), ""));
         assert_eq!((*own.n.get_ref(), own.n.span()), (3, 15..16));
+    }
+
+    #[test]
+    fn format_and_world_are_found_above_sections_and_what_looks_like_one() {
+        for more in ["", "[a]\n= =", "[[a]]\n", "a = [\n[1]\n]\n[b]\n"] {
+            let text = format!("name = \"n\"\nformat = 1\nworld = \"w\"\n{more}");
+            let preamble = Source::new("s.toml", text, "").preamble().expect(more);
+            assert_eq!((preamble.world.get_ref().as_str(), preamble.world.span()), ("w", 30..33));
+        }
+        let none = Source::new("s.toml", "[a]\nworld = \"w\"\n", "").preamble();
+        assert!(none.expect_err("no world").cause().contains("format"));
     }
 
     #[test]

@@ -35,7 +35,18 @@ struct Known {
     world: Option<String>,
     name: Option<String>,
     scenario: Option<IgnoredAny>,
+    profile: Option<String>,
 }
+
+/// Endings of maps and images of floors, and what such a file is.
+const MAPS: [(&str, &str); 6] = [
+    ("yaml", "map of ROS"),
+    ("yml", "map of ROS"),
+    ("map", "map of MovingAI"),
+    ("png", "image: dark is wall"),
+    ("pgm", "image: dark is wall"),
+    ("world", "world of Stage"),
+];
 
 impl Files {
     /// Allows what lies below these folders, and these files.
@@ -193,8 +204,11 @@ fn kind_of_file(path: &Path, worlds: Worlds, foreign: &mut usize) -> Option<(Fil
                 ))
             }
             (None, Some(_)) => Some((FileKind::Sweep, String::new())),
-            (None, None) => None,
+            (None, None) => known.profile.map(|name| (FileKind::Profile, name)),
         };
+    }
+    if let Some((_, about)) = MAPS.iter().find(|(ending, _)| ends_in(ending)) {
+        return Some((FileKind::Map, (*about).into()));
     }
     *foreign += 1;
     let told = (*foreign <= MOST_FOREIGN).then(|| worlds.translate(path))?.ok()??;
@@ -214,6 +228,8 @@ mod tests {
             ("in/sweep.toml", "scenario = \"a.toml\"\n"),
             ("in/other.toml", "x = 1\n"),
             ("in/notes.txt", "words"),
+            ("in/hall.yaml", "image: hall.png\nresolution: 0.05\n"),
+            ("in/mine.toml", "format = 1\nprofile = \"mine\"\n"),
             ("in/.hidden.toml", "world = \"robots\"\n"),
             ("in/film.mcap", "..."),
             ("in/t.scn", "00:00:00.00>CRE A,B738,52,4,90,FL200,250\n"),
@@ -242,6 +258,8 @@ mod tests {
                 ("deep", FileKind::Folder, ""),
                 ("a.toml", FileKind::Scenario, "robots: crowd"),
                 ("film.mcap", FileKind::Recording, "0.0 MB"),
+                ("hall.yaml", FileKind::Map, "map of ROS"),
+                ("mine.toml", FileKind::Profile, "mine"),
                 ("run", FileKind::Run, ""),
                 ("sweep.toml", FileKind::Sweep, ""),
                 ("t.scn", FileKind::Foreign, ""),

@@ -8,7 +8,7 @@ import { brushed, floodCells, lineCells, rectangleCells, rectOf, type Cell } fro
 import type { Draft } from "./draft.svelte";
 import { valueAt, type Path } from "./keypath";
 import { airplaneItems, putAirplane, putWayPoint } from "./tools/airspace";
-import { chainItems, putBall, putBox, putWall } from "./tools/chain";
+import { chainItems, putBall, putBox, putPatrol, putPolygon, putWall } from "./tools/chain";
 import { insert, remove, set, type Item } from "./tools/item";
 import { around, putBody, putDoor, putGoal, robotItems, robotSide } from "./tools/robots";
 import { obstacleTo, toolsOf, type Tool, type ToolId } from "./tools/tools";
@@ -109,6 +109,8 @@ export class Bench {
       case "ball": return putBall(from, Math.max(Math.hypot(to[0] - from[0], to[1] - from[1]), 8 * this.m_per_px), this.m_per_px);
       case "wall": return putWall(from, to, this.m_per_px);
       case "box": return putBox(from, to, this.m_per_px);
+      case "polygon": return putPolygon(model, from, to, chosen, this.m_per_px);
+      case "patrol": return putPatrol(model, to, chosen, this.m_per_px);
       case "airplane": return putAirplane(from, this.#far(from, to), this.m_per_px);
       case "way-point": return putWayPoint(model, to, chosen, this.m_per_px);
       default: return this.ground ? this.#boxEdits(stroke, this.ground) : [];

@@ -474,7 +474,7 @@ about: string, };
 /**
  * The kind of a file or a folder.
  */
-export type FileKind = "folder" | "scenario" | "run" | "recording" | "sweep" | "foreign";
+export type FileKind = "folder" | "scenario" | "run" | "recording" | "sweep" | "foreign" | "map" | "profile";
 
 /**
  * A metric.

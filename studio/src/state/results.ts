@@ -1,5 +1,7 @@
 /** Addresses at which the server makes results of recordings and sweeps: reports, and what can be exported. */
 
+import type { SweepRun } from "../protocol";
+
 function address(route: string, fields: Record<string, string | number | undefined>): string {
   const given = Object.entries(fields).filter(([, value]) => value !== undefined);
   return `/${route}?${given.map(([name, value]) => `${name}=${encodeURIComponent(String(value))}`).join("&")}`;
@@ -8,6 +10,26 @@ function address(route: string, fields: Record<string, string | number | undefin
 /** The report of a folder, or a part of it: `html`, `markdown`, `figures`, or the name of a figure. */
 export function reportAddress(path: string, part?: string): string {
   return address("report", { path, as: part });
+}
+
+/** A run that was asked for in the page of a report: a variant by its name or its number, and a seed or none. */
+export interface WantedRun {
+  variant: string;
+  seed: string | null;
+}
+
+/** What a message of a report's page asks for; anything else is no concern of ours. */
+export function wantedRun(data: unknown): WantedRun | null {
+  const { opens } = (data ?? {}) as { opens?: Partial<WantedRun> };
+  if (typeof opens !== "object" || opens === null || typeof opens.variant !== "string") return null;
+  return { variant: opens.variant, seed: typeof opens.seed === "string" ? opens.seed : null };
+}
+
+/** The run that is asked for: of a variant's name, or of its number among the names; the first if no seed is named. */
+export function foundRun(runs: readonly SweepRun[], { variant, seed }: WantedRun): SweepRun | undefined {
+  const names = [...new Set(runs.map((run) => run.variant))];
+  const name = names.includes(variant) ? variant : /^\d+$/.test(variant) ? names[Number(variant)] : undefined;
+  return runs.find((run) => run.variant === name && (seed === null || run.seed === seed));
 }
 
 export interface Export {

@@ -370,6 +370,21 @@ describe("results", () => {
     await page.getByRole("button", { name: "Close sweep" }).click();
     await page.locator("canvas.picture").waitFor();
   });
+
+  test("a variant that is named in a report opens its first run, by its name or its number", async () => {
+    await openFile(/^sweep/);
+    await page.getByTestId("run-count").filter({ hasText: "3" }).waitFor();
+    const report = page.frameLocator("iframe");
+    await report.getByRole("button", { name: "0001" }).click();
+    await drawn(page);
+    const opened = (): unknown => server.calls.filter((call) => call.do === "open").at(-1);
+    expect(opened()).toEqual({ do: "open", what: { kind: "scenario", path: "robots.toml" }, seed: 1 });
+    await page.getByRole("button", { name: /sweep · sweep/ }).click();
+    await report.getByRole("button", { name: "count = 4" }).click();
+    await drawn(page);
+    // The frame itself tries what it may not.
+    expect(complaints.filter((words) => !words.includes("/enter") && !words.includes("Fetch API"))).toEqual([]);
+  });
 });
 
 describe("sessions", () => {

@@ -248,11 +248,19 @@ function result(url: string, response: ServerResponse): void {
   const policy = "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; frame-ancestors 'self'";
   const kept = part === null ? {} : { "content-disposition": `attachment; filename="made-up.${part}"` };
   response.writeHead(200, { "content-type": "text/html", "content-security-policy": policy, "x-frame-options": "SAMEORIGIN", ...kept });
-  response.end(`<!doctype html><title>r</title><h1>Report of ${fields.get("path")}</h1><p id="p">no script</p><script>
+  response.end(`<!doctype html><title>r</title><h1>Report of ${fields.get("path")}</h1><p id="p">no script</p>
+  ${fields.get("path") === "sweep" ? VARIANTS : ""}<script>
     document.getElementById("p").textContent = "origin " + origin;
     fetch("/enter").then(() => (document.title = "reached"), () => (document.title = "kept in"));
-  </script>`);
+  </script><script>${REPORT_SCRIPT}</script>`);
 }
+
+/** The script of the program's own reports. */
+const REPORT_SCRIPT = readFileSync(new URL("../../../crates/report/src/html/page.js", import.meta.url), "utf8");
+
+const VARIANTS = `<div class="wide"><div class="scrolled"><table class="sortable">
+  <thead><tr><th scope="col">variant</th><th scope="col">mean</th></tr></thead>
+  <tbody><tr><th scope="row">count = 4</th><td>1</td></tr><tr><th scope="row">0001</th><td>2</td></tr></tbody></table></div></div>`;
 
 function files(folder: string | null): Answer {
   if (folder !== null) return { is: "files", entries: [{ path: "crowd.toml", name: "crowd.toml", kind: "scenario", about: "Ten thousand robots" }] };

@@ -1,13 +1,13 @@
 /** What is drawn, filled in and typed is what the program runs and writes. SIDESTEP_BINARY names the program. */
 
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { copyFileSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from "vitest";
 import { drawn, launch, openPage, WAIT_MS } from "../browser";
 import { Hand } from "../drawing";
-import { BINARY, Program } from "./program";
+import { BINARY, Program, SCENARIOS } from "./program";
 
 const HALL = `# A hall with one robot that goes east.
 
@@ -255,5 +255,54 @@ describe.skipIf(BINARY === "")("the real program", () => {
     expect(await page.getByTestId("agent-count").textContent()).toBe(free);
     await page.getByRole("tab", { name: "Text" }).click();
     await page.locator(".cm-line", { hasText: /^#{40,}$/ }).first().waitFor();
+  });
+
+  test("a polygon and a patrol are put with the mouse, and the program takes them", async () => {
+    copyFileSync(join(SCENARIOS, "chain", "default.toml"), join(folder, "chain.toml"));
+    await open("chain.toml");
+    await edit();
+    await hand.tool("Polygon");
+    await hand.drag([2, 5], [4, 5]);
+    await checked();
+    await hand.tool("Ball");
+    await hand.drag([7, 5], [7.3, 5]);
+    await checked();
+    await hand.tool("Patrol");
+    await hand.click(9, 5.5);
+    await checked();
+    await hand.click(9, 6.5);
+    await checked();
+    await page.keyboard.press("Control+s");
+    await page.getByRole("toolbar", { name: "Editing" }).getByText("changed, not saved").waitFor({ state: "hidden" });
+    const text = readFileSync(join(folder, "chain.toml"), "utf8");
+    expect(text).toMatch(/^corners_m = \[\[2(\.0\d*)?, 5/m);
+    expect(text).toMatch(/^patrol_m = \[\[7[^\]]*\], \[(9|8\.99|9\.0)[^\]]*\], \[(9|8\.99|9\.0)[^\]]*\]\]/m);
+    expect(complaints).toEqual([]);
+  });
+
+  /** Runs to the end, and returns the digest that is told there. */
+  async function digest(): Promise<string> {
+    await page.getByLabel("Speed", { exact: true }).selectOption("fastest");
+    await page.getByRole("button", { name: "Play", exact: true }).click();
+    return (await page.locator(".banner .digest").textContent())!;
+  }
+
+  test.each(["building.toml", "office.toml"])("the walls of %s, taken into the text, give the run that they gave before", async (name) => {
+    const examples = join(SCENARIOS, "..", "examples");
+    for (const one of ["building.yaml", "building.png"]) copyFileSync(join(examples, one), join(folder, one));
+    const from = name === "building.toml" ? join(examples, name) : join(SCENARIOS, "robots", name);
+    writeFileSync(join(folder, name), readFileSync(from, "utf8").replace(/^cycles = .*$/m, "cycles = 300"));
+    await open(name);
+    const before = await digest();
+    expect(before).toMatch(/^[0-9a-f]{32}$/);
+    await page.getByRole("button", { name: "Edit", exact: true }).click();
+    await page.getByRole("button", { name: "Take the walls into the text" }).click();
+    await page.getByRole("button", { name: "Brush", exact: true }).waitFor();
+    await checked();
+    await page.getByRole("button", { name: "Run", exact: true }).click();
+    // It goes as fast as before, to its end.
+    await page.locator("canvas.layer").waitFor({ state: "detached" });
+    expect(await page.locator(".banner .digest").textContent()).toBe(before);
+    expect(complaints).toEqual([]);
   });
 });

@@ -1,7 +1,7 @@
 /** Addresses and names of results hold whatever folders and scenarios are called. */
 
 import { expect, test } from "vitest";
-import { exportAddress, plainName, reportAddress } from "../../src/state/results";
+import { exportAddress, foundRun, plainName, reportAddress, wantedRun } from "../../src/state/results";
 
 test("paths are written so that the server reads them as they are", () => {
   expect(reportAddress("runs/a & b/ü%")).toBe("/report?path=runs%2Fa%20%26%20b%2F%C3%BC%25");
@@ -12,4 +12,18 @@ test("paths are written so that the server reads them as they are", () => {
 
 test("names of files are plain", () => {
   expect(["Made-up hall", "../a/b", "…", "v1.2 (é)"].map(plainName)).toEqual(["Made-up-hall", "a-b", "sidestep", "v1.2"]);
+});
+
+test("what a report's page asks for is read with care, and found by name or number", () => {
+  const run = (variant: string, seed: string) => ({ variant, seed, failure: "", replay: { kind: "scenario", path: "x" } });
+  const runs = [run("n=1", "7"), run("n=1", "8"), run("n=2", "7")];
+  const found = (data: unknown) => {
+    const wanted = wantedRun(data);
+    return wanted && foundRun(runs, wanted);
+  };
+  expect(found({ opens: { variant: "n=2", seed: null } })).toBe(runs[2]);
+  expect(found({ opens: { variant: "n=1", seed: "8" } })).toBe(runs[1]);
+  expect(found({ opens: { variant: "0001" } })).toBe(runs[2]);
+  expect(found({ opens: { variant: "0009" } })).toBeUndefined();
+  expect([null, 3, "opens", {}, { opens: null }, { opens: { variant: 3 } }].map(found)).toEqual(Array(6).fill(null));
 });

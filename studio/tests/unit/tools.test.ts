@@ -2,7 +2,7 @@ import { describe, expect, test } from "vitest";
 import { Board, groundOf } from "../../src/edit/board";
 import type { Table } from "../../src/edit/keypath";
 import { airplaneItems, headingTo, putAirplane, putWayPoint } from "../../src/edit/tools/airspace";
-import { chainItems, putBall, putBox, putWall } from "../../src/edit/tools/chain";
+import { chainItems, putBall, putBox, putPatrol, putPolygon, putWall } from "../../src/edit/tools/chain";
 import { around, putBody, putDoor, putGoal, robotItems } from "../../src/edit/tools/robots";
 
 const board = new Board("######\n#....#\n#....#\n######\n", 0.5);
@@ -99,6 +99,28 @@ describe("chains", () => {
     expect(putBox([0, 2, 0], [1, 0, 0], 0.01)[0]).toMatchObject({ value: { at_m: [0.5, 1], size_m: [1, 2] } });
     expect(putBox([0, 0, 0], [1, 0, 0], 0.01)).toEqual([]);
     expect(putWall([0, 0, 0], [0, 0, 0], 0.01)).toEqual([]);
+  });
+
+  test("a polygon begins as a triangle, and gets its corners in the edge that is nearest", () => {
+    const [triangle] = putPolygon(model, [0, 0, 0], [2, 0, 0], null, 0.01);
+    expect(triangle).toEqual({ op: "insert", key: "obstacles", at: null, value: { corners_m: [[0, 0], [2, 0], [1, 1.6]] } });
+    expect(putPolygon(model, [0, 0, 0], [0, 0, 0], null, 0.01)).toEqual([]);
+    const corner = (x: number, y: number) => putPolygon(model, [x, y, 0], [x, y, 0], ["obstacles", 3, "corners_m", 1], 0.01);
+    expect(corner(0.5, -0.2)).toEqual([{ op: "insert", key: "obstacles.3.corners_m", at: 1, value: [0.5, -0.2] }]);
+    expect(corner(0.7, 0.7)).toMatchObject([{ at: 2 }]);
+    expect(corner(-0.3, 0.5)).toMatchObject([{ at: 3 }]);
+  });
+
+  test("a patrol begins where the obstacle is, goes on with each click, and takes the place of a straight way", () => {
+    expect(putPatrol(model, [5, 2, 0], ["obstacles", 0], 0.01)).toEqual([
+      { op: "set", key: "obstacles.0.patrol_m", value: [[4, 1.5], [5, 2]] },
+      { op: "set", key: "obstacles.0.speed_m_s", value: 0.5 },
+    ]);
+    const moving: Table = { obstacles: { at_m: [1, 1], radius_m: 1, patrol_m: [[1, 1], [2, 2]] } };
+    expect(putPatrol(moving, [3, 3, 0], null, 0.01)).toEqual([{ op: "insert", key: "obstacles.patrol_m", at: null, value: [3, 3] }]);
+    const straight: Table = { obstacles: [{ at_m: [1, 1], velocity_m_s: [1, 0] }, { ends_m: [[0, 0], [1, 1]] }] };
+    expect(putPatrol(straight, [3, 3, 0], ["obstacles", 1], 0.01).map((edit) => edit.op)).toEqual(["remove", "set", "set"]);
+    expect(putPatrol({ obstacles: { ends_m: [[0, 0], [1, 1]] } }, [3, 3, 0], null, 0.01)).toEqual([]);
   });
 });
 

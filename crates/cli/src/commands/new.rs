@@ -56,6 +56,9 @@ fn write_new(path: &Path, text: &str) -> Result<(), InputError> {
         let remedy = "name a file that is not there yet, in a folder where you may write";
         InputError::new(path.display(), format!("cannot make the file: {e}"), remedy)
     };
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).map_err(refuse)?;
+    }
     let mut file = std::fs::File::create_new(path).map_err(refuse)?;
     file.write_all(text.as_bytes()).map_err(refuse)
 }

@@ -4,16 +4,19 @@ use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::worlds;
 use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::Value;
 use sidestep::kernel::InputError;
+use sidestep::scenario::Kind;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
   sidestep schema -o sidestep.schema.json
   sidestep schema robots | jq '.properties | keys'
+  sidestep schema sweep -o sweep.schema.json     also: profile
 
-An editor completes and checks the keys of a scenario that begins with the line
+An editor completes and checks the keys of a file that begins with the line
   #:schema ./sidestep.schema.json
 if it knows TOML by taplo (Even Better TOML for VS Code, and others).";
 
@@ -21,13 +24,32 @@ if it knows TOML by taplo (Even Better TOML for VS Code, and others).";
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct SchemaArgs {
-    /// World of the scenarios [default: any, by their key `world`]
-    #[arg(value_name = "WORLD", value_parser = super::new::names())]
-    world: Option<String>,
+    /// World of the scenarios, or another kind of file [default: any world, by the key `world`]
+    #[arg(value_name = "WORLD", value_parser = names())]
+    of: Option<String>,
 
     /// Output file, which is replaced [default: standard output]
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
+}
+
+/// The word for sweep files.
+const SWEEP: &str = "sweep";
+
+/// Returns files beside scenarios, each with a word for it and its schema.
+fn other_files() -> Vec<(&'static str, Value)> {
+    let own = worlds().0.iter().flat_map(|kind| kind.other_files());
+    own.chain([(SWEEP, sidestep::experiment::sweep::file::schema())]).collect()
+}
+
+/// The names of the worlds, and the words for other files.
+fn names() -> PossibleValuesParser {
+    let world = |kind: &&dyn Kind| PossibleValue::new(kind.name()).help(kind.about());
+    let other = |(word, schema): &(&'static str, Value)| {
+        PossibleValue::new(*word).help(schema["title"].as_str().unwrap_or_default().to_string())
+    };
+    let others = other_files();
+    PossibleValuesParser::new(worlds().0.iter().map(world).chain(others.iter().map(other)))
 }
 
 /// Runs the command.
@@ -35,14 +57,16 @@ pub(crate) struct SchemaArgs {
 /// # Errors
 /// When the file cannot be written.
 pub(crate) fn schema(args: &SchemaArgs, console: Console) -> Result<ExitCode, Failure> {
-    let schema = worlds().schema(args.world.as_deref());
-    let schema = schema.expect("the parser takes the names of worlds alone");
+    let of = args.of.as_deref();
+    let other = other_files().into_iter().find(|(word, _)| Some(*word) == of);
+    let schema = other.map(|(_, schema)| schema).or_else(|| worlds().schema(of));
+    let schema = schema.expect("the parser takes these names alone");
     let text = format!("{schema:#}\n");
     match &args.out {
         None => console.result(&schema, || text),
         Some(file) => {
             write(file, &text)?;
-            let written = serde_json::json!({ "file": file, "world": args.world });
+            let written = serde_json::json!({ "file": file, "of": args.of });
             console.result(&written, || told(file, &schema));
         }
     }
@@ -53,7 +77,7 @@ pub(crate) fn schema(args: &SchemaArgs, console: Console) -> Result<ExitCode, Fa
 fn told(file: &Path, schema: &Value) -> String {
     let title = schema["title"].as_str().unwrap_or_default();
     let file = file.display();
-    format!("Wrote {file}: {title}\nBegin scenarios with the line\n  #:schema {file}\n")
+    format!("Wrote {file}: {title}\nBegin such files with the line\n  #:schema {file}\n")
 }
 
 fn write(file: &Path, text: &str) -> Result<(), InputError> {

@@ -77,6 +77,9 @@ struct PlanArgs {
     #[command(flatten)]
     changes: ChangeArgs,
 
+    #[command(flatten)]
+    workers: WorkersArg,
+
     /// Folder of the sweep; it must be new or empty
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -145,7 +148,7 @@ pub(super) fn many_runs(
         let (plan, ended) = sweep::in_memory(worlds(), &wanted, workers, &watch)?;
         return tell(Told { plan: &plan, folder: None, console }, ended, "");
     };
-    go_on(&sweep::planned_or_there(worlds(), &wanted, out, &watch)?, workers, console)
+    go_on(&sweep::planned_or_there(worlds(), &wanted, out, workers, &watch)?, workers, console)
 }
 
 fn share(args: &ShareArgs, console: Console) -> Result<ExitCode, Failure> {
@@ -166,7 +169,8 @@ fn collect(args: &CollectArgs, console: Console) -> Result<ExitCode, Failure> {
 fn plan(args: &PlanArgs, console: Console) -> Result<ExitCode, Failure> {
     let wanted = args.many.sweep(&args.file, &args.changes)?;
     interrupt::listen()?;
-    let folder = sweep::planned(worlds(), &wanted, &args.out, &Watch::new(console))?;
+    let (workers, watch) = (args.workers.count(), Watch::new(console));
+    let folder = sweep::planned(worlds(), &wanted, &args.out, workers, &watch)?;
     let plan = folder.plan();
     let json = json!({
         "folder": args.out,

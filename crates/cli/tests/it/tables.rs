@@ -44,17 +44,16 @@ fn record(text: &str) -> Place {
 #[test]
 fn boxes_can_be_drawn_in_meters_and_ids_told_by_kind_from_the_table_alone() {
     let place = record(FLOOR);
-    let table = read_table(&place.path("s"), "trajectories", ..).expect("it is complete");
-    let about: BTreeMap<_, _> = table.schema.about.into_iter().collect();
-    let of = |name: &str| about.get(name).map(String::as_str);
-    assert_eq!(of("box_m"), Some("0.25"));
-    assert_eq!(
-        (of("origin_x_m"), of("origin_y_m"), of("yaw_rad")),
-        (Some("0"), Some("0"), Some("0"))
-    );
-    assert_eq!(of("ids_robot"), Some("0-2"));
-    assert_eq!(of("ids_person"), Some("3-4"));
-    assert_eq!(of("ids_door"), Some("5-5"));
+    for name in ["trajectories", "events"] {
+        let table = read_table(&place.path("s"), name, ..).expect("it is complete");
+        let about: BTreeMap<_, _> = table.schema.about.into_iter().collect();
+        let of = |name: &str| about.get(name).map(String::as_str);
+        assert_eq!(of("box_m"), Some("0.25"), "{name}");
+        let place = ["origin_x_m", "origin_y_m", "yaw_rad"].map(of);
+        assert_eq!(place, [Some("0"); 3], "{name}");
+        let ids = ["ids_robot", "ids_person", "ids_door"].map(of);
+        assert_eq!(ids, [Some("0-2"), Some("3-4"), Some("5-5")], "{name}");
+    }
 }
 
 fn text_column<'t>(table: &'t Table, name: &str) -> (&'t ColumnSpec, &'t Values) {

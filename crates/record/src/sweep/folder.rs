@@ -14,7 +14,7 @@ use crate::folder::check_vacant;
 use crate::format::{self, FormatVersion};
 use crate::manifest::{self, OF_SWEEP as MANIFEST, json};
 use crate::staging::Staging;
-use crate::whole::{self, WholeTable};
+use crate::whole::{self, GrowingTable, WholeTable};
 
 const CELLS: &str = "cells.parquet";
 const RESULTS: &str = "results.parquet";
@@ -23,6 +23,7 @@ const SHARES: &str = "shares";
 const VARIANTS: &str = "variants";
 const RUNS: &str = "runs";
 const SCENARIO: &str = "scenario.toml";
+const SCRATCH: &str = "joining.partial";
 
 /// The content of `sweep.json`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -54,6 +55,53 @@ pub struct Share {
 pub struct SweepFolder<P> {
     path: PathBuf,
     manifest: SweepManifest<P>,
+}
+
+/// The table of runs, and that of the times that they took, while they are written.
+pub struct Completion {
+    results: GrowingTable,
+    timings: GrowingTable,
+}
+
+impl Completion {
+    /// Appends runs to both.
+    ///
+    /// # Errors
+    /// Other columns than it was begun with; an I/O error.
+    pub fn append<R>(
+        &mut self,
+        results: &[&RoleColumn<R>],
+        timings: &[&RoleColumn<R>],
+    ) -> Result<(), RecordError> {
+        self.results.append(results)?;
+        self.timings.append(timings)
+    }
+
+    /// Completes both. The table of timings comes first, because the sweep is done once the results exist.
+    ///
+    /// # Errors
+    /// An I/O error.
+    pub fn finish(self) -> Result<(), RecordError> {
+        self.timings.finish()?;
+        self.results.finish()
+    }
+}
+
+/// A folder that goes with whoever holds it.
+#[derive(Debug)]
+pub struct Scratch(PathBuf);
+
+impl Scratch {
+    /// Returns its path.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
 }
 
 impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
@@ -221,19 +269,24 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         fs::remove_file(&path).map_err(|e| RecordError::new(path.display(), e))
     }
 
-    /// Passes on the parts of shares that are done, one by one.
+    /// Passes on the parts of shares that are done, one by one, and those block by block.
     ///
     /// # Errors
-    /// A part that cannot be read.
-    pub fn parts<R: DeserializeOwned>(
+    /// A part that cannot be read; blocks before have been passed on.
+    pub fn parts<R: DeserializeOwned + Clone>(
         &self,
         mut each: impl FnMut(WholeTable<R>),
     ) -> Result<(), InputError> {
         for share in self.shares_with("parquet")? {
             let path = self.share_file(share, "parquet");
-            let table = whole::read(&path)?;
-            self.check_version(&path, &table)?;
-            each(table);
+            let mut version = Ok(());
+            whole::read_blocks(&path, |block| {
+                version = self.check_version(&path, &block);
+                if version.is_ok() {
+                    each(block);
+                }
+            })?;
+            version?;
         }
         Ok(())
     }
@@ -258,22 +311,38 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         Ok(())
     }
 
-    /// Writes the table of runs. The table of timings comes first, because the sweep is done once
-    /// the results exist.
+    /// Begins the table of runs, with columns of these names, roles and types, and that of their times.
     ///
     /// # Errors
     /// An I/O error.
-    pub fn complete<R: Serialize>(
+    pub fn completion<R: Serialize>(
         &self,
         results: &[&RoleColumn<R>],
         timings: &[&RoleColumn<R>],
-    ) -> Result<(), RecordError> {
+    ) -> Result<Completion, RecordError> {
         let plan = serde_json::to_string(self.plan())
             .map_err(|e| RecordError::new(self.path.display(), e))?;
         let extra = [("sidestep.plan", plan), ("sidestep.fingerprint", self.fingerprint())];
         let version = &self.manifest.program_version;
-        whole::write(&self.path.join(TIMINGS), timings, version, &extra)?;
-        whole::write(&self.path.join(RESULTS), results, version, &extra)
+        let table = |name: &str, columns| {
+            GrowingTable::create(&self.path.join(name), columns, version, &extra)
+        };
+        Ok(Completion { timings: table(TIMINGS, timings)?, results: table(RESULTS, results)? })
+    }
+
+    /// Returns an empty folder of its own in this one, for what does not fit in memory while runs are joined. What a
+    /// kill has left there is taken away.
+    ///
+    /// # Errors
+    /// An I/O error.
+    pub fn scratch(&self) -> Result<Scratch, RecordError> {
+        let path = self.path.join(SCRATCH);
+        let failed = |e: std::io::Error| RecordError::new(path.display(), e);
+        if path.exists() {
+            fs::remove_dir_all(&path).map_err(failed)?;
+        }
+        make_folder(&path)?;
+        Ok(Scratch(path))
     }
 
     /// Whether the table of all runs exists.
@@ -290,7 +359,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     ///
     /// # Errors
     /// A sweep that is not done, or a damaged table.
-    pub fn results<R: DeserializeOwned>(&self) -> Result<WholeTable<R>, InputError> {
+    pub fn results<R: DeserializeOwned + Clone>(&self) -> Result<WholeTable<R>, InputError> {
         if !self.is_complete() {
             let remedy = "go on with `sidestep resume DIR`, or run its shares and \
                           `sidestep sweep collect DIR`";
@@ -307,7 +376,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     ///
     /// # Errors
     /// A sweep that is not done, or a damaged table.
-    pub fn timings<R: DeserializeOwned>(&self) -> Result<WholeTable<R>, InputError> {
+    pub fn timings<R: DeserializeOwned + Clone>(&self) -> Result<WholeTable<R>, InputError> {
         whole::read(&self.path.join(TIMINGS))
     }
 
@@ -449,10 +518,40 @@ mod tests {
         folder.parts(|part| parts.push(part.columns)).unwrap();
         assert_eq!(parts, [cells()]);
         assert!(folder.results::<String>().unwrap_err().cause().contains("not done"));
-        folder.complete(&refs, &refs).unwrap();
+        let mut completion = folder.completion(&refs, &refs).unwrap();
+        assert!(!folder.is_complete());
+        completion.append(&refs, &refs).unwrap();
+        completion.append(&refs, &refs).unwrap();
+        completion.finish().unwrap();
         let again = Folder::open(&path).unwrap();
         assert_eq!((again.plan(), again.is_complete()), (&vec![4, 5], true));
-        assert_eq!(again.results().unwrap().columns, cells());
+        let twice = Values::I64(vec![0, 1, 0, 1].into());
+        assert_eq!(again.results::<String>().unwrap().columns[0].values, twice);
+    }
+
+    #[test]
+    fn a_table_of_runs_that_is_not_finished_and_a_place_to_join_them_leave_nothing() {
+        let place = tempfile::tempdir().unwrap();
+        let folder = create(&place.path().join("sweep")).unwrap();
+        let names = || {
+            let entries = fs::read_dir(folder.path()).unwrap();
+            let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name()).collect();
+            names.sort();
+            names
+        };
+        let before = names();
+        let columns = cells();
+        let refs: Vec<_> = columns.iter().collect();
+        let mut completion = folder.completion(&refs, &refs).unwrap();
+        completion.append(&refs, &refs).unwrap();
+        drop(completion);
+        // A kill leaves its files there.
+        std::mem::forget(folder.scratch().unwrap());
+        fs::write(folder.path().join(SCRATCH).join("old"), "rest").unwrap();
+        let scratch = folder.scratch().unwrap();
+        assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 0);
+        drop(scratch);
+        assert_eq!(names(), before);
     }
 
     #[test]

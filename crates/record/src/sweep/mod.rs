@@ -8,6 +8,7 @@
 //! shares/1-of-4.parquet     the same, once the share is done
 //! results.parquet           one row per run, of all shares: exists if and only if the sweep is done
 //! timings.parquet           the times that each run took
+//! joining.partial/          runs sorted into piles, while they are joined: if they are too many for the memory
 //! runs/000012/              run folders, if they were requested
 //! ```
 //!
@@ -18,5 +19,5 @@
 mod folder;
 mod journal;
 
-pub use folder::{Share, SweepFolder, SweepManifest, fingerprint};
+pub use folder::{Completion, Scratch, Share, SweepFolder, SweepManifest, fingerprint};
 pub use journal::{Journal, read_journal};

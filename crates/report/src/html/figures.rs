@@ -17,7 +17,7 @@ pub(super) fn figure(figure: &Figure, id: &str, still: Option<&SvgFile>) -> Mark
         figure .plot id=(id) {
             figcaption { (figure.title) }
             @if let Some(still) = still {
-                img .still src=(data_address(&still.svg)) alt=(words(figure));
+                (image(&still.svg, Some("still"), &words(figure)))
             }
             div .drawn hidden {}
             script type="application/json" { (PreEscaped(safe_json(&data))) }
@@ -36,7 +36,7 @@ pub(super) fn picture(picture: &Picture, id: &str) -> Markup {
     html! {
         figure .picture id=(id) {
             figcaption { (picture.title) }
-            img src=(data_address(&picture.svg)) alt={ (picture.title) ". " (picture.caption) };
+            (image(&picture.svg, None, &format!("{}. {}", picture.title, picture.caption)))
             @if !picture.caption.is_empty() { p .note { (picture.caption) } }
         }
     }
@@ -89,20 +89,28 @@ fn safe_json(value: &serde_json::Value) -> String {
     value.to_string().replace('<', "\\u003c").replace('\u{2028}', "\\u2028")
 }
 
-/// Returns an SVG as the address of an image.
+/// Returns an image of an SVG, which stands in its address.
+fn image(svg: &str, class: Option<&str>, words: &str) -> Markup {
+    let class = class.map_or_else(String::new, |class| format!(" class=\"{class}\""));
+    let words = html! { (words) }.into_string();
+    // In single quotes, of which pictures have few: every double one would take three bytes.
+    html! { (PreEscaped(format!("<img{class} src='{}' alt=\"{words}\">", data_address(svg)))) }
+}
+
+/// Returns an SVG as the address of an image, for an attribute in single quotes. Addresses take marks of
+/// HTML as they are, and so do attributes, so that only what would end either is written in another way.
 fn data_address(svg: &str) -> String {
-    let mut address = String::with_capacity(svg.len() + svg.len() / 4);
+    let mut address = String::with_capacity(svg.len() + svg.len() / 8);
     address.push_str("data:image/svg+xml;charset=utf-8,");
     for c in svg.chars() {
         match c {
             '%' => address.push_str("%25"),
             '#' => address.push_str("%23"),
-            '<' => address.push_str("%3C"),
-            '>' => address.push_str("%3E"),
-            // Shorter than the entity that an attribute would need.
-            '"' => address.push_str("%22"),
+            '\'' => address.push_str("%27"),
             '&' => address.push_str("%26"),
-            '\n' => address.push_str("%0A"),
+            // None is needed between elements.
+            '\n' if address.ends_with('>') => {}
+            '\n' => address.push(' '),
             _ => address.push(c),
         }
     }
@@ -124,11 +132,13 @@ mod tests {
     }
 
     #[test]
-    fn an_address_holds_no_mark_of_html() {
-        let address = data_address("<a b=\"#1\">50 % &amp;</a>\n");
+    fn nothing_in_a_picture_ends_its_address_or_its_attribute() {
+        let image =
+            image("<a b=\"#1\">50 % &amp; 'c'</a>\n", Some("still"), "\"A\" & <b>").into_string();
         assert_eq!(
-            address,
-            "data:image/svg+xml;charset=utf-8,%3Ca b=%22%231%22%3E50 %25 %26amp;%3C/a%3E%0A"
+            image,
+            "<img class=\"still\" src='data:image/svg+xml;charset=utf-8,<a b=\"%231\">50 %25 %26amp; \
+             %27c%27</a>' alt=\"&quot;A&quot; &amp; &lt;b&gt;\">"
         );
     }
 }

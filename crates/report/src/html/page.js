@@ -5,7 +5,7 @@
 
   // The number that a cell begins with, `1 234.5 [1 200, 1 300]` or `-`; NaN where there is none.
   function leading(cell) {
-    const found = cell.trim().replaceAll("\u2212", "-").match(/^[-+]?\d+( \d{3})*(\.\d+)?(e[-+]?\d+)?/i);
+    const found = cell.trim().replaceAll("\u2212", "-").replaceAll("\u2060", "").match(/^[-+]?\d+( \d{3})*(\.\d+)?(e[-+]?\d+)?/i);
     return found ? Number(found[0].replaceAll(" ", "")) : NaN;
   }
 
@@ -113,6 +113,28 @@
     }).observe(room);
     fit();
   }
+
+  // ---- Runs ----
+
+  // In the frame of the studio, whoever asks for a variant gets its run of a seed, or its first: the studio
+  // hears of it, and looks for the run itself. A page of its own has no one to ask.
+  function withRuns(table) {
+    const heads = [...table.tHead.rows[0].cells].map((head) => head.textContent);
+    const [named, seeded] = [heads.indexOf("variant"), heads.indexOf("seed")];
+    for (const row of named < 0 ? [] : table.tBodies[0].rows) {
+      const cell = row.cells[named];
+      const [variant, seed] = [cell.textContent, seeded < 0 ? null : row.cells[seeded].textContent];
+      const button = document.createElement("button");
+      button.type = "button";
+      button.className = "open";
+      button.title = seed ? `Opens the run of seed ${seed}` : "Opens the first run";
+      button.append(...cell.childNodes);
+      button.addEventListener("click", () => window.parent.postMessage({ opens: { variant, seed } }, "*"));
+      cell.append(button);
+    }
+  }
+
+  if (window.parent !== window) document.querySelectorAll("table.sortable").forEach(withRuns);
 
   // A link to something folded opens it.
   function open() {

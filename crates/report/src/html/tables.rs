@@ -70,9 +70,12 @@ fn breakable(name: &str) -> Markup {
     }
 }
 
-/// Returns a cell in which the two ends of an interval stay on one line.
+/// Returns a cell in which the two ends of an interval stay on one line, and an exponent with its number.
 fn kept(cell: &str) -> String {
-    if cell.contains('[') { cell.replace(", ", ",\u{a0}") } else { cell.into() }
+    match cell.contains('[') {
+        true => cell.replace(", ", ",\u{a0}").replace("e-", "e-\u{2060}"),
+        false => cell.into(),
+    }
 }
 
 /// Returns the place of a table: the page's script takes the last columns away where they have no room,
@@ -112,7 +115,7 @@ pub(super) fn claims(claims: &[Claim]) -> Markup {
     html! {
         p .tally {
             @for verdict in Verdict::ALL {
-                (badge(verdict)) " " strong { (claim::count(claims, verdict)) } " "
+                span .count { (badge(verdict)) " " strong { (claim::count(claims, verdict)) } } " "
             }
         }
         (wide("Claims", table))

@@ -178,6 +178,26 @@ impl Source {
         self.change(set, told)
     }
 
+    /// Sets those of the keys that have values to others, given as TOML, with one reading of the text; returns the numbers
+    /// of the rest. Sets none where one key stands for another, or for a part of another.
+    pub(crate) fn replace_values(&mut self, given: &[(&str, String)]) -> Vec<usize> {
+        let all = || (0..given.len()).collect();
+        let Ok(layout) = Layout::of(&self.text) else { return all() };
+        let found =
+            |(key, text): &(&str, String)| set::replacement(&layout, &parts(key).ok()?, text);
+        let Some(found) = given.iter().map(found).collect::<Option<Vec<_>>>() else { return all() };
+        let mut ways: Vec<_> = found.iter().map(|(way, _)| way).collect();
+        // A way stands directly before those that go on from it.
+        ways.sort();
+        if ways.windows(2).any(|pair| pair[1].starts_with(pair[0])) {
+            return all();
+        }
+        let rest = (0..given.len()).filter(|k| found[*k].1.is_none()).collect();
+        let splices = found.into_iter().filter_map(|(_, splice)| splice).collect();
+        self.text = splice::spliced(&self.text, splices);
+        rest
+    }
+
     /// Makes one change.
     fn change(
         &mut self,

@@ -24,6 +24,22 @@ pub(super) fn set(layout: &Layout<'_>, key: &[Part], new: New<'_>) -> Result<Vec
     }
 }
 
+/// Returns the way of a key, and what sets its value if it has one that is written as one, not by dotted keys. A value in
+/// place of another leaves TOML, and all else where it is.
+pub(super) fn replacement(
+    layout: &Layout<'_>,
+    key: &[Part],
+    text: &str,
+) -> Option<(Vec<Step>, Option<Splice>)> {
+    let Reach { mut path, item, rest } = layout.reach(key).ok()?;
+    let span = match item {
+        Item::Value(old) if rest.is_empty() && !is_dotted(old) => old.span(),
+        _ => None,
+    };
+    path.extend(rest.into_iter().map(Step::Name));
+    Some((path, span.map(|span| replace(span, text))))
+}
+
 /// Returns what gives a header to a table that has none and gets keys of its own.
 pub(super) fn headed(
     layout: &Layout<'_>,

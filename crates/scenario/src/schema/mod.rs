@@ -96,6 +96,20 @@ pub fn of_world(kind: &dyn Kind) -> Value {
     Value::Object(all)
 }
 
+/// Returns the schema of a file of which `own` says the keys, with a title, and with the words of a commented scenario where
+/// both have a key.
+pub fn of_file(title: &str, mut own: Value, scenario: &str) -> Value {
+    describe::describe(&mut own, scenario);
+    let mut all = Map::new();
+    all.insert("$schema".into(), DRAFT.into());
+    all.insert("title".into(), title.into());
+    for (key, value) in own.as_object().cloned().unwrap_or_default() {
+        all.entry(key).or_insert(value);
+    }
+    all.insert("title".into(), title.into());
+    Value::Object(all)
+}
+
 /// Adds the sections of a world to the keys that all share.
 fn join(schema: &mut Value, own: &mut Map<String, Value>) {
     for (key, value) in std::mem::take(own) {

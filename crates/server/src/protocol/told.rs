@@ -224,6 +224,10 @@ pub enum FileKind {
     Sweep,
     /// A file of another program that stands for a scenario.
     Foreign,
+    /// A map or an image of a floor, which a scenario can name.
+    Map,
+    /// Sensors and effectors that were learned from logs, which a scenario can name.
+    Profile,
 }
 
 /// A message of the server that nobody asked for.

@@ -39,6 +39,16 @@ impl From<usize> for Engine<'_> {
     }
 }
 
+impl Engine<'_> {
+    /// Returns the number of threads of this process that plan the sweep.
+    pub fn planners(self) -> usize {
+        match self {
+            Self::Workers(workers) => workers,
+            Self::Crew(_) => 1,
+        }
+    }
+}
+
 /// Cells that a crew is to run, with their scenarios.
 pub struct Deal<'a> {
     pub(super) cells: &'a [Cell],

@@ -2,7 +2,10 @@
 
 use super::crew::Engine;
 use super::effort::Effort;
-use super::prepare::prepare;
+use super::gather::{Folder, gather, share_of, table_of};
+use super::look::finished;
+use super::piles::{PILE, Piles};
+use super::prepare::{Make, prepare};
 use super::work::{Take, Work};
 use crate::identity::Maker;
 use crate::identity::build;
@@ -11,19 +14,13 @@ use crate::{Error, Watcher};
 use sidestep::VERSION;
 use sidestep::experiment::sweep::rounds::Rounds;
 use sidestep::experiment::sweep::seeds::Trials;
-use sidestep::experiment::sweep::{
-    Cell, Outcome, Plan, Role, Rows, RunTable, Shard, Sweep, rows::cells,
-};
+use sidestep::experiment::sweep::{Cell, Outcome, Plan, Rows, RunTable, Shard, Sweep, rows::cells};
 use sidestep::kernel::InputError;
-use sidestep::scenario::{Source, Worlds};
-use sidestep_record::WholeTable;
-use sidestep_record::sweep::{Share, SweepFolder, fingerprint};
+use sidestep::scenario::{Resolved, Source, Worlds};
+use sidestep_record::sweep::{Completion, fingerprint};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// The folder of a sweep.
-pub type Folder = SweepFolder<Plan>;
 
 /// The result of working on a sweep, or on a share of one.
 pub enum Ended {
@@ -67,24 +64,25 @@ pub fn in_memory<'a>(
         let cause = "there is no folder to record runs to";
         return Err(InputError::new("--record-runs", cause, "name one with --out").into());
     }
-    let mut sources: Vec<Source> = Vec::new();
-    let plan = prepare(worlds, sweep, watcher, |_, source, _| {
-        sources.push(source.clone());
+    let engine = engine.into();
+    let make: Make<'_, Source> = &|_, source, _| Ok(source.clone());
+    let (plan, sources) = prepare(worlds, sweep, engine.planners(), watcher, make)?;
+    let source = |variant: u32| Ok(sources[variant as usize].clone());
+    let agents = plan.agents;
+    let work = Work { worlds, agents, source: &source, record: None, engine, watcher };
+    let (mut log, mut rows) = (Log::new(&plan), Rows::default());
+    let effort = log.run_all(&work, &mut |outcome| {
+        rows.push(outcome);
         Ok(())
     })?;
-    let source = |variant: u32| Ok(sources[variant as usize].clone());
-    let (agents, engine) = (plan.agents, engine.into());
-    let work = Work { worlds, agents, source: &source, record: None, engine, watcher };
-    let mut log = Log::new(&plan);
-    let effort = log.run_all(&work, &mut |_| Ok(()))?;
     let ended = match watcher.go_on() {
-        true => Done::now(log.rows.table(&plan)?, effort),
-        false => Ended::Interrupted(log.rows.len()),
+        true => Done::now(rows.table(&plan)?, effort),
+        false => Ended::Interrupted(log.finished.len()),
     };
     Ok((plan, ended))
 }
 
-/// Plans a sweep into a folder: completely or not at all.
+/// Plans a sweep into a folder, on so many workers: completely or not at all.
 ///
 /// # Errors
 /// When the sweep is wrong, or the folder is taken.
@@ -92,15 +90,16 @@ pub fn planned(
     worlds: Worlds,
     sweep: &Sweep,
     out: &Path,
+    workers: usize,
     watcher: &dyn Watcher,
 ) -> Result<Folder, Error> {
     Folder::create(out, VERSION, build(), |staging| {
-        let mut fingerprints = Vec::new();
-        let plan = prepare(worlds, sweep, watcher, |k, source, compiled| {
-            let resolved = compiled.resolve(source)?;
-            fingerprints.push(fingerprint(resolved.text.as_bytes(), &resolved.files));
-            Ok(Folder::write_variant(staging, k, &resolved.text, &resolved.files)?)
-        })?;
+        let (plan, fingerprints) =
+            prepare(worlds, sweep, workers, watcher, &|k, source, compiled| {
+                let Resolved { text, files } = compiled.resolve(source)?;
+                Folder::write_variant(staging, k, &text, &files)?;
+                Ok(fingerprint(text.as_bytes(), &files))
+            })?;
         let cells = cells(&plan).columns;
         Ok::<_, Error>((plan, fingerprints, cells))
     })
@@ -114,11 +113,12 @@ pub fn planned_or_there(
     worlds: Worlds,
     sweep: &Sweep,
     out: &Path,
+    workers: usize,
     watcher: &dyn Watcher,
 ) -> Result<Folder, Error> {
     match Folder::is_at(out) {
-        false => planned(worlds, sweep, out, watcher),
-        true => the_same(worlds, sweep, out, watcher),
+        false => planned(worlds, sweep, out, workers, watcher),
+        true => the_same(worlds, sweep, out, workers, watcher),
     }
 }
 
@@ -127,14 +127,13 @@ fn the_same(
     worlds: Worlds,
     sweep: &Sweep,
     out: &Path,
+    workers: usize,
     watcher: &dyn Watcher,
 ) -> Result<Folder, Error> {
     let folder = Folder::open(out)?;
-    let mut fingerprints = Vec::new();
-    let plan = prepare(worlds, sweep, watcher, |_, source, compiled| {
-        let resolved = compiled.resolve(source)?;
-        fingerprints.push(fingerprint(resolved.text.as_bytes(), &resolved.files));
-        Ok(())
+    let (plan, fingerprints) = prepare(worlds, sweep, workers, watcher, &|_, source, compiled| {
+        let Resolved { text, files } = compiled.resolve(source)?;
+        Ok(fingerprint(text.as_bytes(), &files))
     })?;
     let manifest = folder.manifest();
     if (&plan, &fingerprints) == (&manifest.plan, &manifest.fingerprints) {
@@ -171,9 +170,9 @@ pub fn go_on<'a>(
     }
     check_build(folder)?;
     let mut log = Log::new(folder.plan());
-    gather(folder, Some(Shard::ALL), |outcome| log.note(outcome))?;
+    gather(folder, Some(Shard::ALL), |outcome| log.note(&outcome))?;
     let mut effort = Effort::default();
-    if let Some(mut journal) = folder.journal(share_of(Shard::ALL), |o: Outcome| log.note(o))? {
+    if let Some(mut journal) = folder.journal(share_of(Shard::ALL), |o: Outcome| log.note(&o))? {
         with_work(worlds, folder, engine.into(), watcher, |work| {
             let mut keep = |outcome: &Outcome| Ok(journal.append(outcome)?);
             effort = log.run_all(work, &mut keep).map_err(|e| saved(e, folder.path()))?;
@@ -182,23 +181,45 @@ pub fn go_on<'a>(
         journal.sync()?;
     }
     if !watcher.go_on() {
-        return Ok(Ended::Interrupted(log.rows.len()));
+        return Ok(Ended::Interrupted(log.finished.len()));
     }
-    joined(folder, log.rows, effort, watcher)
+    joined(folder, PILE, effort, watcher)
 }
 
-/// Joins all runs into the sweep's tables.
+/// Joins all runs into the sweep's tables, in blocks of so many cells: only as many are in memory at a time.
 fn joined(
     folder: &Folder,
-    rows: Rows,
+    cells: u64,
     effort: Effort,
     watcher: &dyn Watcher,
 ) -> Result<Ended, Error> {
     let watched = Watched(watcher);
     watched.at(Progress::Stage { what: "joining the runs", share: 0.0 });
-    let table = rows.table(folder.plan())?;
+    let mut piles = Piles::new(folder, cells)?;
+    gather(folder, None, |outcome| piles.put(&outcome))?;
     watched.at(Progress::Stage { what: "writing the results", share: 0.5 });
-    folder.complete(&table.results(), &table.timings())?;
+    let (mut completion, mut only) = (None::<Completion>, None);
+    let of = folder.plan().len().max(1) as f64;
+    let mut written = 0;
+    piles.blocks(|block| {
+        let (results, timings) = (block.results(), block.timings());
+        let completion = match &mut completion {
+            Some(completion) => completion,
+            begun => begun.insert(folder.completion(&results, &timings)?),
+        };
+        completion.append(&results, &timings)?;
+        written += block.runs();
+        let share = 0.5 + 0.5 * (written as f64 / of).min(1.0);
+        watched.at(Progress::Stage { what: "writing the results", share });
+        only = (written == block.runs()).then_some(block);
+        Ok(())
+    })?;
+    completion.map_or(Ok(()), Completion::finish)?;
+    // A table of several blocks is read again once all that joined them is out of the memory.
+    let table = match only {
+        Some(table) => table,
+        None => finished(folder)?.table,
+    };
     Ok(Done::now(table, effort))
 }
 
@@ -221,10 +242,14 @@ pub fn share(
             "run it in one process with `sidestep resume DIR`, or plan it with --replicate";
         return Err(InputError::new(folder.path().display(), cause, remedy).into());
     }
-    let mut log = Log::new(plan);
+    let (mut log, mut rows) = (Log::new(plan), Rows::default());
+    let mut note = |outcome: Outcome| {
+        log.note(&outcome);
+        rows.push(&outcome);
+    };
     let journal = match folder.is_complete() {
         true => None,
-        false => folder.journal(share_of(shard), |outcome: Outcome| log.note(outcome))?,
+        false => folder.journal(share_of(shard), &mut note)?,
     };
     let Some(mut journal) = journal else {
         return Ok(Done::before(finished_of(folder, shard)?));
@@ -236,15 +261,19 @@ pub fn share(
     let cells: Vec<Cell> = plan.share(shard).filter(|c| !elsewhere.contains(&c.id)).collect();
     let mut effort = Effort::default();
     with_work(worlds, folder, workers.into(), watcher, |work| {
-        let mut keep = |outcome: &Outcome| Ok(journal.append(outcome)?);
+        let mut keep = |outcome: &Outcome| {
+            journal.append(outcome)?;
+            rows.push(outcome);
+            Ok(())
+        };
         effort = log.run(work, &cells, &mut keep).map_err(|e| saved(e, folder.path()))?;
         Ok(())
     })?;
     journal.sync()?;
     if !watcher.go_on() {
-        return Ok(Ended::Interrupted(log.rows.len()));
+        return Ok(Ended::Interrupted(log.finished.len()));
     }
-    let table = log.rows.table(plan)?;
+    let table = rows.table(plan)?;
     folder.end_share(share_of(shard), journal, &table.columns.iter().collect::<Vec<_>>())?;
     Ok(Done::now(table, effort))
 }
@@ -255,7 +284,7 @@ fn finished_of(folder: &Folder, shard: Shard) -> Result<RunTable, Error> {
     let mut rows = Rows::default();
     let mut take = |outcome: Outcome| {
         if own.contains(&outcome.cell) {
-            rows.push(outcome);
+            rows.push(&outcome);
         }
     };
     match folder.is_complete() {
@@ -276,7 +305,7 @@ pub fn collect(folder: &Folder, watcher: &dyn Watcher) -> Result<Ended, Error> {
     check_build(folder)?;
     let plan = folder.plan();
     let mut log = Log::new(plan);
-    gather(folder, None, |outcome| log.note(outcome))?;
+    gather(folder, None, |outcome| log.note(&outcome))?;
     let missing = if log.rounds.is_some() { log.open() } else { log.missing() }.len();
     if missing > 0 {
         let cause = format!("{missing} of {} runs are missing", plan.runs());
@@ -284,27 +313,7 @@ pub fn collect(folder: &Folder, watcher: &dyn Watcher) -> Result<Ended, Error> {
                       run the rest here: sidestep resume DIR";
         return Err(Error::stopped(cause, remedy));
     }
-    joined(folder, log.rows, Effort::default(), watcher)
-}
-
-/// Returns the table of runs in a file.
-pub(super) fn table_of(file: WholeTable<Role>) -> RunTable {
-    RunTable { columns: file.columns }
-}
-
-/// Converts a share to the type that folders use.
-fn share_of(shard: Shard) -> Share {
-    Share { index: shard.index, count: shard.count }
-}
-
-/// Passes on all finished runs, except those of the share `but`.
-pub(super) fn gather(
-    folder: &Folder,
-    but: Option<Shard>,
-    mut each: impl FnMut(Outcome),
-) -> Result<(), InputError> {
-    folder.parts(|part| table_of(part).outcomes(&mut each))?;
-    folder.journals(but.map(share_of), &mut each)
+    joined(folder, PILE, Effort::default(), watcher)
 }
 
 /// Passes on what is needed to run the cells of a folder.
@@ -348,10 +357,10 @@ fn saved(error: Error, folder: &Path) -> Error {
     }
 }
 
-/// All finished runs.
+/// The finished runs, as far as it takes to know which come next: a number for each.
 struct Log<'a> {
     plan: &'a Plan,
-    rows: Rows,
+    finished: Vec<u64>,
     rounds: Option<Rounds<'a>>,
     trials: Trials<'a>,
 }
@@ -362,15 +371,15 @@ type Keep<'a> = dyn FnMut(&Outcome) -> Result<(), Error> + Send + 'a;
 impl<'a> Log<'a> {
     fn new(plan: &'a Plan) -> Self {
         let rounds = plan.until.as_ref().map(|until| Rounds::new(plan, until));
-        Self { plan, rows: Rows::default(), rounds, trials: Trials::new(plan) }
+        Self { plan, finished: Vec::new(), rounds, trials: Trials::new(plan) }
     }
 
-    fn note(&mut self, outcome: Outcome) {
+    fn note(&mut self, outcome: &Outcome) {
         if let Some(rounds) = &mut self.rounds {
-            rounds.note(&outcome);
+            rounds.note(outcome);
         }
-        self.trials.note(&outcome);
-        self.rows.push(outcome);
+        self.trials.note(outcome);
+        self.finished.push(outcome.cell);
     }
 
     /// Returns the cells to run next: of the next round, or all, trials first.
@@ -388,7 +397,7 @@ impl<'a> Log<'a> {
     }
 
     fn unfinished(&self, cells: impl Iterator<Item = Cell>) -> Vec<Cell> {
-        let mut finished = self.rows.cells().to_vec();
+        let mut finished = self.finished.clone();
         finished.sort_unstable();
         cells.filter(|cell| finished.binary_search(&cell.id).is_err()).collect()
     }
@@ -413,17 +422,96 @@ impl<'a> Log<'a> {
         keep: &mut Keep<'_>,
     ) -> Result<Effort, Error> {
         let open = self.unfinished(cells.iter().copied());
-        let before = self.rows.len() as u64;
+        let before = self.finished.len() as u64;
         let mut effort = Effort::begin();
         let mut take = |outcome: Outcome| {
             keep(&outcome)?;
             effort.note(&outcome);
-            self.note(outcome);
+            self.note(&outcome);
             Ok(())
         };
         let take: &mut Take<'_> = &mut take;
         let ran = work.run(&open, (before, before + open.len() as u64), take);
         effort.end(work.at_once(open.len()));
         ran.map(|()| effort)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Unwatched;
+    use serde_json::json;
+    use sidestep::experiment::sweep::Factor;
+    use sidestep::worlds::WORLDS;
+    use sidestep_record::sweep::Share;
+
+    /// A planned sweep of two times 300 runs, all of them in journals of two shares: made up, and in no order.
+    fn folder(place: &Path) -> Folder {
+        let text =
+            "format = 1\nworld = \"airspace\"\n[airspace.generator]\nkind = \"random\"\nn = 2\n";
+        let mut sweep = Sweep::of_source(Source::new("s.toml", text, place));
+        sweep.design.factors = vec![Factor::parse("airspace.generator.n=2,3").expect("valid")];
+        sweep.replicates = 300;
+        let folder = planned(WORLDS, &sweep, &place.join("sweep"), 2, &Unwatched).expect("planned");
+        let mut cells: Vec<Cell> = folder.plan().share(Shard::ALL).collect();
+        cells.sort_by_key(|cell| cell.id.wrapping_mul(2_654_435_761) % 1009);
+        for index in 0..2 {
+            let share = Share { index, count: 2 };
+            let mut journal =
+                folder.journal(share, |_: Outcome| ()).expect("opened").expect("open");
+            for cell in cells.iter().filter(|cell| cell.id % 2 == u64::from(index)) {
+                journal.append(&outcome(*cell)).expect("written");
+            }
+        }
+        folder
+    }
+
+    /// Columns that come and go, and one whose type only a late cell tells.
+    fn outcome(cell: Cell) -> Outcome {
+        let value = if cell.id == 555 { json!(0.5) } else { json!(cell.id) };
+        let mut metrics = serde_json::Map::from_iter([("wide".to_string(), value)]);
+        if cell.id > 400 {
+            metrics.insert("late".into(), json!(cell.id % 3 == 0));
+        }
+        let costs = serde_json::Map::from_iter([("run_wall_s".to_string(), json!(0.25))]);
+        let (digest, failure) = (format!("end {}", cell.id), None);
+        Outcome { metrics, costs, digest, failure, cycles: 7, ..Outcome::failed(cell, "") }
+    }
+
+    #[test]
+    fn runs_joined_in_blocks_give_the_files_that_all_at_once_give() {
+        let place = tempfile::tempdir().expect("a folder");
+        let folder = folder(place.path());
+        let tables = |cells| {
+            let ended = joined(&folder, cells, Effort::default(), &Unwatched).expect("joined");
+            let Ended::Done(done) = ended else { panic!("nobody interrupts") };
+            let file = finished(&folder).expect("it is done");
+            std::fs::remove_file(folder.results_file()).expect("there");
+            assert_eq!(done.table, file.table, "{cells} cells at a time");
+            file.table
+        };
+        let whole = tables(PILE);
+        assert_eq!(whole.runs(), 600);
+        for cells in [1000, 600, 599, 64, 7] {
+            assert_eq!(tables(cells), whole, "{cells} cells at a time");
+        }
+        assert!(!folder.path().join("joining.partial").exists());
+    }
+
+    #[test]
+    fn no_more_rows_are_in_memory_than_a_block_has_cells() {
+        let place = tempfile::tempdir().expect("a folder");
+        let folder = folder(place.path());
+        let mut piles = Piles::new(&folder, 50).expect("room");
+        gather(&folder, None, |outcome| piles.put(&outcome)).expect("read");
+        let mut sizes = Vec::new();
+        piles
+            .blocks(|block| {
+                sizes.push(block.runs());
+                Ok(())
+            })
+            .expect("joined");
+        assert_eq!(sizes, [50; 12]);
     }
 }

@@ -1,6 +1,6 @@
 //! The parts of a sweep that a report needs: its finished runs, and pictures of some.
 
-use super::journey::{Folder, gather, table_of};
+use super::gather::{Folder, gather, table_of};
 use super::work::recorded;
 use crate::watcher::Within;
 use crate::{Error, Watcher};
@@ -31,7 +31,7 @@ pub fn finished(folder: &Folder) -> Result<Finished, InputError> {
         return Ok(Finished { table, is_complete: true });
     }
     let mut rows = Rows::default();
-    gather(folder, None, |outcome| rows.push(outcome))?;
+    gather(folder, None, |outcome| rows.push(&outcome))?;
     if rows.is_empty() {
         let remedy = "run it first: sidestep resume DIR";
         return Err(InputError::new(folder.path().display(), "no run is finished yet", remedy));

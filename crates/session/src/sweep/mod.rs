@@ -3,15 +3,19 @@
 //! ```text
 //! prepare.rs   every variant compiled, a plan     work.rs      cells -> outcomes, many at once
 //! journey.rs   from the plan to the table         effort.rs    the time that all took
+//! gather.rs    the folder, and the finished runs in it
 //! crew.rs      others who run cells            task.rs      cells that another process sends
+//! piles.rs     finished runs -> the table, in blocks
 //! told.rs      the results, for programs
 //! look.rs      finished runs, for reports
 //! ```
 
 mod crew;
 mod effort;
+mod gather;
 mod journey;
 mod look;
+mod piles;
 mod prepare;
 mod task;
 mod told;
@@ -19,9 +23,8 @@ mod work;
 
 pub use crew::{Crew, Deal, Engine, Taken};
 pub use effort::Effort;
-pub use journey::{
-    Done, Ended, Folder, collect, go_on, in_memory, planned, planned_or_there, share,
-};
+pub use gather::Folder;
+pub use journey::{Done, Ended, collect, go_on, in_memory, planned, planned_or_there, share};
 pub(crate) use look::picture_of;
 pub use look::{Finished, finished};
 pub use task::Task;

@@ -5,53 +5,106 @@ use crate::scenario::{read, source_of};
 use crate::watcher::{Progress, Watched};
 use crate::{Error, Watcher};
 use sidestep::experiment::sweep::cell::metric_names;
+use sidestep::experiment::sweep::work::run_cells;
 use sidestep::experiment::sweep::{Base, Plan, Setting, Sweep, Variant};
 use sidestep::kernel::InputError;
-use sidestep::scenario::{Compiled, Source, Worlds, nearest};
+use sidestep::scenario::{Compiled, Seeds, Source, Worlds, nearest};
+use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Compiles every variant, passes it to `each` with its number, and makes the plan.
+/// A plan, and what was made of each variant, by its number.
+pub(super) type Prepared<T> = (Plan, Vec<T>);
+
+/// A function that makes something of a variant: of its number, its scenario, and what that compiles to.
+pub(super) type Make<'a, T> = &'a (dyn Fn(u32, &Source, &dyn Compiled) -> Result<T, Error> + Sync);
+
+/// Compiles every variant on so many workers, makes of each what `make` makes, and returns it with the plan. Whatever the
+/// number of workers, the error is that of the first variant that has one.
 ///
 /// # Errors
-/// When the design or a variant is wrong, `each` fails, or the watcher asks to stop.
-pub(super) fn prepare(
+/// When the design or a variant is wrong, `make` fails, or the watcher asks to stop.
+pub(super) fn prepare<T: Send>(
     worlds: Worlds,
     sweep: &Sweep,
+    workers: usize,
     watcher: &dyn Watcher,
-    mut each: impl FnMut(u32, &Source, &dyn Compiled) -> Result<(), Error>,
-) -> Result<Plan, Error> {
+    make: Make<'_, T>,
+) -> Result<Prepared<T>, Error> {
     let fixed: Vec<String> = sweep.fixed.iter().map(Setting::to_override).collect();
     let base = base(worlds, sweep, &fixed)?;
     let mut variants = sweep.design.variants(&sweep.place)?;
     Plan::check_size(variants.len(), sweep.replicates, &sweep.place)?;
-    let (mut agents, mut first) = (0, None);
-    let (count, watched) = (variants.len(), Watched(watcher));
-    for (k, wanted) in (0u32..).zip(&mut variants) {
-        if !watcher.go_on() {
-            return Err(Error::Interrupted);
-        }
-        let share = f64::from(k) / count as f64;
-        watched.at(Progress::Stage { what: "checking variants", share });
-        let (source, compiled) = variant(worlds, &base, wanted).map_err(|e| {
+    let checked = |wanted: &Variant| {
+        variant(worlds, &base, wanted).map_err(|e| {
             let plain = match sweep.given {
                 Some(_) => worlds.compile(&base).err(),
                 None => read(worlds, &sweep.scenario, &fixed).err(),
             };
             of_variant(wanted, &base, plain, e)
-        })?;
-        wanted.seeds = compiled.seeds();
-        agents = agents.max(compiled.bodies() as u64);
-        if first.is_none() {
-            first = Some((compiled.world(), compiled.plan().clone()));
-            check_metrics(sweep, &source, compiled.as_ref())?;
-        }
-        each(k, &source, compiled.as_ref())?;
+        })
+    };
+    let (source, first) = checked(&variants[0])?;
+    check_metrics(sweep, &source, first.as_ref())?;
+    let one = |k: u32, wanted: &Variant| -> Result<One<T>, Error> {
+        let (source, compiled) = checked(wanted)?;
+        let (seeds, agents) = (compiled.seeds(), compiled.bodies() as u64);
+        Ok(One { seeds, agents, made: make(k, &source, compiled.as_ref())? })
+    };
+    let all = each(&variants, workers, watcher, &one)?;
+    let agents = all.iter().map(|one| one.agents).max().unwrap_or(0);
+    let mut made = Vec::with_capacity(all.len());
+    for (variant, one) in variants.iter_mut().zip(all) {
+        variant.seeds = one.seeds;
+        made.push(one.made);
     }
-    let (world, of_scenario) = first.expect("a design has at least one variant");
-    let base = Base { world, seed: of_scenario.seed, source: &base };
+    let plain = first.plan();
+    let base = Base { world: first.world(), seed: plain.seed, source: &base };
     let plan = Plan::new(sweep, variants, base)?;
     // A sweep without a name of its own goes by that of its scenario.
-    let name = if plan.name.is_empty() { of_scenario.name } else { plan.name };
-    Ok(Plan { agents, name, ..plan })
+    let name = if plan.name.is_empty() { plain.name } else { plan.name };
+    Ok((Plan { agents, name, ..plan }, made))
+}
+
+/// The findings of compiling a variant, and the thing that was made of it.
+struct One<T> {
+    seeds: Seeds,
+    agents: u64,
+    made: T,
+}
+
+/// Does the work for each variant, on so many workers, and returns what came of it in the order of the variants.
+///
+/// # Errors
+/// That of the first variant that has one, or when the watcher asks to stop.
+fn each<T: Send>(
+    variants: &[Variant],
+    workers: usize,
+    watcher: &dyn Watcher,
+    work: &(dyn Fn(u32, &Variant) -> Result<T, Error> + Sync),
+) -> Result<Vec<T>, Error> {
+    let cells: Vec<(u32, &Variant)> = (0..).zip(variants).collect();
+    // Those before a wrong one are done to their end, as one of them may be wrong, too.
+    let wrong_at = AtomicU32::new(u32::MAX);
+    let run = |(k, variant): &(u32, &Variant)| {
+        let is_wanted = watcher.go_on() && *k < wrong_at.load(Ordering::Relaxed);
+        is_wanted.then(|| {
+            let result = work(*k, variant);
+            if result.is_err() {
+                wrong_at.fetch_min(*k, Ordering::Relaxed);
+            }
+            Ok::<_, Error>((*k, result))
+        })
+    };
+    let watched = Watched(watcher);
+    let mut results: Vec<(u32, Result<T, Error>)> = Vec::with_capacity(variants.len());
+    run_cells(&cells, workers, run, &mut |result| {
+        results.push(result);
+        let share = results.len() as f64 / variants.len() as f64;
+        watched.at(Progress::Stage { what: "checking variants", share });
+        Ok(())
+    })?;
+    results.sort_by_key(|(k, _)| *k);
+    let found: Vec<T> = results.into_iter().map(|(_, result)| result).collect::<Result<_, _>>()?;
+    if found.len() < variants.len() { Err(Error::Interrupted) } else { Ok(found) }
 }
 
 /// Returns the scenario with what all variants share.

@@ -1,7 +1,8 @@
 //! The results of a finished sweep, for programs.
 
 use super::effort::Effort;
-use super::journey::{Done, Folder};
+use super::gather::Folder;
+use super::journey::Done;
 use serde_json::{Value, json};
 use sidestep::experiment::sweep::rounds::stopped;
 use sidestep::experiment::sweep::{Plan, RunTable, Summary};

@@ -18,7 +18,7 @@ fn is_refused<T>(result: Result<T, Error>) {
 fn two_builds_do_not_mix_in_one_sweep() {
     let place = Place::new();
     let (sweep, path) = (sweep(&place), place.path("sweep"));
-    planned(WORLDS, &sweep, &path, &Unwatched).expect("planned");
+    planned(WORLDS, &sweep, &path, 2, &Unwatched).expect("planned");
     let run = |shard: &str| {
         let folder = Folder::open(&path).expect("a sweep");
         let shard: Shard = shard.parse().expect("a share");
@@ -31,7 +31,7 @@ fn two_builds_do_not_mix_in_one_sweep() {
     let folder = Folder::open(&path).expect("a sweep");
     is_refused(collect(&folder, &Unwatched));
     is_refused(go_on(WORLDS, &folder, 1, &Unwatched));
-    is_refused(planned_or_there(WORLDS, &sweep, &path, &Unwatched));
+    is_refused(planned_or_there(WORLDS, &sweep, &path, 2, &Unwatched));
     // A folder from before builds had identities.
     edit(&manifest, &format!("  \"build\": \"{OTHER}\",\n"), "");
     run("1/2").expect("the version is the same");

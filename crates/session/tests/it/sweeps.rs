@@ -36,11 +36,11 @@ fn two_variants_with_three_seeds_come_to_one_table_however_they_are_run() {
     assert_eq!((plan.world.as_str(), plan.variants.len(), table.runs()), ("pond", 2, 6));
     assert!(table.column("hops_per_frog").is_some());
 
-    let folder = planned(WORLDS, &sweep, &place.path("one"), &Unwatched).expect("planned");
+    let folder = planned(WORLDS, &sweep, &place.path("one"), 2, &Unwatched).expect("planned");
     let one = go_on(WORLDS, &folder, 3, &Unwatched).expect("run");
     assert_eq!(done(one), table);
 
-    let folder = planned(WORLDS, &sweep, &place.path("shares"), &Unwatched).expect("planned");
+    let folder = planned(WORLDS, &sweep, &place.path("shares"), 2, &Unwatched).expect("planned");
     for shard in ["1/2", "0/2"] {
         let shard: Shard = shard.parse().expect("a share");
         let ended = share(WORLDS, &folder, shard, 1, &Unwatched).expect("run");
@@ -54,7 +54,7 @@ fn runs_of_a_sweep_are_recorded_and_reported() {
     let place = Place::new();
     let sweep = Sweep { record: true, ..sweep(&place) };
     let path = place.path("sweep");
-    let folder = planned(WORLDS, &sweep, &path, &Unwatched).expect("planned");
+    let folder = planned(WORLDS, &sweep, &path, 2, &Unwatched).expect("planned");
     go_on(WORLDS, &folder, 2, &Unwatched).expect("run");
     let folder = Folder::open(&path).expect("a sweep");
     assert!(folder.run_folder(5).join("trajectories.svg").is_file());
@@ -117,7 +117,7 @@ fn others_who_run_the_cells_come_to_the_same_table_in_any_order_and_any_number_o
         let (_, ended) = in_memory(WORLDS, &sweep, Engine::Crew(&others), &Unwatched).expect("run");
         assert_eq!(done(ended), table);
         let path = place.path(&format!("others {in_a_call}"));
-        let folder = planned(WORLDS, &sweep, &path, &Unwatched).expect("planned");
+        let folder = planned(WORLDS, &sweep, &path, 2, &Unwatched).expect("planned");
         let ended = go_on(WORLDS, &folder, Engine::Crew(&others), &Unwatched).expect("run");
         assert_eq!(done(ended), table);
     }
@@ -131,7 +131,7 @@ fn a_task_of_another_build_is_refused_and_so_is_recording_by_others() {
 
     let place = Place::new();
     let sweep = Sweep { record: true, ..sweep(&place) };
-    let folder = planned(WORLDS, &sweep, &place.path("sweep"), &Unwatched).expect("planned");
+    let folder = planned(WORLDS, &sweep, &place.path("sweep"), 2, &Unwatched).expect("planned");
     let others = Others { in_a_call: 1 };
     let told = go_on(WORLDS, &folder, Engine::Crew(&others), &Unwatched);
     let told = told.err().expect("recorded by others").to_string();

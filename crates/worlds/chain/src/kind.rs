@@ -4,7 +4,7 @@ use super::scenario::{AnyCompiled as EitherCompiled, Compiled};
 use super::{bundle, remarks, words, world::ChainWorld};
 use sidestep_kernel::words::Said;
 use sidestep_kernel::{InputError, Plan, Simulation, World};
-use sidestep_scenario::{Compiled as AnyCompiled, Kind, Meaning, Remark, Resolved, Source};
+use sidestep_scenario::{Compiled as AnyCompiled, Kind, Meaning, Remark, Resolved, Seeds, Source};
 use std::any::Any;
 
 /// Chains of connectors and rods, in the plane or in space.
@@ -67,6 +67,15 @@ impl<const D: usize> AnyCompiled for Compiled<D> {
 
     fn remarks(&self) -> Vec<Remark> {
         remarks::remarks(self)
+    }
+
+    fn seeds(&self) -> Seeds {
+        // Where the start does not follow from the seed, little draws, and only on occasion: a leader that wanders,
+        // a laser that errs, parts that are thrown about, a way that is planned.
+        match &self.recipe {
+            Some(recipe) if !recipe.draws_start() => Seeds::Perhaps,
+            _ => Seeds::Decide,
+        }
     }
 
     fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {

@@ -48,7 +48,7 @@ fn robots() -> Table<Place> {
         .u32("robot", "the connector that it follows", |p| p.id)
         .f64("x_m", "position of the body", |p| p.at[0])
         .f64("y_m", "position of the body", |p| p.at[1])
-        .f64("heading_rad", "counter-clockwise from x", |p| p.at[2])
+        .f64("heading_rad", "heading, counter-clockwise from east", |p| p.at[2])
 }
 
 fn movers(dimensions: usize) -> Table<Place> {

@@ -4,7 +4,7 @@ use super::scenario::{Behaviours, Compiled, StorageOrder};
 use super::{RobotsWorld, bundle, remarks, words};
 use sidestep_kernel::words::Said;
 use sidestep_kernel::{InputError, Plan, Simulation, World};
-use sidestep_scenario::{Compiled as AnyCompiled, Kind, Meaning, Remark, Resolved, Source};
+use sidestep_scenario::{Compiled as AnyCompiled, Kind, Meaning, Remark, Resolved, Seeds, Source};
 use std::any::Any;
 
 /// Situated agents on a grid.
@@ -52,6 +52,10 @@ impl Kind for Robots {
         super::scenario::sections(&self.own)
     }
 
+    fn other_files(&self) -> Vec<(&'static str, serde_json::Value)> {
+        vec![("profile", super::scenario::profile_schema(self.default_scenario()))]
+    }
+
     fn draws(&self) -> &'static str {
         "errors (a regime other than reliable), random places and doors, and behaviors that draw"
     }
@@ -85,6 +89,14 @@ impl AnyCompiled for Compiled {
 
     fn remarks(&self) -> Vec<Remark> {
         remarks::remarks(self)
+    }
+
+    fn seeds(&self) -> Seeds {
+        match self.draws_always() {
+            true => Seeds::Decide,
+            // Behaviors and conflicts may draw: runs tell.
+            false => Seeds::Perhaps,
+        }
     }
 
     fn resolve(&self, source: &Source) -> Result<Resolved, InputError> {

@@ -29,6 +29,8 @@ const TRANSPOSED: usize = 16;
 pub const HEADING_NAMES: [&str; 4] = ["east", "north", "west", "south"];
 
 const CYCLE: &str = "cycle, counted from 0";
+const HEADING: &str =
+    "heading, counter-clockwise from east along the map: 0, 90, 180 or 270 degrees, by name";
 const BODY: &str = "entity id: robots first, then people, then doors";
 
 /// Returns the table of poses, which are recorded as whole columns because they are many.
@@ -39,7 +41,7 @@ fn trajectories(world: &RobotsWorld) -> TableSchema {
         column("body", ColumnType::U32, BODY),
         column("col_boxes", ColumnType::U32, "column of the body's lower-left box, from the west"),
         column("row_boxes", ColumnType::U32, "row of the body's lower-left box, from the south"),
-        ColumnSpec::label("heading", "where the body looks", HEADING_NAMES),
+        ColumnSpec::label("heading", HEADING, HEADING_NAMES),
     ];
     TableSchema { about: about_boxes(world), ..TableSchema::new("trajectories", columns) }
 }
@@ -67,6 +69,7 @@ fn events(world: &RobotsWorld) -> Table<Event> {
     let sides = Side::ALL.iter().map(|side| side.name()).chain([""]);
     let no_side = Side::ALL.len() as u32;
     Table::new("events")
+        .about(about_boxes(world))
         .u64("cycle", CYCLE, |e: &Event| e.cycle)
         .u32("body", BODY, |e| e.body)
         .label("event", "what happened", names, |e| match e.event {
@@ -100,8 +103,12 @@ struct Reading {
     reported: [u32; 2],
 }
 
-fn readings(Vocabulary { observations, classes }: Vocabulary) -> Table<Reading> {
+fn readings(
+    world: &RobotsWorld,
+    Vocabulary { observations, classes }: Vocabulary,
+) -> Table<Reading> {
     Table::new("readings")
+        .about(about_boxes(world))
         .u64("cycle", CYCLE, |r: &Reading| r.cycle)
         .u32("robot", "entity id", |r| r.robot)
         .u32("sensor", "number of the sensor on its robot", |r| u32::from(r.sensor))
@@ -111,9 +118,10 @@ fn readings(Vocabulary { observations, classes }: Vocabulary) -> Table<Reading> 
         .label("reported_class", "the reported distance class", classes, |r| r.reported[1])
 }
 
-fn motions() -> Table<MotionSample> {
+fn motions(world: &RobotsWorld) -> Table<MotionSample> {
     let action = "action tried: 0 forward, 1 left, 2 right, 3 stay, then the effector's own";
     Table::new("motions")
+        .about(about_boxes(world))
         .u64("cycle", CYCLE, |s: &MotionSample| s.cycle)
         .u32("robot", "entity id", |s| s.robot)
         .u32("action", action, |s| u32::from(s.action))
@@ -174,8 +182,10 @@ impl Books {
         let record = &self.record;
         self.rows.trajectories.begin(record.trajectories.then(|| trajectories(world)));
         self.rows.events.begin(record.events.then(|| events(world)));
-        self.rows.readings.begin(record.calibration.then(|| readings(Vocabulary::of(world))));
-        self.rows.motions.begin(record.calibration.then(motions));
+        self.rows
+            .readings
+            .begin(record.calibration.then(|| readings(world, Vocabulary::of(world))));
+        self.rows.motions.begin(record.calibration.then(|| motions(world)));
         if record.trajectories {
             let bodies = world.bodies.len();
             let wanted = (FEW_POSES / bodies).max(CYCLES_IN_A_ROW);

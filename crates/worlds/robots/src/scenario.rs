@@ -11,7 +11,7 @@ mod tables;
 
 pub use crate::world::StorageOrder;
 pub use compile::{Behaviours, Compiled, presets};
-pub(super) use schema::sections;
+pub(super) use schema::{profile as profile_schema, sections};
 
 use super::effector::ObstacleRule;
 use super::policy::ConflictPolicy;

@@ -1,7 +1,7 @@
 /** Obstacles, starts and targets of chains in the plane. */
 
 import type { Edit, Place } from "../../protocol";
-import { numbersOf, sectionsOf, valueAt, type Json, type Path, type Table } from "../keypath";
+import { isWithin, numbersOf, sectionsOf, valueAt, type Json, type Path, type Table } from "../keypath";
 import { box, insert, remove, removeFrom, ring, rounded, set, type Item } from "./item";
 
 /** How near obstacles of no thickness can be taken hold of. */
@@ -105,4 +105,53 @@ export function putWall(a: Place, b: Place, m_per_px: number): Edit[] {
   const round = ([x, y]: Place): number[] => [rounded(x, m_per_px), rounded(y, m_per_px)];
   if (Math.hypot(b[0] - a[0], b[1] - a[1]) < m_per_px) return [];
   return [insert(["obstacles"], { ends_m: [round(a), round(b)], radius_m: 0.1 })];
+}
+
+/** The obstacle that a tool works on: the chosen one, or the one that the chosen point belongs to. */
+function chosenObstacle(model: Table, chosen: Path | null): { path: Path; value: Table } | undefined {
+  return chosen ? sectionsOf(model, "obstacles").find(({ path }) => isWithin(chosen, path)) : undefined;
+}
+
+/** The distance of a place from a piece of an outline. */
+function distance(at: Place, a: Place, b: Place): number {
+  const [dx, dy] = [b[0] - a[0], b[1] - a[1]];
+  const along = ((at[0] - a[0]) * dx + (at[1] - a[1]) * dy) / (dx * dx + dy * dy || 1);
+  const t = Math.min(1, Math.max(0, along));
+  return Math.hypot(at[0] - a[0] - t * dx, at[1] - a[1] - t * dy);
+}
+
+/** The edge of a closed outline that is nearest to a place: the number of its second corner. */
+function nearestEdge(at: Place, corners: Place[]): number {
+  const far = corners.map((corner, i) => distance(at, corners[(i + corners.length - 1) % corners.length]!, corner));
+  const nearest = far.indexOf(Math.min(...far));
+  return nearest === 0 ? corners.length : nearest;
+}
+
+/** One more corner of the chosen polygon, in its nearest edge; else a triangle on the way of the drag. */
+export function putPolygon(model: Table, a: Place, b: Place, chosen: Path | null, m_per_px: number): Edit[] {
+  const round = ([x, y]: readonly number[]): number[] => [rounded(x!, m_per_px), rounded(y!, m_per_px)];
+  const host = chosenObstacle(model, chosen);
+  const corners = pointsOf(host?.value["corners_m"]);
+  if (host && corners.length >= 3) {
+    return [{ ...insert([...host.path, "corners_m"], round(b)), at: nearestEdge(b, corners) } as Edit];
+  }
+  if (Math.hypot(b[0] - a[0], b[1] - a[1]) < m_per_px) return [];
+  const [dx, dy] = [b[0] - a[0], b[1] - a[1]];
+  // The third corner stands off to the left, so that all sides are about as long.
+  const third = [a[0] + 0.5 * dx - 0.8 * dy, a[1] + 0.5 * dy + 0.8 * dx];
+  return [insert(["obstacles"], { corners_m: [round(a), round(b), round(third)] })];
+}
+
+/** One more way-point of the chosen obstacle's patrol; the first makes it go there from where it is, and back. */
+export function putPatrol(model: Table, to: Place, chosen: Path | null, m_per_px: number): Edit[] {
+  const place = [rounded(to[0], m_per_px), rounded(to[1], m_per_px)];
+  const fits = ({ value }: { value: Table }): boolean => value["at_m"] !== undefined && value["corners_m"] === undefined;
+  const own = chosenObstacle(model, chosen);
+  const host = own && fits(own) ? own : sectionsOf(model, "obstacles").filter(fits).at(-1);
+  const from = host ? numbersOf(host.value["at_m"], 2) : null;
+  if (!host || !from) return [];
+  if (Array.isArray(host.value["patrol_m"])) return [insert([...host.path, "patrol_m"], place)];
+  // A patrol takes the place of a straight way.
+  const gone = ["bounces_m", "velocity_m_s"].filter((key) => host.value[key] !== undefined);
+  return [...gone.map((key) => remove([...host.path, key])), set([...host.path, "patrol_m"], [from, place]), set([...host.path, "speed_m_s"], 0.5)];
 }

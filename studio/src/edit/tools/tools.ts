@@ -5,7 +5,7 @@ import type { Board } from "../board";
 
 export type ToolId =
   | "select" | "brush" | "line" | "rectangle" | "fill" | "eraser" | "robot" | "person" | "door" | "goal"
-  | "ball" | "wall" | "box" | "airplane" | "way-point";
+  | "ball" | "wall" | "box" | "polygon" | "patrol" | "airplane" | "way-point";
 
 export interface Tool {
   id: ToolId;
@@ -39,6 +39,8 @@ const CHAIN: readonly Tool[] = [
   tool("ball", "●", "Ball", "Drag from its middle to its edge"),
   tool("wall", "╱", "Wall", "Drag from end to end"),
   tool("box", "▭", "Box", "Drag from corner to corner"),
+  tool("polygon", "△", "Polygon", "Drag one side of a triangle; a click adds a corner to the polygon that is chosen"),
+  tool("patrol", "⇄", "Patrol", "Click adds a way-point to the chosen ball or box, which then goes to and fro"),
 ];
 const AIRSPACE: readonly Tool[] = [
   SELECT,
@@ -57,7 +59,7 @@ export function toolsOf(scene: Scene): readonly Tool[] {
 /** Why a scene, or a part of it, cannot be drawn upon; nothing where all can. */
 export function obstacleTo(scene: Scene, board: Board | null, has: { file: boolean; office: boolean; airplanes: boolean }): string {
   if (scene.is_recording) return "A recording stays as it is: open its scenario to change it.";
-  if (toolsOf(scene).length === 0 && scene.dimensions === 3) return "A scene in space is changed in its forms and its text.";
+  if (toolsOf(scene).length === 0 && scene.dimensions === 3) return "A scene in space is changed in its forms and its text: there is nothing here to draw on, as a place on the screen is no place in space.";
   if (toolsOf(scene).length === 0) return "This world is changed in its forms and its text.";
   if (scene.world === "robots" && !board && has.office) return "The walls are those of a generated office, which the text only measures.";
   if (scene.world === "robots" && !board && has.file) return "The walls are those of a file beside the scenario.";

@@ -23,6 +23,7 @@ use std::fmt;
 pub struct Table<R> {
     name: String,
     columns: Vec<Column<R>>,
+    about: Vec<(String, String)>,
 }
 
 /// A function that reads all values of a column from a block of rows: one call per block, so that
@@ -81,7 +82,7 @@ macro_rules! typed {
 impl<R> Table<R> {
     /// Creates a table without columns.
     pub fn new(name: &str) -> Self {
-        Self { name: name.into(), columns: Vec::new() }
+        Self { name: name.into(), columns: Vec::new(), about: Vec::new() }
     }
 
     typed! {
@@ -120,10 +121,16 @@ impl<R> Table<R> {
         self
     }
 
-    /// Returns its name and columns.
+    /// Says what holds for all rows, by name: see [`TableSchema::about`].
+    #[must_use]
+    pub fn about(self, about: Vec<(String, String)>) -> Self {
+        Self { about, ..self }
+    }
+
+    /// Returns its name and columns, and what holds for all rows.
     pub fn schema(&self) -> TableSchema {
         let columns = self.columns.iter().map(|column| column.spec.clone()).collect();
-        TableSchema::new(&self.name, columns)
+        TableSchema { about: self.about.clone(), ..TableSchema::new(&self.name, columns) }
     }
 
     /// Returns the values of all columns in these rows.

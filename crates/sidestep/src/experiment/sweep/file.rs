@@ -3,13 +3,14 @@
 use super::baseline::Wanted;
 use super::design::{self, Design, Factor, Hypercube};
 use super::variant::{Setting, Variant};
-use crate::scenario::{FORMAT, Source};
+use crate::scenario::{FORMAT, Source, Spanned, schema};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use toml::{Spanned, Value};
+use toml::Value;
 
 /// Default number of runs of each variant.
 const REPLICATES: u32 = 10;
@@ -80,35 +81,68 @@ impl FromStr for Until {
 }
 
 /// The keys of the file.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct SweepFile {
+    /// Version of the file's format.
     format: Spanned<u32>,
+    /// The scenario's file, relative to this one.
     scenario: PathBuf,
+    /// Name of the sweep; the scenario's if it has none.
     #[serde(default)]
     name: String,
+    /// Number of runs of each variant; 10 if neither this nor `until` is given.
     replicates: Option<Spanned<u64>>,
+    /// Seed of the first run of each variant; the scenario's if it is not given.
     first_seed: Option<u64>,
+    /// Keys of the scenario that are set in all variants.
     #[serde(default)]
+    #[schemars(with = "AnyTable")]
     set: toml::Table,
+    /// Keys of the scenario, each with a list of values: all combinations of them are variants.
+    #[schemars(with = "Option<AnyTable>")]
     vary: Option<Spanned<toml::Table>>,
+    /// Variants one by one: keys of the scenario with their values, and perhaps a `name`.
     #[serde(default)]
+    #[schemars(with = "Vec<AnyTable>")]
     variant: Vec<Spanned<toml::Table>>,
+    /// Variants as samples of a box of parameters.
     latin_hypercube: Option<Spanned<HypercubeSection>>,
+    /// The precision at which a variant has had enough runs; instead of `replicates`.
     until: Option<Spanned<UntilSection>>,
+    /// Metrics to report; all that vary if none is named.
     #[serde(default)]
     metrics: Vec<String>,
+    /// The variant that others are compared with: values of keys, or its name.
+    #[schemars(with = "Option<BaselineValue>")]
     baseline: Option<Spanned<Value>>,
+    /// Whether every run is recorded in a folder of its own.
     #[serde(default)]
     record: bool,
 }
 
-#[derive(Debug, Deserialize)]
+/// A table of keys of a scenario, dotted or nested.
+type AnyTable = serde_json::Map<String, serde_json::Value>;
+
+/// Values of keys, or the name of a variant.
+#[derive(JsonSchema)]
+#[serde(untagged)]
+#[expect(dead_code, reason = "only its schema is of interest")]
+enum BaselineValue {
+    Name(String),
+    Values(AnyTable),
+}
+
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct HypercubeSection {
+    /// Number of samples, and so of variants.
     samples: Spanned<u64>,
+    /// Seed of the places; not that of runs.
     #[serde(default)]
     seed: u64,
+    /// Keys of the scenario, each with `low` and `high`, and perhaps `log = true` or `integer = true`.
+    #[schemars(with = "AnyTable")]
     range: Spanned<toml::Table>,
 }
 
@@ -123,14 +157,25 @@ struct RangeSection {
     integer: bool,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct UntilSection {
+    /// Half width of the 95 % interval of each mean, as a share of the mean.
     ci: Option<f64>,
+    /// The same in the metric's unit, instead.
     abs: Option<f64>,
+    /// Metrics of which the means are to be so precise; all that vary if none is named.
     #[serde(default)]
     metrics: Vec<String>,
+    /// Largest number of runs of each variant; 1000 if it is not given.
     max_runs: Option<u64>,
+}
+
+/// Returns the JSON Schema of a sweep file.
+pub fn schema() -> serde_json::Value {
+    let mut keys = schema::of::<SweepFile>();
+    keys["properties"]["format"]["const"] = FORMAT.into();
+    schema::of_file("A sweep: many variants of a scenario", keys, "")
 }
 
 /// Keys that no scenario has.
@@ -412,6 +457,22 @@ airspace.method = ["none", "pc"]
 ci = 0.05
 max_runs = 200
 "#;
+
+    #[test]
+    fn the_schema_knows_the_keys_of_a_sweep_and_no_others() {
+        let schema = schema();
+        let table: toml::Table = FILE.parse().expect("TOML");
+        let keys = schema["properties"].as_object().expect("keys");
+        assert!(table.keys().all(|key| keys.contains_key(key)), "{schema:#}");
+        assert!(keys.values().all(|key| key["description"].is_string()), "{schema:#}");
+        assert_eq!(schema["additionalProperties"], false);
+        assert_eq!(schema["required"], serde_json::json!(["format", "scenario"]));
+        let until = &schema["$defs"]["UntilSection"]["properties"];
+        assert_eq!(
+            (&until["ci"]["type"], &until["cu"]),
+            (&"number".into(), &serde_json::Value::Null)
+        );
+    }
 
     fn parse(text: &str) -> Result<Sweep, InputError> {
         Sweep::parse(&Source::new("sweep.toml", text, "dir"))

@@ -12,6 +12,7 @@
 //! work.rs      cells -> results, many at once
 //! rounds.rs    the next cells, if a requested precision decides when to stop
 //! rows.rs      outcomes -> a table of runs, the same for any order of arrival
+//! shape.rs     the columns of that table, for who writes it block by block
 //!
 //! table.rs     a table of runs: one row per run, typed columns with a role
 //! label.rs     the label of a column on an axis, with its unit
@@ -43,6 +44,7 @@ pub mod plan;
 pub mod rounds;
 pub mod rows;
 pub mod seeds;
+pub mod shape;
 mod summarize;
 pub mod summary;
 pub mod table;
@@ -62,6 +64,7 @@ pub use label::Label;
 pub use options::{Against, SummaryOptions};
 pub use plan::{Cell, Plan, Shard};
 pub use rows::Rows;
+pub use shape::Shape;
 pub use summary::{LeftOut, Summary};
 pub use table::{Role, RunColumn, RunTable};
 pub use variant::{Base, Setting, Variant};

@@ -3,15 +3,13 @@
 use super::cell::Outcome;
 use super::plan::{Plan, Shard};
 use super::seeds::Trials;
+use super::shape::{CYCLES, FAILURE, Shape, each_field, type_of, widened, wider, words};
 use super::table::{Role, RunColumn, RunTable};
 use super::variant::Variant;
 use serde_json::Value;
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::{ColumnType, Values};
 use std::collections::BTreeMap;
-
-/// Name of the column of reasons why runs failed; it exists only if one did.
-const FAILURE: &str = "failure";
 
 /// A table that grows by outcomes. A number takes 8 or 9 bytes, so a million runs of 40 metrics fit
 /// into less than half a gigabyte.
@@ -27,8 +25,7 @@ pub struct Rows {
 #[derive(Debug)]
 struct Growing {
     column: RunColumn,
-    /// The first cell in which it has a value, and its place there: the order of columns,
-    /// independent of the order of shares. Columns without any value come last.
+    /// See [`Shape`].
     first: (u64, usize),
 }
 
@@ -43,26 +40,10 @@ impl Rows {
         self.cells.is_empty()
     }
 
-    /// Returns the cells that have an outcome, in the order of arrival.
-    pub fn cells(&self) -> &[u64] {
-        &self.cells
-    }
-
     /// Adds an outcome.
-    pub fn push(&mut self, outcome: Outcome) {
-        let Outcome { cell, cycles, digest, failure, metrics, costs } = outcome;
-        self.cells.push(cell);
-        if let Some(why) = failure {
-            self.set(Role::Metric, FAILURE, &Value::String(why), 0);
-        } else {
-            self.set(Role::Digest, "digest", &Value::String(digest), 0);
-            self.set(Role::Metric, "cycles_run", &cycles.into(), 1);
-        }
-        for (role, fields) in [(Role::Metric, metrics), (Role::Cost, costs)] {
-            for (place, (name, value)) in fields.iter().enumerate() {
-                self.set(role, name, value, place + 2);
-            }
-        }
+    pub fn push(&mut self, outcome: &Outcome) {
+        self.cells.push(outcome.cell);
+        each_field(outcome, |role, name, value, place| self.set(role, name, value, place));
     }
 
     /// Sets a field of the last row.
@@ -89,7 +70,39 @@ impl Rows {
     /// # Errors
     /// When a cell has two outcomes that differ, because they come from different programs or
     /// machines.
-    pub fn table(mut self, plan: &Plan) -> Result<RunTable, InputError> {
+    pub fn table(self, plan: &Plan) -> Result<RunTable, InputError> {
+        let (shape, mut trials) = (self.shape(), Trials::new(plan));
+        let digest = self.columns.iter().find(|c| c.column.role == Role::Digest);
+        for (row, cell) in self.cells.iter().enumerate() {
+            let end = digest.map_or_else(String::new, |c| c.column.values.text(row));
+            trials.end(Some(*cell), end);
+        }
+        self.block(plan, &shape, &trials)
+    }
+
+    /// Returns the columns of these outcomes alone.
+    fn shape(&self) -> Shape {
+        let mut shape = Shape::default();
+        for Growing { column, first } in &self.columns {
+            let values = &column.values;
+            let has_values = (0..values.len()).any(|row| !values.is_missing(row));
+            shape.see((column.role, &column.name), has_values.then(|| values.ty()), *first);
+        }
+        shape
+    }
+
+    /// Returns a part of the table of all runs: the rows of these outcomes, sorted by cell, in the columns of all
+    /// outcomes. Outcomes of cells that are not in the plan are left out, and runs beyond trials that settle their
+    /// variant.
+    ///
+    /// # Errors
+    /// See [`Rows::table`].
+    pub fn block(
+        mut self,
+        plan: &Plan,
+        shape: &Shape,
+        trials: &Trials<'_>,
+    ) -> Result<RunTable, InputError> {
         let rows = self.cells.len();
         self.columns.iter_mut().for_each(|c| c.column.values.resize(rows));
         let mut order: Vec<usize> = (0..rows).collect();
@@ -97,24 +110,22 @@ impl Rows {
         order.sort_by_key(|&row| (self.cells[row], row));
         self.check_twins(&order)?;
         order.dedup_by_key(|row| self.cells[*row]);
-        self.leave_out_settled(plan, &mut order);
-        self.columns.sort_by_key(|c| (c.column.role, c.first));
+        order.retain(|&row| plan.cell_of(self.cells[row]).is_some_and(|c| trials.asks_for(&c)));
         let mut columns = identity(plan, order.iter().map(|&row| self.cells[row]));
-        for Growing { column, .. } in self.columns {
-            columns.push(RunColumn { values: column.values.pick(&order), ..column });
+        for (role, name, ty) in shape.columns() {
+            let mut values = match self.index.get(&(role, name.to_string())) {
+                // Let go of at once, so that no value stands in the memory twice.
+                Some(k) => std::mem::replace(
+                    &mut self.columns[*k].column.values,
+                    Values::empty(ColumnType::F64),
+                )
+                .pick(&order),
+                None => Values::empty(ty),
+            };
+            values.resize(order.len());
+            columns.push(RunColumn { name: name.into(), role, values: widened(values, ty) });
         }
         Ok(RunTable { columns })
-    }
-
-    /// Leaves out runs beyond the trials of settled variants, which a share cannot know of.
-    fn leave_out_settled(&self, plan: &Plan, order: &mut Vec<usize>) {
-        let digest = self.columns.iter().find(|c| c.column.role == Role::Digest);
-        let mut trials = Trials::new(plan);
-        for &row in order.iter() {
-            let end = digest.map_or_else(String::new, |c| c.column.values.text(row));
-            trials.end(Some(self.cells[row]), end);
-        }
-        order.retain(|&row| plan.cell_of(self.cells[row]).is_some_and(|c| trials.asks_for(&c)));
     }
 
     /// Checks that cells that were run twice have the same outcome.
@@ -157,13 +168,13 @@ impl RunTable {
         for row in 0..self.runs() {
             let Some(cell) = number(row, cell) else { continue };
             let fields = |role: Role| {
-                let own = |c: &&RunColumn| !["cycles_run", FAILURE].contains(&c.name.as_str());
+                let own = |c: &&RunColumn| ![CYCLES, FAILURE].contains(&c.name.as_str());
                 let columns = self.of_role(role).filter(own);
                 columns.map(|c| (c.name.clone(), c.values.json(row))).collect()
             };
             each(Outcome {
                 cell,
-                cycles: number(row, self.column("cycles_run")).unwrap_or(0),
+                cycles: number(row, self.column(CYCLES)).unwrap_or(0),
                 digest: digest.map_or_else(String::new, |c| c.values.text(row)),
                 failure: failure.map(|c| c.values.text(row)).filter(|why| !why.is_empty()),
                 metrics: fields(Role::Metric),
@@ -196,8 +207,10 @@ fn identity(plan: &Plan, cells: impl Iterator<Item = u64>) -> Vec<RunColumn> {
     ];
     for name in &plan.parameters {
         let levels = levels(plan, name);
+        let ty = levels.iter().map(type_of).fold(None, wider).unwrap_or(ColumnType::F64);
         let mut values = Values::empty(ColumnType::F64);
         cells.iter().for_each(|cell| add(&mut values, &levels[cell.variant as usize]));
+        let values = widened(values, ty);
         columns.push(RunColumn { name: name.clone(), role: Role::Parameter, values });
     }
     columns
@@ -238,39 +251,17 @@ fn add(values: &mut Values, value: &Value) {
     }
 }
 
-fn words(value: &Value) -> String {
-    value.as_str().map_or_else(|| value.to_string(), str::to_string)
-}
-
 /// Widens the column's type so that it can hold the value.
 fn widen(values: &mut Values, value: &Value) {
-    let fits = match values {
-        Values::I64(_) => value.as_i64().is_some(),
-        Values::F64(_) => value.is_f64(),
-        Values::Bool(_) => value.is_boolean(),
-        _ => true,
-    };
-    if fits {
+    if type_of(value) == Some(values.ty()) {
         return;
     }
-    let n = values.len();
-    let is_new = (0..n).all(|row| values.is_missing(row));
-    let empty = |ty| {
-        let mut values = Values::empty(ty);
-        values.resize(n);
-        values
-    };
-    *values = match value {
-        Value::Number(number) if is_new && number.as_i64().is_some() => empty(ColumnType::I64),
-        Value::Bool(_) if is_new => empty(ColumnType::Bool),
-        Value::Number(_) if is_new || values.is_numeric() => {
-            Values::F64((0..n).map(|row| values.number(row)).collect())
-        }
-        _ => {
-            let text = |row| (!values.is_missing(row)).then(|| words(&values.json(row)));
-            Values::Text((0..n).map(text).collect())
-        }
-    };
+    let has_values = (0..values.len()).any(|row| !values.is_missing(row));
+    let own = has_values.then(|| values.ty());
+    let ty = wider(own, type_of(value)).unwrap_or(ColumnType::F64);
+    if ty != values.ty() {
+        *values = widened(std::mem::replace(values, Values::empty(ty)), ty);
+    }
 }
 
 #[cfg(test)]
@@ -307,7 +298,7 @@ mod tests {
 
     fn table(cells: impl IntoIterator<Item = u64>) -> RunTable {
         let mut rows = Rows::default();
-        cells.into_iter().for_each(|cell| rows.push(outcome(cell)));
+        cells.into_iter().for_each(|cell| rows.push(&outcome(cell)));
         rows.table(&plan()).expect("no twins that differ")
     }
 
@@ -355,7 +346,7 @@ mod tests {
     fn outcomes_survive_the_table_of_their_share() {
         let whole = table(0..12);
         let mut rows = Rows::default();
-        whole.outcomes(|outcome| rows.push(outcome));
+        whole.outcomes(|outcome| rows.push(&outcome));
         assert_eq!(rows.table(&plan()), Ok(whole));
     }
 
@@ -365,9 +356,36 @@ mod tests {
             let mut rows = Rows::default();
             for index in (0..count).rev() {
                 let share = table((0..12).filter(|cell| cell % count == index));
-                share.outcomes(|outcome| rows.push(outcome));
+                share.outcomes(|outcome| rows.push(&outcome));
             }
             prop_assert_eq!(rows.table(&plan()), Ok(table(0..12)));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn blocks_one_below_the_other_are_the_table(size in 1u64..9, step in 1u64..12) {
+            let (plan, mut shape) = (plan(), Shape::default());
+            let arrived: Vec<Outcome> = (0..12).map(|k| outcome((k * step + k / 3) % 12)).collect();
+            let mut trials = Trials::new(&plan);
+            for outcome in &arrived {
+                shape.note(outcome);
+                trials.note(outcome);
+            }
+            let mut joined: Option<RunTable> = None;
+            for first in (0..12).step_by(size as usize) {
+                let mut rows = Rows::default();
+                arrived.iter().filter(|o| (first..first + size).contains(&o.cell)).for_each(|o| rows.push(o));
+                let block = rows.block(&plan, &shape, &trials).expect("no twins that differ");
+                match &mut joined {
+                    None => joined = Some(block),
+                    Some(table) => for (column, more) in table.columns.iter_mut().zip(&block.columns) {
+                        prop_assert_eq!((&column.name, column.role), (&more.name, more.role));
+                        column.values.append(&more.values);
+                    }
+                }
+            }
+            prop_assert_eq!(joined, Some(table(arrived.iter().map(|o| o.cell))));
         }
     }
 
@@ -375,16 +393,16 @@ mod tests {
     fn a_cell_that_was_run_twice_counts_once_and_must_agree() {
         assert_eq!(table([3, 1, 3]), table([1, 3]));
         let mut rows = Rows::default();
-        rows.push(outcome(3));
-        rows.push(Outcome { digest: "another".into(), ..outcome(3) });
+        rows.push(&outcome(3));
+        rows.push(&Outcome { digest: "another".into(), ..outcome(3) });
         assert!(rows.table(&plan()).expect_err("they differ").cause().contains("cell 3"));
     }
 
     #[test]
     fn a_failed_run_has_a_row_that_says_why() {
         let mut rows = Rows::default();
-        rows.push(outcome(0));
-        rows.push(Outcome::failed(plan().cell(0, 1), "index out of bounds"));
+        rows.push(&outcome(0));
+        rows.push(&Outcome::failed(plan().cell(0, 1), "index out of bounds"));
         let table = rows.table(&plan()).expect("no twins");
         let text = |name: &str, row| table.column(name).expect(name).values.text(row);
         assert_eq!(

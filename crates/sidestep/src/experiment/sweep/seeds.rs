@@ -205,7 +205,7 @@ mod tests {
         let plan = plan([Seeds::Perhaps, Seeds::Decide]);
         let mut rows = Rows::default();
         for cell in plan.share(crate::experiment::sweep::Shard::ALL) {
-            rows.push(outcome(cell, "the same"));
+            rows.push(&outcome(cell, "the same"));
         }
         let table = rows.table(&plan).expect("no twins");
         assert_eq!(table.runs(), 2 + 4);
@@ -227,7 +227,7 @@ mod tests {
         let plan = plan([Seeds::Decide, Seeds::Decide]);
         let mut rows = Rows::default();
         for (k, cell) in plan.share(crate::experiment::sweep::Shard::ALL).enumerate() {
-            rows.push(outcome(cell, &format!("end {k}")));
+            rows.push(&outcome(cell, &format!("end {k}")));
         }
         let table = rows.table(&plan).expect("no twins");
         assert!(notes(&plan, &table).is_empty());

@@ -27,6 +27,11 @@ impl<const D: usize> Recipe<D> {
         Ok(Self { source: source.clone(), head, file, site })
     }
 
+    /// Whether the seed decides what is there at the start: obstacles, or where a chain begins.
+    pub(crate) fn draws_start(&self) -> bool {
+        !self.file.fields.0.is_empty() || self.file.is_anywhere()
+    }
+
     /// Compiles it.
     pub(super) fn compile(self) -> Result<Compiled<D>, InputError> {
         let compiled = self.compiled(&self.head, None)?;
@@ -59,7 +64,7 @@ impl<const D: usize> Compiled<D> {
     /// When random obstacles or a chain find no place with this seed.
     pub fn reseeded(&self, seed: u64) -> Option<Result<Self, InputError>> {
         let recipe = self.recipe.as_ref()?;
-        if recipe.file.fields.0.is_empty() && !recipe.file.is_anywhere() {
+        if !recipe.draws_start() {
             let streams = Streams::new(Seed(seed));
             let world = Arc::new(ChainWorld { streams, ..(*self.world).clone() });
             return Some(Ok(Self { world, seed, ..self.clone() }));

@@ -31,7 +31,7 @@ use crate::policy::ConflictPolicy;
 use crate::purpose;
 use crate::sensor::SensorModel;
 use crate::world::{
-    BEAM_STEP, Body, BodyType, Door, MountedSensor, Mover, Radio, RobotBody, RobotModel,
+    BEAM_STEP, Body, BodyType, Door, MountedSensor, Mover, Radio, Regime, RobotBody, RobotModel,
     RobotsWorld, Role, StorageOrder,
 };
 use sidestep_kernel::distr::Chance;
@@ -92,6 +92,27 @@ impl Compiled {
         let placed = self.placer.place(&streams)?;
         let world = RobotsWorld { streams, bodies: placed.bodies, ..(*self.world).clone() };
         Ok(Self { world: Arc::new(world), start: placed.start.into(), seed, ..self.clone() })
+    }
+}
+
+impl Compiled {
+    /// Whether every run draws: errors of sensors and effectors, people, doors, a radio, or places at the start, as far as
+    /// another seed gives others.
+    pub(crate) fn draws_always(&self) -> bool {
+        let RobotsWorld { regime, types, radio, .. } = &*self.world;
+        let is_robot = |ty: &BodyType| matches!(ty.role, Role::Robot(_));
+        if *regime != Regime::Reliable || radio.is_some() || !types.iter().all(is_robot) {
+            return true;
+        }
+        let start = |bodies: &[Body], at: &[((u32, u32), u8)]| {
+            let phases: Vec<u32> = bodies.iter().map(|body| body.phase).collect();
+            (phases, at.to_vec())
+        };
+        let other = self.placer.place(&Streams::new(Seed(self.seed ^ 1)));
+        let same = other.is_ok_and(|other| {
+            start(&other.bodies, &other.start) == start(&self.world.bodies, &self.start)
+        });
+        !same
     }
 }
 

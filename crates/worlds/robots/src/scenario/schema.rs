@@ -4,7 +4,7 @@ use super::compile::idle::BEHAVIOURS;
 use super::kinds::BUILT_IN;
 use super::{Behaviours, ProfileFile, RobotsFile, presets};
 use serde_json::Value;
-use sidestep_scenario::{Source, schema};
+use sidestep_scenario::{FORMAT, Source, schema};
 
 /// Returns the schema of a scenario's sections; `own` are behaviors beside the built-in ones.
 pub(crate) fn sections(own: &Behaviours) -> Value {
@@ -24,4 +24,11 @@ pub(crate) fn sections(own: &Behaviours) -> Value {
     let behaviours: Vec<&str> = BEHAVIOURS.iter().map(|(kind, _)| *kind).chain(own).collect();
     sections["$defs"]["BehaviourSection"]["properties"]["kind"]["enum"] = behaviours.into();
     sections
+}
+
+/// Returns the schema of a profile, a file of sensors and effectors; `scenario` has the words for their keys.
+pub(crate) fn profile(scenario: &str) -> Value {
+    let mut keys = schema::of::<ProfileFile>();
+    keys["properties"]["format"]["const"] = FORMAT.into();
+    schema::of_file("A profile: sensors and effectors of robots", keys, scenario)
 }

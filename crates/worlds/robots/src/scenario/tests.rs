@@ -218,6 +218,28 @@ fn an_author_is_told_what_will_surprise() {
 }
 
 #[test]
+fn seeds_decide_where_something_always_draws_and_otherwise_runs_tell() {
+    let text = |regime: &str, robots: &str, more: &str| {
+        let map = "................\n".repeat(7);
+        format!(
+            "format = 1\nworld = \"robots\"\nregime = \"{regime}\"\n[map]\nascii = \"\"\"\n{map}\"\"\"\n\
+             [[robots]]\n{robots}\n{more}"
+        )
+    };
+    let draws = |text: String| {
+        let source = Source::new("s", text, "");
+        let compiled = Compiled::new(&source, &Behaviours::new(), StorageOrder::Spatial);
+        compiled.expect("valid").draws_always()
+    };
+    let placed = "at = [[1, 1, 1], [9, 1, 2]]";
+    assert!(!draws(text("reliable", placed, "")));
+    assert!(draws(text("reliable", "count = 2", "")), "places are drawn");
+    assert!(draws(text("reliable", "at = [[1, 1], [9, 1]]", "")), "headings are drawn");
+    assert!(draws(text("reliable", placed, "[[people]]\ncount = 1\n")));
+    assert!(draws(text("sensors", placed, "")));
+}
+
+#[test]
 fn another_seed_gives_what_compiling_with_it_would() {
     let text = "format = 1\nworld = \"robots\"\nseed = SEED\n[map]\nascii = \"\"\"\nMAP\"\"\"\n\
                 [[robots]]\ncount = 9\nperiod = 3\n[[robots]]\nat = [[1, 1], [3, 1]]\n\

@@ -1,0 +1,29 @@
+//! The folder of a sweep, and the finished runs in it.
+
+use sidestep::experiment::sweep::{Outcome, Plan, Role, RunTable, Shard};
+use sidestep::kernel::InputError;
+use sidestep_record::WholeTable;
+use sidestep_record::sweep::{Share, SweepFolder};
+
+/// The folder of a sweep.
+pub type Folder = SweepFolder<Plan>;
+
+/// Returns the table of runs in a file.
+pub(super) fn table_of(file: WholeTable<Role>) -> RunTable {
+    RunTable { columns: file.columns }
+}
+
+/// Converts a share to the type that folders use.
+pub(super) fn share_of(shard: Shard) -> Share {
+    Share { index: shard.index, count: shard.count }
+}
+
+/// Passes on all finished runs, except those of the share `but`.
+pub(super) fn gather(
+    folder: &Folder,
+    but: Option<Shard>,
+    mut each: impl FnMut(Outcome),
+) -> Result<(), InputError> {
+    folder.parts(|part| table_of(part).outcomes(&mut each))?;
+    folder.journals(but.map(share_of), &mut each)
+}
