@@ -3,6 +3,7 @@
 use super::crew::Engine;
 use super::effort::Effort;
 use super::prepare::prepare;
+use super::stamped::Stamped;
 use super::work::{Take, Work};
 use crate::identity::Maker;
 use crate::identity::build;
@@ -175,7 +176,7 @@ pub fn go_on<'a>(
     let mut effort = Effort::default();
     if let Some(mut journal) = folder.journal(share_of(Shard::ALL), |o: Outcome| log.note(o))? {
         with_work(worlds, folder, engine.into(), watcher, |work| {
-            let mut keep = |outcome: &Outcome| Ok(journal.append(outcome)?);
+            let mut keep = |outcome: &Outcome| Ok(journal.append(&Stamped::now(outcome))?);
             effort = log.run_all(work, &mut keep).map_err(|e| saved(e, folder.path()))?;
             Ok(())
         })?;
@@ -236,7 +237,7 @@ pub fn share(
     let cells: Vec<Cell> = plan.share(shard).filter(|c| !elsewhere.contains(&c.id)).collect();
     let mut effort = Effort::default();
     with_work(worlds, folder, workers.into(), watcher, |work| {
-        let mut keep = |outcome: &Outcome| Ok(journal.append(outcome)?);
+        let mut keep = |outcome: &Outcome| Ok(journal.append(&Stamped::now(outcome))?);
         effort = log.run(work, &cells, &mut keep).map_err(|e| saved(e, folder.path()))?;
         Ok(())
     })?;

@@ -5,7 +5,8 @@
 //! journey.rs   from the plan to the table         effort.rs    the time that all took
 //! crew.rs      others who run cells            task.rs      cells that another process sends
 //! told.rs      the results, for programs
-//! look.rs      finished runs, for reports
+//! look.rs      finished runs, for reports         stamped.rs   lines of a journal
+//! status.rs    a sweep that others work on
 //! ```
 
 mod crew;
@@ -13,6 +14,8 @@ mod effort;
 mod journey;
 mod look;
 mod prepare;
+mod stamped;
+mod status;
 mod task;
 mod told;
 mod work;
@@ -24,5 +27,6 @@ pub use journey::{
 };
 pub(crate) use look::picture_of;
 pub use look::{Finished, finished};
+pub use status::{Failure, ShareStatus, Status, status};
 pub use task::Task;
 pub use told::failed;
