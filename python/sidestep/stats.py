@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _native
+from . import _native, _notebook
 from ._errors import wrong
 
 __all__ = [
@@ -111,6 +111,9 @@ class Paired(NamedTuple):
     ratio: float | None
     #: Fieller's interval of it.
     ratio_interval: Interval | None
+
+    def _repr_html_(self) -> str:
+        return _notebook.paired(self)
 
 
 class Correlation(NamedTuple):

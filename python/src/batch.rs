@@ -132,8 +132,7 @@ fn told(error: &BatchError) -> PyErr {
 
 /// Returns the way to a world at its start: checkpoints are not made of it, so that all seeds share one text.
 fn start(scenario: &Arc<Made>) -> PyResult<Arc<Start>> {
-    let text = scenario.resolved()?.text.clone();
-    let source = Source { text, ..scenario.source.clone() };
+    let source = Source::new("scenario.toml", scenario.identity()?, "");
     let (own, scenario) = (scenario.compiled.plan().seed, Arc::clone(scenario));
     Ok(Arc::new(move |seed| {
         if seed == own {

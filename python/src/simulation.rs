@@ -1,9 +1,11 @@
 //! Simulations that Python advances, observes and orders.
 
 use crate::arrays::{Whole, column, ids, numbers, rows, texts};
+use crate::blocks::Blocks;
 use crate::decide::{Deciding, Numbered, decided};
 use crate::error::{self, ClosedError, wrong};
 use crate::json::to_python;
+use crate::notebook::shown;
 use crate::scenario::{Bundle, Made, made};
 use crate::space::{Room, Team, named, numbered};
 use crate::table::Table;
@@ -12,20 +14,24 @@ use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
 use sidestep::kernel::control::{self, Orders};
+use sidestep::kernel::ports::{TableSchema, Values};
 use sidestep::kernel::view::{Body, Kind, Look};
 use sidestep::kernel::{Cycle, EntityId, Plan, Simulation as AnySimulation};
 use sidestep::scenario::{Resolved, Source};
-use sidestep_draw::Film;
-use sidestep_session::{Journey, Keep};
+use sidestep_draw::{DrawError, Film, Still};
+use sidestep_session::{Journey, Keep, Wanted, frame_rows};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// Width in pixels of a picture in a notebook.
+const NOTEBOOK_PX: u32 = 480;
 
 /// A run of a scenario, at its start.
 ///
 /// Simulation(scenario, *, seed=None, workers=1, record=False, out=None, replace=False): `scenario` is a Scenario, a path
-/// or a dict. With `record` the rows of all tables are kept in memory (see `tables`); with `out` they go to a run folder, as
-/// `sidestep run --out` writes it, and `close` completes it. Same scenario and seed, same bits: whatever the
-/// workers, as the command and the library.
+/// or a dict. With `record` the rows of all tables are kept in memory, or of those in a list of names (see the method `record`,
+/// and `tables` and `blocks`); with `out` they go to a run folder, as `sidestep run --out` writes it, and `close` completes it.
+/// Same scenario and seed, same bits: whatever the workers, as the command and the library.
 ///
 /// It may be used from several threads, one at a time; Python's lock is released while it advances, and Ctrl-C stops it between
 /// two cycles. It can be pickled: its whole state goes along, but no rows.
@@ -55,11 +61,8 @@ impl Simulation {
         }
         // Without a folder it is identified by the text that a folder would have: checkpoints fit both.
         let source = match keep.folder {
-            Some(_) => scenario.source.clone(),
-            None => {
-                let text = scenario.resolved()?.text.clone();
-                Source { text, ..scenario.source.clone() }
-            }
+            Some(_) => scenario.source()?.clone(),
+            None => Source::new("scenario.toml", scenario.identity()?, ""),
         };
         let journey = Journey::start(scenario.compiled.as_ref(), &source, workers, keep, None);
         let journey = journey.map_err(|e| error::session(&e))?;
@@ -160,9 +163,56 @@ impl Simulation {
         })
     }
 
+    /// Draws the present state.
+    fn still(&self, py: Python<'_>, width: u32) -> PyResult<(Still, (u32, u32))> {
+        self.with(py, |journey| {
+            let run = journey.simulation_mut();
+            let frame = run.frame(Look::BODIES);
+            let mut film = self.film.lock().unwrap_or_else(PoisonError::into_inner);
+            let made = film.take().filter(|(its, _)| *its == width);
+            let made = made.map_or_else(|| Film::new(run.scenery(), &[], width), |(_, it)| Ok(it));
+            let made = made.map_err(|e| wrong("width", e.to_string(), "give 1 to 4096 pixels"))?;
+            let (caption, size) = (format!("cycle {}", frame.cycle), made.size_px());
+            let still = made.still(&frame, &[], &caption).map_err(|e| undrawn(&e))?;
+            *film = Some((width, made));
+            Ok((still, size))
+        })
+    }
+
     /// Returns the end that the scenario plans, or another one.
-    fn end(&self, until: Option<Cycle>) -> Cycle {
+    pub(crate) fn end(&self, until: Option<Cycle>) -> Cycle {
         until.unwrap_or_else(|| self.scenario.compiled.plan().cycles)
+    }
+}
+
+fn undrawn(error: &DrawError) -> PyErr {
+    error::RecordError::new_err(error.to_string())
+}
+
+/// Returns tables by name.
+fn tables(py: Python<'_>, rows: Vec<(TableSchema, Vec<Values>)>) -> PyResult<Bound<'_, PyDict>> {
+    let dict = PyDict::new(py);
+    for (schema, columns) in rows {
+        dict.set_item(schema.name.clone(), Table::new(schema, columns)?)?;
+    }
+    Ok(dict)
+}
+
+/// The argument `record`: whether rows are kept, or those of which tables.
+pub(crate) struct Recorded(Option<Wanted>);
+
+impl FromPyObject<'_, '_> for Recorded {
+    type Error = PyErr;
+
+    fn extract(value: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
+        if let Ok(is_wanted) = value.extract::<bool>() {
+            return Ok(Self(is_wanted.then(Wanted::default)));
+        }
+        let names = value.extract::<Vec<String>>().map_err(|_| {
+            let remedy = "give True, False, or a list of names: record=[\"events\"]";
+            wrong("record", format!("{} is no list of tables", &*value), remedy)
+        })?;
+        Ok(Self(Some(Wanted { tables: Some(names), frames: None })))
     }
 }
 
@@ -175,12 +225,12 @@ fn closed() -> PyErr {
 #[pymethods]
 impl Simulation {
     #[new]
-    #[pyo3(signature = (scenario, *, seed=None, workers=Whole(1), record=false, out=None, replace=false), text_signature = "(scenario, *, seed=None, workers=1, record=False, out=None, replace=False)")]
+    #[pyo3(signature = (scenario, *, seed=None, workers=Whole(1), record=Recorded(None), out=None, replace=false), text_signature = "(scenario, *, seed=None, workers=1, record=False, out=None, replace=False)")]
     fn new(
         scenario: &Bound<'_, PyAny>,
         seed: Option<Whole>,
         workers: Whole,
-        record: bool,
+        record: Recorded,
         out: Option<PathBuf>,
         replace: bool,
     ) -> PyResult<Self> {
@@ -191,10 +241,10 @@ impl Simulation {
         }
         let keep = Keep { folder: out.as_deref(), mcap: None, replace };
         let simulation = Self::at_start(scenario, workers.0 as usize, keep)?;
-        if record {
+        if let Recorded(Some(wanted)) = record {
             let mut journey = simulation.journey.lock().unwrap_or_else(PoisonError::into_inner);
             let journey = journey.as_mut().ok_or_else(closed)?;
-            journey.keep_rows().map_err(|e| error::input(&e))?;
+            journey.keep_rows(&wanted).map_err(|e| error::input(&e))?;
         }
         Ok(simulation)
     }
@@ -212,7 +262,7 @@ impl Simulation {
     /// cycle it is called with a dict of what all agents of a team observe (arrays of the shape (agents, ...)) and with `state`,
     /// and returns their orders: a dict of arrays by name, or the array of the only or first order.
     #[pyo3(signature = (until=None, *, decide=None, state=None))]
-    fn run(
+    pub(crate) fn run(
         slf: &Bound<'_, Self>,
         until: Option<Whole>,
         decide: Option<&Bound<'_, PyAny>>,
@@ -368,21 +418,16 @@ impl Simulation {
     /// Draws the present state: an array (height, width, 3) of red, green and blue (uint8).
     #[pyo3(signature = (width=640))]
     fn picture<'py>(&self, py: Python<'py>, width: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        let (pixels, width, height) = self.with(py, |journey| {
-            let run = journey.simulation_mut();
-            let frame = run.frame(Look::BODIES);
-            let mut film = self.film.lock().unwrap_or_else(PoisonError::into_inner);
-            let made = film.take().filter(|(its, _)| *its == width);
-            let made = made.map_or_else(|| Film::new(run.scenery(), &[], width), |(_, it)| Ok(it));
-            let made = made.map_err(|e| wrong("width", e.to_string(), "give 1 to 4096 pixels"))?;
-            let (caption, size) = (format!("cycle {}", frame.cycle), made.size_px());
-            let still = made.still(&frame, &[], &caption);
-            let still = still.map_err(|e| error::RecordError::new_err(e.to_string()))?;
-            *film = Some((width, made));
-            let opaque = still.rgba().chunks_exact(4).flat_map(|pixel| &pixel[..3]);
-            Ok((opaque.copied().collect::<Vec<u8>>(), size.0 as usize, size.1 as usize))
-        })?;
-        PyArray1::from_vec(py, pixels).reshape([height, width, 3])
+        let (still, (width, height)) = self.still(py, width)?;
+        let opaque = still.rgba().chunks_exact(4).flat_map(|pixel| &pixel[..3]);
+        let pixels: Vec<u8> = opaque.copied().collect();
+        PyArray1::from_vec(py, pixels).reshape([height as usize, width as usize, 3])
+    }
+
+    /// Returns the present frame as a table, one row for each body: kind, place, orientation, velocity and condition.
+    fn frame(&self, py: Python<'_>) -> PyResult<Table> {
+        let rows = self.with(py, |journey| Ok(frame_rows(journey.simulation_mut())));
+        rows.and_then(|(schema, columns)| Table::new(schema, columns))
     }
 
     /// Returns what a body perceives and decides in the next cycle, and what will come of it, as a dict;
@@ -410,8 +455,35 @@ impl Simulation {
         to_python(py, &told)
     }
 
-    /// Takes the rows that were recorded since the last call: tables by name. Needs `record=True`.
-    fn tables<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    /// Keeps rows in memory from now on: those of all tables, or of these; with `frames=n` also the table `frames`, with all
+    /// bodies at every n-th cycle. `tables` and `blocks` hand them over.
+    ///
+    /// Raises InputError when there is no such table, rows are kept already, or they go to a folder.
+    ///
+    /// >>> import sidestep
+    /// >>> sim = sidestep.Simulation({"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2}]})
+    /// >>> sim.record(["trajectories"], frames=5)
+    /// >>> sim.step(10)
+    /// 10
+    /// >>> {name: len(table) for name, table in sim.tables().items()}
+    /// {'trajectories': 20, 'frames': 6}
+    #[pyo3(signature = (tables=None, *, frames=None))]
+    fn record(
+        &self,
+        py: Python<'_>,
+        tables: Option<Recorded>,
+        frames: Option<Whole>,
+    ) -> PyResult<()> {
+        let Recorded(wanted) = tables.unwrap_or(Recorded(Some(Wanted::default())));
+        let Some(wanted) = wanted else {
+            return Err(wrong("record", "rows that are kept are not dropped", "leave it out"));
+        };
+        let wanted = Wanted { frames: frames.map(|Whole(frames)| frames), ..wanted };
+        self.with(py, |journey| journey.keep_rows(&wanted).map_err(|e| error::input(&e)))
+    }
+
+    /// Takes the rows that were recorded since the last call: tables by name. Needs `record=True`, or `record` before.
+    pub(crate) fn tables<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let rows = self.with(py, |journey| {
             let remedy = "make it with record=True; with `out` read its folder when it is closed";
             if !journey.keeps_rows() {
@@ -419,11 +491,44 @@ impl Simulation {
             }
             journey.take_rows().map_err(|e| error::record(&e))
         })?;
-        let dict = PyDict::new(py);
-        for (schema, columns) in rows {
-            dict.set_item(schema.name.clone(), Table::new(schema, columns)?)?;
+        tables(py, rows)
+    }
+
+    /// Runs on to cycle `until` (the planned end, by default) and hands the rows over as they come: an iterator that
+    /// advances by `cycles` cycles at a time, and gives the tables of those, by name. So a run of any length takes the
+    /// memory of one block. `decide` and `state` are those of `run`. Rows of all tables are kept from now on, unless
+    /// `record` has said which.
+    ///
+    /// >>> import sidestep
+    /// >>> sim = sidestep.Simulation({"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2}]})
+    /// >>> for tables in sim.blocks(40, until=100):
+    /// ...     print(sim.cycle, len(tables["trajectories"]))
+    /// 40 80
+    /// 80 80
+    /// 100 40
+    #[pyo3(
+        signature = (cycles=Whole(1024), until=None, *, decide=None, state=None),
+        text_signature = "($self, cycles=1024, until=None, *, decide=None, state=None)"
+    )]
+    fn blocks(
+        slf: Bound<'_, Self>,
+        cycles: Whole,
+        until: Option<Whole>,
+        decide: Option<Py<PyAny>>,
+        state: Option<Py<PyAny>>,
+    ) -> PyResult<Blocks> {
+        let (py, simulation) = (slf.py(), slf.get());
+        if cycles.0 == 0 {
+            return Err(wrong("cycles", "a block of 0 cycles never ends", "give 1 or more"));
         }
-        Ok(dict)
+        simulation.with(py, |journey| match journey.keeps_rows() {
+            true => Ok(()),
+            false => journey.keep_rows(&Wanted::default()).map_err(|e| error::input(&e)),
+        })?;
+        let until = simulation.end(until.map(|Whole(until)| until));
+        // What functions keep from cycle to cycle, they keep from block to block.
+        let state = state.unwrap_or_else(|| PyDict::new(py).into_any().unbind());
+        Ok(Blocks { simulation: slf.unbind(), cycles: cycles.0, until, decide, state })
     }
 
     /// Ends the run. A run folder gets its summary and picture: it is complete at the planned end, and can be
@@ -447,6 +552,23 @@ impl Simulation {
     #[pyo3(signature = (*_raised))]
     fn __exit__(&self, py: Python<'_>, _raised: &Bound<'_, PyTuple>) -> PyResult<()> {
         self.close(py).map(drop)
+    }
+
+    /// Returns the picture and the measurements, for notebooks.
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        shown(slf.as_any(), "simulation")
+    }
+
+    /// Returns the picture as PNG, for notebooks; None when it is closed.
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyBytes>>> {
+        match self.still(py, NOTEBOOK_PX) {
+            Ok((still, _)) => {
+                let bytes = still.to_png().map_err(|e| undrawn(&e))?;
+                Ok(Some(PyBytes::new(py, &bytes)))
+            }
+            Err(raised) if raised.is_instance_of::<ClosedError>(py) => Ok(None),
+            Err(raised) => Err(raised),
+        }
     }
 
     fn __repr__(&self, py: Python<'_>) -> String {

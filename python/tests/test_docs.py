@@ -21,6 +21,26 @@ def test_the_code_of_a_page_runs_from_its_top_to_its_end(page, root, monkeypatch
         exec(compile(block, page, "exec"), names)
 
 
+#: What is written in Python, and no part of a module of its own.
+OF_PYTHON = (
+    "Agent",
+    "Compared",
+    "Each",
+    "Placed",
+    "Reached",
+    "Sweep",
+    "SweepStatus",
+    "Tables",
+    "compare",
+    "each",
+    "fk",
+    "ik",
+    "read",
+    "sweep",
+    "sweep_status",
+)
+
+
 def public():
     """Everything public, by its name."""
     modules = [sidestep.stats, sidestep.collectives, sidestep.learn]
@@ -31,7 +51,7 @@ def public():
         for name in module.__all__:
             yield f"{module.__name__}.{name}", getattr(module, name)
     yield from ((name, thing) for name, thing in vars(_native).items() if not name.startswith("_"))
-    for name in ("Sweep", "Placed", "Reached", "compare", "fk", "ik", "sweep"):
+    for name in OF_PYTHON:
         yield name, getattr(sidestep, name)
 
 
