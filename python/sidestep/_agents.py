@@ -24,7 +24,7 @@ class Agent(Protocol):
 
 
 class Each:
-    """A function for ``decide=``, made of an object for each agent: see :func:`each`."""
+    """A function for ``decide=``, made of an object for each agent: see :func:`each`, which has an example."""
 
     def __init__(self, make: Callable[[int], Agent]) -> None:
         self._make = make

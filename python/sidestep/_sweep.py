@@ -43,6 +43,11 @@ class Sweep:
 
         Runs of two variants with the same replicate have the same seed, so they are pairs for
         :func:`sidestep.stats.paired`.
+
+        >>> import sidestep
+        >>> floor = {"world": "robots", "cycles": 50, "map": {"ascii": "......"}, "robots": {"count": 2}}
+        >>> sidestep.sweep(floor, replicate=3).values("contacts").shape
+        (3,)
         """
         values = self.results[metric]
         return values if variant is None else values[self.results["variant"] == variant]

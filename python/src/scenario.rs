@@ -17,7 +17,7 @@ use std::sync::{Arc, OnceLock};
 /// such as BlueSky's .scn), a dict with the keys of a scenario file, or `text`, which is one. Paths in a dict or text are
 /// relative to `base`, by default the present folder.
 ///
-/// Raises InputError, with the key that is wrong.
+/// Raises InputError, with the key that is wrong. Examples of its methods go on from here:
 ///
 /// >>> import sidestep
 /// >>> scenario = sidestep.Scenario({"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2}]})
@@ -225,8 +225,8 @@ impl Scenario {
     /// Returns the same scenario with other values: `set(seed=3)`, `set({"robots.0.count": 5})`. A dotted key goes by tables and
     /// by the numbers of arrays, as `--set` of the command does.
     ///
-    /// >>> import sidestep
-    /// >>> scenario = sidestep.Scenario({"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2}]})
+    /// Raises InputError, with the key that is wrong.
+    ///
     /// >>> scenario.set({"robots.0.count": 4}, seed=9).agents
     /// 4
     #[pyo3(signature = (values=None, /, **keys))]
@@ -247,6 +247,9 @@ impl Scenario {
     }
 
     /// Returns what will surprise its author, the weightiest first: `key: words`.
+    ///
+    /// >>> scenario.check()
+    /// []
     fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let remarks = self.0.compiled.remarks();
         list(py, remarks.into_iter().map(|remark| format!("{}: {}", remark.key, remark.words)))
@@ -289,6 +292,9 @@ impl Scenario {
     }
 
     /// Returns the JSON Schema of the scenarios of its world, as a dict.
+    ///
+    /// >>> "robots" in scenario.schema()["properties"]
+    /// True
     fn schema(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         schema(py, Some(self.world()))
     }
@@ -324,6 +330,12 @@ pub(crate) fn unpack_scenario(text: String, files: Vec<(String, Vec<u8>)>) -> Py
 }
 
 /// Returns the JSON Schema of the scenarios of a world, or of any, as a dict.
+///
+/// Raises InputError when there is no such world.
+///
+/// >>> import sidestep
+/// >>> "airspace" in sidestep.schema("airspace")["properties"]
+/// True
 #[pyfunction]
 #[pyo3(signature = (world=None))]
 pub(crate) fn schema(py: Python<'_>, world: Option<&str>) -> PyResult<Py<PyAny>> {
@@ -341,6 +353,10 @@ pub(crate) fn schema(py: Python<'_>, world: Option<&str>) -> PyResult<Py<PyAny>>
 }
 
 /// Returns the names of the worlds.
+///
+/// >>> import sidestep
+/// >>> sorted(sidestep.worlds())
+/// ['airspace', 'chain', 'robots']
 #[pyfunction]
 pub(crate) fn worlds() -> Vec<&'static str> {
     WORLDS.names()

@@ -36,8 +36,11 @@ const NOTEBOOK_PX: u32 = 480;
 /// It may be used from several threads, one at a time; Python's lock is released while it advances, and Ctrl-C stops it between
 /// two cycles. It can be pickled: its whole state goes along, but no rows.
 ///
+/// Examples of its methods go on from here:
+///
 /// >>> import sidestep
-/// >>> sim = sidestep.Simulation({"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2}]})
+/// >>> floor = {"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2, "behaviour": {"kind": "external"}}]}
+/// >>> sim = sidestep.Simulation(floor, record=True)
 /// >>> sim.step(10)
 /// 10
 /// >>> sim.cycle
@@ -251,6 +254,9 @@ impl Simulation {
 
     /// Advances by `cycles` cycles (one if not said), and returns how many were done: fewer when nothing can happen
     /// anymore.
+    ///
+    /// >>> sim.step(), sim.step(5)
+    /// (1, 5)
     #[pyo3(signature = (cycles=Whole(1)), text_signature = "($self, cycles=1)")]
     fn step(&self, py: Python<'_>, cycles: Whole) -> PyResult<u64> {
         self.advance_from(py, |now| now.saturating_add(cycles.0))
@@ -261,6 +267,11 @@ impl Simulation {
     /// With `decide`, a function or a dict of functions by team, agents are decided from outside: before each
     /// cycle it is called with a dict of what all agents of a team observe (arrays of the shape (agents, ...)) and with `state`,
     /// and returns their orders: a dict of arrays by name, or the array of the only or first order.
+    ///
+    /// >>> def decide(observed, state):
+    /// ...     return (observed["contact"] > 0).astype(int)        # left where it touched something, else forward
+    /// >>> sim.run(30, decide=decide)
+    /// 20
     #[pyo3(signature = (until=None, *, decide=None, state=None))]
     pub(crate) fn run(
         slf: &Bound<'_, Self>,
@@ -307,11 +318,17 @@ impl Simulation {
     }
 
     /// Returns the measurements of the run so far, as the command's summary has them.
+    ///
+    /// >>> sim.metrics()["contacts"]
+    /// 0
     fn metrics(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         to_python(py, &self.ask(py, |run| run.metrics())?)
     }
 
     /// Returns the measurements of each agent.
+    ///
+    /// >>> len(sim.agent_metrics())
+    /// 2
     fn agent_metrics(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         to_python(py, &self.ask(py, |run| run.agent_metrics())?)
     }
@@ -324,6 +341,11 @@ impl Simulation {
 
     /// Returns what the agents of a team (by number or name) observe before the next cycle: arrays by name, of the shape (agents, ...),
     /// in the order of `Team.agents`. It is what an agent of its own would perceive, errors and all.
+    ///
+    /// Raises OrderError when there is no such team.
+    ///
+    /// >>> sim.observe()["at_boxes"].shape
+    /// (2, 2)
     #[pyo3(signature = (team=None))]
     fn observe<'py>(
         &self,
@@ -339,6 +361,9 @@ impl Simulation {
     /// acted.
     ///
     /// Raises OrderError; nobody is ordered anything then.
+    ///
+    /// >>> sim.order("action", [0, 1])
+    /// >>> sim.order("action", 0, agents=[1])
     #[pyo3(signature = (name, values, *, agents=None, team=None))]
     fn order(
         &self,
@@ -358,6 +383,9 @@ impl Simulation {
     }
 
     /// Returns the state as bytes, for `restore`; run folders of the same scenario hold the like.
+    ///
+    /// >>> isinstance(sim.checkpoint(), bytes)
+    /// True
     fn checkpoint<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let bytes = self.ask(py, |run| run.checkpoint())?;
         Ok(PyBytes::new(py, &bytes))
@@ -366,6 +394,13 @@ impl Simulation {
     /// Goes on from a checkpoint of the same scenario.
     ///
     /// Raises CheckpointError when it is damaged, or belongs to another scenario or version.
+    ///
+    /// >>> before = sim.checkpoint()
+    /// >>> sim.step(5)
+    /// 5
+    /// >>> sim.restore(before)
+    /// >>> sim.cycle
+    /// 10
     fn restore(&self, py: Python<'_>, checkpoint: Vec<u8>) -> PyResult<()> {
         self.with(py, |journey| {
             let restored = journey.simulation_mut().restore(&checkpoint);
@@ -374,6 +409,9 @@ impl Simulation {
     }
 
     /// Returns an independent copy in the same state, which records nothing.
+    ///
+    /// >>> sim.copy().digest == sim.digest
+    /// True
     fn copy(&self, py: Python<'_>) -> PyResult<Self> {
         let bytes = self.ask(py, |run| run.checkpoint())?;
         let copy = Self::at_start(Arc::clone(&self.scenario), self.workers, Keep::default())?;
@@ -399,6 +437,9 @@ impl Simulation {
 
     /// Returns all bodies as arrays: `kind` and `condition` (text), `number`, `part` (-1 where there are no parts), `at_m` (n, 3),
     /// `turn` (n, 4: a unit quaternion x, y, z, w), `velocity_m_s` (n, 3), besides `cycle` and `time_s`.
+    ///
+    /// >>> sim.snapshot()["at_m"].shape
+    /// (2, 3)
     fn snapshot<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let frame = self.with(py, |journey| Ok(journey.simulation_mut().frame(Look::BODIES)))?;
         let (dict, bodies) = (PyDict::new(py), &frame.bodies);
@@ -416,6 +457,11 @@ impl Simulation {
     }
 
     /// Draws the present state: an array (height, width, 3) of red, green and blue (uint8).
+    ///
+    /// Raises InputError when the width is 0 or above 4096 pixels.
+    ///
+    /// >>> sim.picture(100).shape[1:]
+    /// (100, 3)
     #[pyo3(signature = (width=640))]
     fn picture<'py>(&self, py: Python<'py>, width: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
         let (still, (width, height)) = self.still(py, width)?;
@@ -425,6 +471,9 @@ impl Simulation {
     }
 
     /// Returns the present frame as a table, one row for each body: kind, place, orientation, velocity and condition.
+    ///
+    /// >>> len(sim.frame()), sim.frame().units["x_m"]
+    /// (2, 'm')
     fn frame(&self, py: Python<'_>) -> PyResult<Table> {
         let rows = self.with(py, |journey| Ok(frame_rows(journey.simulation_mut())));
         rows.and_then(|(schema, columns)| Table::new(schema, columns))
@@ -432,6 +481,11 @@ impl Simulation {
 
     /// Returns what a body perceives and decides in the next cycle, and what will come of it, as a dict;
     /// None where nothing is to tell. Looking changes nothing.
+    ///
+    /// Raises InputError when there is no such kind.
+    ///
+    /// >>> [section["title"] for section in sim.inspect("robot", 0)["sections"]][:2]
+    /// ['Now', 'Memory']
     #[pyo3(signature = (kind, number, part=None))]
     fn inspect(
         &self,
@@ -460,8 +514,7 @@ impl Simulation {
     ///
     /// Raises InputError when there is no such table, rows are kept already, or they go to a folder.
     ///
-    /// >>> import sidestep
-    /// >>> sim = sidestep.Simulation({"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2}]})
+    /// >>> sim = sidestep.Simulation(floor)
     /// >>> sim.record(["trajectories"], frames=5)
     /// >>> sim.step(10)
     /// 10
@@ -483,6 +536,11 @@ impl Simulation {
     }
 
     /// Takes the rows that were recorded since the last call: tables by name. Needs `record=True`, or `record` before.
+    ///
+    /// Raises InputError when rows are not kept in memory.
+    ///
+    /// >>> len(sim.tables()["trajectories"])
+    /// 20
     pub(crate) fn tables<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let rows = self.with(py, |journey| {
             let remedy = "make it with record=True; with `out` read its folder when it is closed";
@@ -499,8 +557,7 @@ impl Simulation {
     /// memory of one block. `decide` and `state` are those of `run`. Rows of all tables are kept from now on, unless
     /// `record` has said which.
     ///
-    /// >>> import sidestep
-    /// >>> sim = sidestep.Simulation({"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2}]})
+    /// >>> sim = sidestep.Simulation(floor)
     /// >>> for tables in sim.blocks(40, until=100):
     /// ...     print(sim.cycle, len(tables["trajectories"]))
     /// 40 80
@@ -533,6 +590,11 @@ impl Simulation {
 
     /// Ends the run. A run folder gets its summary and picture: it is complete at the planned end, and can be
     /// resumed otherwise. Returns the summary as a dict; None if it was closed before.
+    ///
+    /// Raises RecordError when something cannot be stored.
+    ///
+    /// >>> sim.close()["cycles"]
+    /// 10
     fn close(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let signals = Signals::default();
         let summary = py.detach(|| {

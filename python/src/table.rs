@@ -29,7 +29,15 @@ use std::sync::Arc;
 /// Rows of one table: what a run records.
 ///
 /// It has `__arrow_c_stream__`, so `polars.DataFrame(table)`, `pandas.DataFrame.from_arrow(table)`, `pyarrow.table(table)` and DuckDB take it
-/// without a copy of the numbers; `table["column"]` is a NumPy array.
+/// without a copy of the numbers; `table["column"]` is a NumPy array. Examples of its methods go on from here:
+///
+/// >>> import sidestep
+/// >>> sim = sidestep.Simulation({"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2}]}, record=True)
+/// >>> sim.step(5)
+/// 5
+/// >>> table = sim.tables()["trajectories"]
+/// >>> table["cycle"].tolist()
+/// [0, 1, 2, 3, 4, 0, 1, 2, 3, 4]
 #[pyclass(module = "sidestep", frozen)]
 pub(crate) struct Table {
     schema: TableSchema,
@@ -123,6 +131,19 @@ impl Table {
         values(py, self.batch.column(position), self.schema.columns[position].ty)
     }
 
+    /// Returns the same rows with these columns alone, in this order; nothing is copied.
+    ///
+    /// Raises KeyError when there is no such column.
+    ///
+    /// >>> table.select(["body", "cycle"])
+    /// Table(trajectories, 10 rows: body, cycle)
+    fn select(&self, columns: Vec<String>) -> PyResult<Self> {
+        let places = columns.iter().map(|name| self.position(name)).collect::<PyResult<Vec<_>>>()?;
+        let batch = self.batch.project(&places).map_err(|e| bug(&e))?;
+        let specs = places.iter().map(|&k| self.schema.columns[k].clone()).collect();
+        Ok(Self { schema: TableSchema { columns: specs, ..self.schema.clone() }, batch })
+    }
+
     fn __contains__(&self, name: &str) -> bool {
         self.schema.columns.iter().any(|column| column.name == name)
     }
@@ -142,6 +163,9 @@ impl Table {
     }
 
     /// Returns the first rows as tuples of Python's own values; None where one is missing.
+    ///
+    /// >>> [row[:2] for row in table.head(2)]
+    /// [(0, 0), (1, 0)]
     #[pyo3(signature = (rows=Whole(5)), text_signature = "($self, rows=5)")]
     fn head<'py>(&self, py: Python<'py>, rows: Whole) -> PyResult<Vec<Bound<'py, PyTuple>>> {
         let rows = self.batch.num_rows().min(usize::try_from(rows.0).unwrap_or(usize::MAX));

@@ -166,7 +166,7 @@ def test_what_cannot_be_swept_is_an_error_before_any_run(options, words, floor):
 
 
 def test_ctrl_c_stops_a_sweep_and_the_same_call_goes_on(floor, tmp_path):
-    options = {"set": {"cycles": 60_000}, "replicate": 40}
+    options = {"set": {"cycles": 40_000}, "replicate": 24}
     out, done = tmp_path / "s", threading.Event()
 
     def interrupt():
@@ -183,9 +183,9 @@ def test_ctrl_c_stops_a_sweep_and_the_same_call_goes_on(floor, tmp_path):
     finally:
         done.set()
         thread.join()
-    assert 0 < len(sidestep.read(out)["results"]) < 40
+    assert 0 < len(sidestep.read(out)["results"]) < 24
     swept = sidestep.sweep(floor, **options, out=out, workers=2)
-    assert 0 < swept.told["took"]["runs"] < 40
+    assert 0 < swept.told["took"]["runs"] < 24
     whole = sidestep.sweep(floor, **options, out=tmp_path / "whole", workers=2)
     assert files(out) == files(tmp_path / "whole")
 
@@ -196,7 +196,7 @@ from concurrent.futures import ThreadPoolExecutor
 import sidestep
 floor, out = sys.argv[1:]
 with ThreadPoolExecutor(2) as pool:
-    sidestep.sweep(floor, set={"cycles": 60_000}, replicate=40, out=out, engine=pool)
+    sidestep.sweep(floor, set={"cycles": 40_000}, replicate=24, out=out, engine=pool)
 """
 
 
@@ -209,11 +209,11 @@ def test_a_killed_driver_loses_nothing_that_is_in_the_journal(floor, tmp_path):
     driver.kill()
     driver.wait()
     finished = len(sidestep.read(out)["results"])
-    assert 0 < finished < 40
-    options = {"set": {"cycles": 60_000}, "replicate": 40}
+    assert 0 < finished < 24
+    options = {"set": {"cycles": 40_000}, "replicate": 24}
     with ThreadPoolExecutor(2) as pool:
         swept = sidestep.sweep(floor, **options, out=out, engine=pool)
-    assert swept.told["took"]["runs"] == 40 - finished
+    assert swept.told["took"]["runs"] == 24 - finished
     sidestep.sweep(floor, **options, out=tmp_path / "whole")
     assert files(out) == files(tmp_path / "whole")
 

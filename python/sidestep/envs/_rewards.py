@@ -22,23 +22,23 @@ Reward = Callable[[Arrays, Arrays], NDArray[Any]]
 
 
 def _contact(before: Arrays, after: Arrays) -> NDArray[Any]:
-    return np.asarray(after["contact"] > 0, dtype=float)
+    return np.asarray(after["contact"] > 0)
 
 
 def _moved(before: Arrays, after: Arrays) -> NDArray[Any]:
-    return np.asarray(np.abs(after["at_boxes"] - before["at_boxes"]).sum(axis=1), dtype=float)
+    return np.asarray(np.abs(after["at_boxes"] - before["at_boxes"]).sum(axis=1))
 
 
 def _turned(before: Arrays, after: Arrays) -> NDArray[Any]:
-    return np.asarray(after["heading"] != before["heading"], dtype=float)
+    return np.asarray(after["heading"] != before["heading"])
 
 
 def _veto(before: Arrays, after: Arrays) -> NDArray[Any]:
-    return np.asarray(after["veto"] > 0, dtype=float)
+    return np.asarray(after["veto"] > 0)
 
 
 def _done(before: Arrays, after: Arrays) -> NDArray[Any]:
-    return np.asarray(after["done_share"], dtype=float)
+    return after["done_share"]
 
 
 def _nearer(before: Arrays, after: Arrays) -> NDArray[Any]:
@@ -53,7 +53,7 @@ def _nearer(before: Arrays, after: Arrays) -> NDArray[Any]:
 def _separation(before: Arrays, after: Arrays) -> NDArray[Any]:
     distance_m = np.linalg.norm(after["neighbor_place_m"], axis=2)
     is_near = (after["neighbor_id"] >= 0) & (distance_m < after["neighbor_separation_m"])
-    return np.asarray(is_near.sum(axis=1), dtype=float)
+    return np.asarray(is_near.sum(axis=1))
 
 
 def _delay(before: Arrays, after: Arrays) -> NDArray[Any]:
@@ -122,8 +122,16 @@ def rewards(terms: Mapping[str, float] | Reward, observed: set[str]) -> Reward:
             raise _wrong(name, f"its weight is {weight!r}", "give a finite number")
         chosen.append((fitting[0], float(weight)))
 
+    if not chosen:
+        raise wrong("rewards", "no term is named", f"give weights to some of {', '.join(TERMS)}, or a function")
+    (first, its_weight), *others = chosen
+
     def total(before: Arrays, after: Arrays) -> NDArray[Any]:
-        return np.asarray(sum(weight * term(before, after) for term, weight in chosen))
+        # One term is the usual case, and a step of ten agents takes as long as some calls of NumPy.
+        gains = its_weight * first(before, after)
+        for term, weight in others:
+            gains = gains + weight * term(before, after)
+        return gains
 
     return total
 
