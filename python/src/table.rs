@@ -138,7 +138,8 @@ impl Table {
     /// >>> table.select(["body", "cycle"])
     /// Table(trajectories, 10 rows: body, cycle)
     fn select(&self, columns: Vec<String>) -> PyResult<Self> {
-        let places = columns.iter().map(|name| self.position(name)).collect::<PyResult<Vec<_>>>()?;
+        let places =
+            columns.iter().map(|name| self.position(name)).collect::<PyResult<Vec<_>>>()?;
         let batch = self.batch.project(&places).map_err(|e| bug(&e))?;
         let specs = places.iter().map(|&k| self.schema.columns[k].clone()).collect();
         Ok(Self { schema: TableSchema { columns: specs, ..self.schema.clone() }, batch })

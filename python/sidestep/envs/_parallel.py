@@ -231,7 +231,7 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         given = list(map(actions.__getitem__, names))
         for order in chosen:
             values = given if len(chosen) == 1 else [action[order] for action in given]
-            self.sim.order(order, np.asarray(values), team=number)
+            self.sim.order(order, values, team=number)
 
     def _observed(self) -> list[dict[str, NDArray[Any]]]:
         return [self.sim.observe(k) for k, _ in self._teams]

@@ -12,6 +12,7 @@ use sidestep::kernel::ports::{ColumnSpec, TableSchema};
 use sidestep::scenario::{Source, told};
 use sidestep::worlds::WORLDS;
 use std::fmt::Write;
+use std::sync::{Mutex, PoisonError};
 
 const CHAPTER: &str = "docs/src/columns.md";
 
@@ -111,6 +112,9 @@ fn metrics(value: &Value, path: &str) -> Vec<String> {
 
 /// Compares a marked part of the chapter with what it should be, or writes it.
 fn compare(name: &str, expected: &str) {
+    // Two tests that write would undo each other's parts.
+    static WRITING: Mutex<()> = Mutex::new(());
+    let _one = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
     let chapter = read(CHAPTER);
     let mark = format!("<!-- {name} -->\n");
     let found = marked(&chapter, name);
