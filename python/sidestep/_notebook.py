@@ -51,7 +51,7 @@ def scenario(it: Scenario) -> str:
     """Returns the start of a scenario and what it has."""
     from ._native import Simulation
 
-    facts = [("bodies", it.agents), ("seed", it.seed), ("cycles", it.cycles)]
+    facts: list[tuple[str, Any]] = [("bodies", it.agents), ("seed", it.seed), ("cycles", it.cycles)]
     facts += [("note", remark) for remark in it.check()]
     name = f"{it.world} {it.name}".strip()
     return rows((name, ""), facts) + _picture(Simulation(it)._repr_png_())

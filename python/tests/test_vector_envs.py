@@ -226,7 +226,7 @@ def test_rllib_takes_it(external):
 
     env = ParallelPettingZooEnv(parallel_env(external, max_cycles=5))
     observed, _ = env.reset(seed=3)
-    assert set(observed) == set(env.get_agent_ids()) if hasattr(env, "get_agent_ids") else observed
+    assert set(observed) == set(env.par_env.possible_agents)
     for k in range(5):
         actions = {agent: env.action_space[agent].sample() for agent in observed}
         observed, rewards, terminations, truncations, _ = env.step(actions)

@@ -51,7 +51,7 @@ class Env(gymnasium.Env[dict[str, Any], Any]):
         one = self._agent
         return observed[one], gains[one], terminations[one], truncations[one], infos[one]
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """Returns a picture of the present state, (height, width, 3)."""
         return self.parallel.render()
 

@@ -78,7 +78,7 @@ fn the_status_counts_each_run_once_and_tells_those_that_failed() {
     let shares: Vec<_> =
         found.shares.iter().map(|s| (s.share.as_str(), s.runs, s.is_done)).collect();
     assert_eq!(shares, [("0/1", 2, false), ("1/2", 3, true)]);
-    std::fs::write(journal, "no journal").expect("written");
+    std::fs::write(journal, "no journal\nat all\n").expect("written");
     assert!(status(&folder).is_err(), "damage is told");
 }
 
