@@ -1,8 +1,5 @@
 //! The rows of a long run, block by block.
 
-use crate::arrays::Whole;
-use crate::decide::Deciding;
-use crate::simulation::Simulation;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sidestep::kernel::Cycle;
@@ -11,7 +8,8 @@ use sidestep::kernel::Cycle;
 /// these cycles by name.
 #[pyclass(module = "sidestep", frozen)]
 pub(crate) struct Blocks {
-    pub(crate) simulation: Py<Simulation>,
+    /// A simulation; it is asked as any caller in Python asks it.
+    pub(crate) simulation: Py<PyAny>,
     pub(crate) cycles: Cycle,
     pub(crate) until: Cycle,
     pub(crate) decide: Option<Py<PyAny>>,
@@ -24,16 +22,17 @@ impl Blocks {
         slf
     }
 
-    fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+    fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let run = self.simulation.bind(py);
-        let now = run.get().now(py)?;
-        if now >= self.until || run.get().has_ended(py)? {
+        let now: Cycle = run.getattr("cycle")?.extract()?;
+        if now >= self.until || run.getattr("is_over")?.extract()? {
             return Ok(None);
         }
+        let how = PyDict::new(py);
+        how.set_item("decide", &self.decide)?;
+        how.set_item("state", &self.state)?;
         let goal = now.saturating_add(self.cycles).min(self.until);
-        let decide = self.decide.as_ref().map(|decide| decide.bind(py));
-        let state = Some(self.state.bind(py).clone());
-        Simulation::run(run, Some(Whole(goal)), decide, state)?;
-        run.get().tables(py).map(Some)
+        run.call_method("run", (goal,), Some(&how))?;
+        run.call_method0("tables").map(Some)
     }
 }

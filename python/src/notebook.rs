@@ -1,4 +1,4 @@
-//! What cells of notebooks show; it is made by `sidestep/_notebook.py`.
+//! Things as cells of notebooks show them; the HTML is made by `sidestep/_notebook.py`.
 
 use pyo3::prelude::*;
 

@@ -183,7 +183,7 @@ impl Simulation {
     }
 
     /// Returns the end that the scenario plans, or another one.
-    pub(crate) fn end(&self, until: Option<Cycle>) -> Cycle {
+    fn end(&self, until: Option<Cycle>) -> Cycle {
         until.unwrap_or_else(|| self.scenario.compiled.plan().cycles)
     }
 }
@@ -273,7 +273,7 @@ impl Simulation {
     /// >>> sim.run(30, decide=decide)
     /// 20
     #[pyo3(signature = (until=None, *, decide=None, state=None))]
-    pub(crate) fn run(
+    fn run(
         slf: &Bound<'_, Self>,
         until: Option<Whole>,
         decide: Option<&Bound<'_, PyAny>>,
@@ -541,7 +541,7 @@ impl Simulation {
     ///
     /// >>> len(sim.tables()["trajectories"])
     /// 20
-    pub(crate) fn tables<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn tables<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let rows = self.with(py, |journey| {
             let remedy = "make it with record=True; with `out` read its folder when it is closed";
             if !journey.keeps_rows() {
@@ -585,7 +585,8 @@ impl Simulation {
         let until = simulation.end(until.map(|Whole(until)| until));
         // What functions keep from cycle to cycle, they keep from block to block.
         let state = state.unwrap_or_else(|| PyDict::new(py).into_any().unbind());
-        Ok(Blocks { simulation: slf.unbind(), cycles: cycles.0, until, decide, state })
+        let simulation = slf.into_any().unbind();
+        Ok(Blocks { simulation, cycles: cycles.0, until, decide, state })
     }
 
     /// Ends the run. A run folder gets its summary and picture: it is complete at the planned end, and can be

@@ -71,7 +71,7 @@ pub struct ShareStatus {
     pub idle_s: Option<f64>,
 }
 
-/// What was found in the folder.
+/// The findings in the folder.
 #[derive(Default)]
 struct Found {
     cells: BTreeSet<u64>,
