@@ -18,6 +18,7 @@ Python runs it.
 """
 
 from . import collectives, learn, stats
+from ._agents import Agent, Each, each
 from ._arm import Placed, Reached, fk, ik
 from ._errors import (
     CheckpointError,
@@ -32,23 +33,29 @@ from ._errors import (
 from ._native import (
     Arm,
     Batch,
+    Blocks,
     Scenario,
     Simulation,
     Space,
     Table,
     Team,
     __version__,
-    read,
     schema,
     worlds,
 )
-from ._sweep import Sweep, compare, sweep
+from ._read import Tables, read
+from ._status import SweepStatus, sweep_status
+from ._sweep import Compared, Sweep, compare, sweep
 
 __all__ = [
+    "Agent",
     "Arm",
     "Batch",
+    "Blocks",
     "CheckpointError",
     "ClosedError",
+    "Compared",
+    "Each",
     "EngineError",
     "InputError",
     "OrderError",
@@ -61,11 +68,14 @@ __all__ = [
     "Simulation",
     "Space",
     "Sweep",
+    "SweepStatus",
     "Table",
+    "Tables",
     "Team",
     "__version__",
     "collectives",
     "compare",
+    "each",
     "fk",
     "ik",
     "learn",
@@ -73,5 +83,6 @@ __all__ = [
     "schema",
     "stats",
     "sweep",
+    "sweep_status",
     "worlds",
 ]

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from . import _engines
+from . import _engines, _notebook
 from ._engines import Engine
 from ._errors import whole, wrong
 from ._native import Scenario, Table, compare_methods, run_sweep
@@ -43,6 +43,11 @@ class Sweep:
 
         Runs of two variants with the same replicate have the same seed, so they are pairs for
         :func:`sidestep.stats.paired`.
+
+        >>> import sidestep
+        >>> floor = {"world": "robots", "cycles": 50, "map": {"ascii": "......"}, "robots": {"count": 2}}
+        >>> sidestep.sweep(floor, replicate=3).values("contacts").shape
+        (3,)
         """
         values = self.results[metric]
         return values if variant is None else values[self.results["variant"] == variant]
@@ -53,6 +58,16 @@ class Sweep:
     def __repr__(self) -> str:
         name = self.told["name"] or self.told["world"]
         return f"Sweep({name}, {len(self)} runs of {len(self.summary['variants'])} variants)"
+
+    def _repr_html_(self) -> str:
+        return _notebook.sweep(self)
+
+
+class Compared(dict[str, Any]):
+    """Methods that were compared, as :func:`compare` returns them: a dict that notebooks show as a table."""
+
+    def _repr_html_(self) -> str:
+        return _notebook.compared(self)
 
 
 def sweep(
@@ -141,13 +156,13 @@ def compare(
     runs: int = 10,
     seed: int | None = None,
     workers: int | None = None,
-) -> dict[str, Any]:
+) -> Compared:
     """Compares methods of collision avoidance on the same air traffic: what ``sidestep compare --json`` prints.
 
     ``methods`` are among ``"pc"`` (probability collectives), ``"orca"``, ``"mvp"`` and ``"none"``. Each flies ``runs``
     times, with consecutive seeds from ``seed`` on (the scenario's). The answer has a dict of each method under ``"methods"``:
-    ``losses`` of separation, ``arrived`` (a share), ``delay_percent`` and others, each with ``mean``, ``low`` and ``high``
-    of its 95 % interval, and ``n``; ``min_separation_m`` is the nearest of all runs.
+    ``losses`` of separation, ``arrived`` (a share), ``delay_percent`` and others, each with its ``mean``, the ``interval`` of that
+    (95 %) and ``n``; ``min_separation_m`` is the nearest of all runs.
 
     Any other two variants are compared by :func:`sweep` with ``baseline=``, or by :func:`sidestep.stats.paired`.
 
@@ -161,10 +176,9 @@ def compare(
     """
     count = _count("runs", runs, MOST_RUNS) or 1
     workers = _count("workers", workers, 1024) or 0
-    told: dict[str, Any] = compare_methods(
-        scenario, _names("methods", methods), count, _seed(seed), workers
+    return Compared(
+        compare_methods(scenario, _names("methods", methods), count, _seed(seed), workers)
     )
-    return told
 
 
 def _mapping(name: str, values: Mapping[str, Any] | None) -> Mapping[str, Any]:

@@ -47,6 +47,15 @@ def effector(moves: Columns, *, alpha: float = 0.5, hold_out: int = 2) -> Learne
     become probabilities; every ``hold_out``-th move is held out to test the fit.
 
     Raises InputError when columns are missing or differ in length, or a value is out of range.
+
+    >>> from sidestep import learn
+    >>> moved = {"action": ["forward"] * 10, "ahead_boxes": [1] * 9 + [0], "left_boxes": [0] * 10, "turn_deg": [0] * 10}
+    >>> learned = learn.effector(moved)
+    >>> one = learned.report["probabilities"][0]
+    >>> one["row"], one["count"], one["of"]
+    ('forward', 9.0, 10.0)
+    >>> "[effectors.mine]" in learned.profile("mine")
+    True
     """
     text, run = _table(moves, MOTIONS)
     return _native.learn_effector(text, run, (alpha, hold_out))

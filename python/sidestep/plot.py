@@ -116,6 +116,13 @@ def tracks(rows: Rows, *, agents: Collection[int] | None = None, ax: Any = None)
     ``agents`` are the numbers of those wanted, all by default.
 
     Raises InputError when the run has recorded no places.
+
+    >>> import sidestep
+    >>> from sidestep import plot
+    >>> sim = sidestep.Simulation("scenarios/robots/one-robot.toml", record=True)
+    >>> _ = sim.step(20)
+    >>> plot.tracks(sim.tables()).get_xlabel()
+    'x, m'
     """
     where, axes = places(rows), _axes(ax)
     for agent in np.unique(where.agent):
@@ -140,6 +147,13 @@ def separation(rows: Rows, *, limit_m: float | None = None, ax: Any = None) -> A
     near.
 
     Raises InputError when the run has recorded no places, or of fewer than two agents.
+
+    >>> import sidestep
+    >>> from sidestep import plot
+    >>> sim = sidestep.Simulation("scenarios/airspace/superconflict.toml", record=True)
+    >>> _ = sim.step(20)
+    >>> plot.separation(sim.tables(), limit_m=500.0).get_xlabel()
+    'cycle'
     """
     where = places(rows)
     if len(np.unique(where.agent)) < 2:

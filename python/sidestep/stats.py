@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _native
+from . import _native, _notebook
 from ._errors import wrong
 
 __all__ = [
@@ -111,6 +111,9 @@ class Paired(NamedTuple):
     ratio: float | None
     #: Fieller's interval of it.
     ratio_interval: Interval | None
+
+    def _repr_html_(self) -> str:
+        return _notebook.paired(self)
 
 
 class Correlation(NamedTuple):
@@ -261,7 +264,12 @@ class StoppingRule:
 
     def next(self, *columns: ArrayLike) -> Next:
         """Returns how many runs to have, after the values of those there are: one column per quantity, in the order of the
-        runs. With several columns they are enough when they are for all."""
+        runs. With several columns they are enough when they are for all.
+
+        >>> from sidestep import stats
+        >>> stats.StoppingRule(1.0, relative=False, max_runs=20).next([1.0, 9.0] * 5)
+        Next(runs=20, reason=None)
+        """
         values = [_values("columns", column) for column in columns]
         runs = (self.min_runs, self.max_runs)
         return Next(*_native.stats_next(self.half_width, self.relative, runs, values))

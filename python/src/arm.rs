@@ -21,6 +21,13 @@ use std::path::PathBuf;
 /// frame of the base, angles in rad. It never changes, and threads may share it.
 ///
 /// Raises InputError when a file, a link or the group is wrong.
+///
+/// Examples of its methods go on from here, in the root of a clone:
+///
+/// >>> import sidestep
+/// >>> arm = sidestep.Arm("scenarios/chain/arm.urdf")
+/// >>> len(arm.joints) == len(arm.units)
+/// True
 #[pyclass(module = "sidestep", frozen)]
 pub(crate) struct Arm(ChosenArm);
 
@@ -126,6 +133,9 @@ impl Arm {
     /// allow.
     ///
     /// Raises InputError when there is no such posture.
+    ///
+    /// >>> arm.posture().shape == (len(arm.joints),)
+    /// True
     #[pyo3(signature = (name=None))]
     fn posture<'py>(
         &self,

@@ -31,6 +31,8 @@ const MOST_WORKERS: usize = 1024;
 /// Python's lock is released while worlds advance, and Ctrl-C stops them between two cycles, all at the same one. A world that
 /// breaks off (which is a bug) is named, and the others go on once it has been reset.
 ///
+/// Examples of its methods go on from here:
+///
 /// >>> import sidestep
 /// >>> scenario = {"world": "robots", "map": {"ascii": "....."},
 /// ...             "robots": [{"count": 2, "behaviour": {"kind": "external"}}]}
@@ -132,8 +134,7 @@ fn told(error: &BatchError) -> PyErr {
 
 /// Returns the way to a world at its start: checkpoints are not made of it, so that all seeds share one text.
 fn start(scenario: &Arc<Made>) -> PyResult<Arc<Start>> {
-    let text = scenario.resolved()?.text.clone();
-    let source = Source { text, ..scenario.source.clone() };
+    let source = Source::new("scenario.toml", scenario.identity()?, "");
     let (own, scenario) = (scenario.compiled.plan().seed, Arc::clone(scenario));
     Ok(Arc::new(move |seed| {
         if seed == own {
@@ -222,6 +223,9 @@ impl Batch {
     }
 
     /// Returns the measurements of each world so far, a list of dicts.
+    ///
+    /// >>> [world["actions"] for world in batch.metrics()]
+    /// [2, 2, 2]
     fn metrics(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let all = self.with(py, |batch| batch.ask(|run| run.metrics()))?;
         to_python(py, &serde_json::Value::from(all))
@@ -231,6 +235,8 @@ impl Batch {
     /// (worlds, agents, ...), or one number for all.
     ///
     /// Raises OrderError; nobody is ordered anything then.
+    ///
+    /// >>> batch.order("action", 0)
     #[pyo3(signature = (name, values, *, team=None))]
     fn order(
         &self,
@@ -255,6 +261,12 @@ impl Batch {
     /// world) is true; orders to the others are dropped. A world that is over stays as it is.
     ///
     /// Raises ReplayError when a world breaks off; the others have advanced then.
+    ///
+    /// >>> import numpy as np
+    /// >>> batch.step(4)
+    /// >>> batch.step(mask=np.array([True, False, True]))
+    /// >>> batch.cycles.tolist()
+    /// [6, 5, 6]
     #[pyo3(signature = (cycles=Whole(1), *, mask=None), text_signature = "($self, cycles=1, *, mask=None)")]
     fn step(&self, py: Python<'_>, cycles: Whole, mask: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let mask = self.mask(mask)?;
@@ -274,6 +286,13 @@ impl Batch {
 
     /// Returns what the agents of a team (by number or name) observe in all worlds before the next cycle: arrays by name, of the
     /// shape (worlds, agents, ...). With `out`, arrays of an earlier call are written anew and returned.
+    ///
+    /// Raises OrderError when there is no such team, InputError when `out` has other arrays.
+    ///
+    /// >>> out = batch.observe()
+    /// >>> batch.step()
+    /// >>> batch.observe(out=out) is out
+    /// True
     #[pyo3(signature = (team=None, *, out=None))]
     fn observe<'py>(
         &self,
@@ -296,6 +315,10 @@ impl Batch {
     /// it is true. Orders that wait are dropped.
     ///
     /// Raises InputError when a world cannot start with its seed; it stays as it was then.
+    ///
+    /// >>> batch.reset([8, 9, 10])
+    /// >>> batch.seeds.tolist(), batch.cycles.tolist()
+    /// ([8, 9, 10], [0, 0, 0])
     #[pyo3(signature = (seeds, *, mask=None))]
     fn reset(
         &self,

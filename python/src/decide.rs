@@ -81,12 +81,12 @@ fn deciders<'py>(run: &impl Deciding, decide: &Bound<'py, PyAny>) -> PyResult<Ve
     if let Ok(by_team) = decide.cast::<PyMapping>() {
         for entry in by_team.items()?.iter() {
             let (team, decide): (Bound<'_, PyAny>, Bound<'_, PyAny>) = entry.extract()?;
-            deciders.push(Decider { team: run.team(&team)?, decide });
+            deciders.push(Decider::new(run.team(&team)?, &decide)?);
         }
         return Ok(deciders);
     }
     for team in run.ordered_teams() {
-        deciders.push(Decider { team, decide: decide.clone() });
+        deciders.push(Decider::new(team, decide)?);
     }
     if deciders.is_empty() {
         let words = "no agent of this scenario takes orders; let it say that some are `external`";
@@ -95,7 +95,16 @@ fn deciders<'py>(run: &impl Deciding, decide: &Bound<'py, PyAny>) -> PyResult<Ve
     Ok(deciders)
 }
 
-impl Decider<'_> {
+impl<'py> Decider<'py> {
+    /// Returns who decides for a team: the function, or what it returns of that team if it makes one for each.
+    fn new(team: Numbered, decide: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let decide = match decide.getattr_opt("of_team")? {
+            Some(of_team) => of_team.call1((crate::space::Team(Arc::clone(&team.1)),))?,
+            None => decide.clone(),
+        };
+        Ok(Self { team, decide })
+    }
+
     /// Calls the function, and gives its orders.
     fn order(&self, py: Python<'_>, run: &impl Deciding, state: &Bound<'_, PyAny>) -> PyResult<()> {
         let observed = run.observed(py, &self.team)?;

@@ -47,6 +47,8 @@ impl Learned {
     /// Returns the text of a profile with it under this name: a new one, or `text` with it added or replaced.
     ///
     /// Raises InputError when the text is no profile, or the name does not fit.
+    ///
+    /// See :func:`sidestep.learn.effector` for an example.
     #[pyo3(signature = (name, text=None))]
     fn profile(&self, name: &str, text: Option<&str>) -> PyResult<String> {
         let empty = profile::empty(name);

@@ -3,14 +3,14 @@
 //! ```text
 //! scenario.rs    a file, text or dict -> a compiled scenario
 //! simulation.rs  a run that Python advances, observes and orders
-//! batch.rs       many worlds that step together
+//! blocks.rs      the rows of a long run          batch.rs       many worlds that step together
 //! space.rs       what goes in and out       decide.rs  functions in Python that decide
 //! table.rs       rows -> Arrow, NumPy       arrays.rs  ids, values and columns of bodies
 //! read.rs        folders -> tables
 //! sweep.rs       many runs, by threads or by others
 //! arm.rs         kinematics of arms         learn.rs   error models from tables
 //! stats.rs       intervals and pairs        collectives.rs  games of tables or of an objective
-//! json.rs        values of other sorts
+//! json.rs        values of other sorts           notebook.rs    what cells of notebooks show
 //! error.rs       the exceptions             watch.rs   Ctrl-C
 //! ```
 //!
@@ -19,11 +19,13 @@
 mod arm;
 mod arrays;
 mod batch;
+mod blocks;
 mod collectives;
 mod decide;
 mod error;
 mod json;
 mod learn;
+mod notebook;
 mod read;
 mod scenario;
 mod simulation;
@@ -39,7 +41,11 @@ use pyo3::prelude::*;
 #[pymodule(gil_used = false)]
 mod _native {
     #[pymodule_export]
+    use super::arrays::rows_by_name;
+    #[pymodule_export]
     use super::batch::Batch;
+    #[pymodule_export]
+    use super::blocks::Blocks;
     #[pymodule_export]
     use super::scenario::{Scenario, schema, unpack_scenario, worlds};
     #[pymodule_export]
@@ -54,14 +60,14 @@ mod _native {
     #[pymodule_export]
     use super::learn::{Learned, learn_effector, learn_sensor};
     #[pymodule_export]
-    use super::read::read;
+    use super::read::{read, table_names};
     #[pymodule_export]
     use super::stats::{
         stats_correlation, stats_holm, stats_mean, stats_next, stats_paired, stats_quantile,
         stats_share,
     };
     #[pymodule_export]
-    use super::sweep::{compare_methods, run_sweep, run_task};
+    use super::sweep::{compare_methods, run_sweep, run_task, sweep_status};
     #[pymodule_export]
     use super::table::Table;
     use pyo3::prelude::*;

@@ -9,10 +9,21 @@ use sidestep_record::{read_table, tables as tables_of};
 use sidestep_session::sweep::{self, Folder};
 use std::path::{Path, PathBuf};
 
-/// Returns the tables of a run folder or a sweep's folder by name.
+/// The tables of a sweep's folder.
+const OF_SWEEP: [&str; 2] = ["results", "timings"];
+
+/// Returns the names of the tables of a run folder or a sweep's folder.
 ///
-/// ``tables`` names those that are wanted; all of them otherwise. A table of a run that has not ended reaches to its last
-/// checkpoint. A sweep has ``results``, one row per finished run, and ``timings``.
+/// Raises InputError when there is no such folder.
+#[pyfunction]
+pub(crate) fn table_names(py: Python<'_>, folder: PathBuf) -> PyResult<Vec<String>> {
+    if Folder::is_at(&folder) {
+        return Ok(OF_SWEEP.map(String::from).to_vec());
+    }
+    py.detach(|| tables_of(&folder)).map_err(|e| error::input(&e))
+}
+
+/// Returns the tables of a run folder or a sweep's folder by name, all of them or those that are named.
 ///
 /// Raises InputError when there is no such folder or table, or a file is damaged.
 #[pyfunction]
@@ -51,14 +62,13 @@ fn read_folder<'py>(
     });
     let (table, world) = finished.map_err(|e: InputError| error::input(&e))?;
     let dict = PyDict::new(py);
-    for (name, columns) in [("results", table.results()), ("timings", table.timings())] {
+    for (name, columns) in OF_SWEEP.into_iter().zip([table.results(), table.timings()]) {
         if wanted.is_none_or(|wanted| wanted.iter().any(|other| other == name)) {
             let columns = columns.into_iter().cloned().collect();
             dict.set_item(name, Table::of_runs(name, columns, &world)?)?;
         }
     }
-    let unknown =
-        wanted.into_iter().flatten().find(|name| !["results", "timings"].contains(&name.as_str()));
+    let unknown = wanted.into_iter().flatten().find(|name| !OF_SWEEP.contains(&name.as_str()));
     match unknown {
         Some(name) => {
             let cause = format!("there is no table `{name}`");

@@ -2,10 +2,11 @@
 
 use crate::error::{self, wrong};
 use crate::json::{list, table, to_python, to_toml};
+use crate::notebook::shown;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyMapping};
 use sidestep::kernel::InputError;
-use sidestep::scenario::{Compiled, Resolved, Source};
+use sidestep::scenario::{Compiled, Resolved, Seedless, Source};
 use sidestep::worlds::WORLDS;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
@@ -16,7 +17,7 @@ use std::sync::{Arc, OnceLock};
 /// such as BlueSky's .scn), a dict with the keys of a scenario file, or `text`, which is one. Paths in a dict or text are
 /// relative to `base`, by default the present folder.
 ///
-/// Raises InputError, with the key that is wrong.
+/// Raises InputError, with the key that is wrong. Examples of its methods go on from here:
 ///
 /// >>> import sidestep
 /// >>> scenario = sidestep.Scenario({"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2}]})
@@ -27,19 +28,40 @@ pub(crate) struct Scenario(pub(crate) Arc<Made>);
 
 /// A compiled scenario with its text.
 pub(crate) struct Made {
-    pub(crate) source: Source,
     pub(crate) compiled: Box<dyn Compiled>,
+    text: Text,
     /// Whether its text was made from a dict, so that its lines are nobody's.
     is_dict: bool,
     resolved: OnceLock<Result<Resolved, InputError>>,
+    /// The resolved text without its seed, where it has one.
+    seedless: OnceLock<Option<Seedless>>,
     /// Holds its files, if it was unpacked from a bundle.
     unpacked: Option<Arc<tempfile::TempDir>>,
+}
+
+/// The text of a scenario.
+enum Text {
+    /// One that was read or written.
+    Own(Source),
+    /// That of another scenario with this seed. It is written when somebody asks: to write a text anew takes longer than
+    /// to start a small world.
+    Reseeded { of: Arc<Made>, seed: u64, source: OnceLock<Result<Source, InputError>> },
 }
 
 impl Made {
     fn new(source: Source, is_dict: bool) -> PyResult<Self> {
         let compiled = WORLDS.compile(&source).map_err(|e| told(&e, is_dict))?;
-        Ok(Self { source, compiled, is_dict, resolved: OnceLock::new(), unpacked: None })
+        Ok(Self::of(compiled, Text::Own(source), is_dict, None))
+    }
+
+    fn of(
+        compiled: Box<dyn Compiled>,
+        text: Text,
+        is_dict: bool,
+        unpacked: Option<Arc<tempfile::TempDir>>,
+    ) -> Self {
+        let (resolved, seedless) = (OnceLock::new(), OnceLock::new());
+        Self { compiled, text, is_dict, resolved, seedless, unpacked }
     }
 
     /// Returns the scenario of a bundle.
@@ -55,38 +77,73 @@ impl Made {
         Ok(Self { unpacked, ..made })
     }
 
+    /// Returns its text and where that is from.
+    pub(crate) fn source(&self) -> PyResult<&Source> {
+        self.own_source().map_err(|e| told(e, self.is_dict))
+    }
+
+    fn own_source(&self) -> Result<&Source, &InputError> {
+        match &self.text {
+            Text::Own(source) => Ok(source),
+            Text::Reseeded { of, seed, source } => {
+                let write = || match of.own_source() {
+                    Ok(source) => source.clone().with(&[format!("seed={seed}")]),
+                    Err(error) => Err(error.clone()),
+                };
+                source.get_or_init(write).as_ref()
+            }
+        }
+    }
+
     /// Returns it with all its files, as run folders keep it; checkpoints belong to this text.
     pub(crate) fn resolved(&self) -> PyResult<&Resolved> {
-        let resolved = self.resolved.get_or_init(|| self.compiled.resolve(&self.source));
-        resolved.as_ref().map_err(|e| told(e, self.is_dict))
+        let resolve = || match self.own_source() {
+            Ok(source) => self.compiled.resolve(source),
+            Err(error) => Err(error.clone()),
+        };
+        self.resolved.get_or_init(resolve).as_ref().map_err(|e| told(e, self.is_dict))
+    }
+
+    /// Returns the text to which checkpoints belong: the resolved one.
+    pub(crate) fn identity(&self) -> PyResult<String> {
+        if let Text::Reseeded { of, seed, .. } = &self.text {
+            let (resolved, find) = (of.resolved()?, Resolved::seedless);
+            if let Some(seedless) = of.seedless.get_or_init(|| find(resolved)) {
+                return Ok(seedless.with(*seed));
+            }
+        }
+        Ok(self.resolved()?.text.clone())
     }
 
     /// Returns the same scenario with another seed, compiled anew only where its world needs that.
-    pub(crate) fn reseeded(&self, seed: u64) -> PyResult<Self> {
-        let source = self.source.clone().with(&[format!("seed={seed}")]);
-        let source = source.map_err(|e| told(&e, self.is_dict))?;
-        let Some(compiled) = self.compiled.reseeded(seed) else {
-            let unpacked = self.unpacked.clone();
-            return Ok(Self { unpacked, ..Self::new(source, self.is_dict)? });
+    pub(crate) fn reseeded(self: &Arc<Self>, seed: u64) -> PyResult<Self> {
+        if i64::try_from(seed).is_err() {
+            let remedy = "give at most 2^63 - 1: scenario files have no larger numbers";
+            return Err(wrong("seed", format!("{seed} is too large"), remedy));
+        }
+        // The text of a text is never looked for: who reseeds again and again keeps one scenario alive, and no chain of them.
+        let of = match &self.text {
+            Text::Own(_) => self,
+            Text::Reseeded { of, .. } => of,
+        };
+        let compiled = match self.compiled.reseeded(seed) {
+            Some(compiled) => compiled,
+            None => self.compiled_with(seed),
         };
         let compiled = compiled.map_err(|e| told(&e, self.is_dict))?;
-        Ok(Self {
-            source,
-            compiled,
-            is_dict: self.is_dict,
-            resolved: OnceLock::new(),
-            unpacked: self.unpacked.clone(),
-        })
+        let text = Text::Reseeded { of: Arc::clone(of), seed, source: OnceLock::new() };
+        Ok(Self::of(compiled, text, self.is_dict, self.unpacked.clone()))
     }
 
     /// Returns the same scenario with another seed, read and compiled anew.
     pub(crate) fn compiled_with(&self, seed: u64) -> Result<Box<dyn Compiled>, InputError> {
-        WORLDS.compile(&self.source.clone().with(&[format!("seed={seed}")])?)
+        let source = self.own_source().map_err(InputError::clone)?;
+        WORLDS.compile(&source.clone().with(&[format!("seed={seed}")])?)
     }
 
     /// Returns the same scenario with other values.
     pub(crate) fn with(&self, overrides: &[String]) -> PyResult<Self> {
-        let source = self.source.clone().with(overrides).map_err(|e| told(&e, self.is_dict))?;
+        let source = self.source()?.clone().with(overrides).map_err(|e| told(&e, self.is_dict))?;
         Ok(Self { unpacked: self.unpacked.clone(), ..Self::new(source, self.is_dict)? })
     }
 }
@@ -134,8 +191,7 @@ fn of_any(
                 })?;
                 let (source, compiled) =
                     sidestep_session::read(WORLDS, &path, &[]).map_err(|e| error::input(&e))?;
-                let resolved = OnceLock::new();
-                Ok(Made { source, compiled, is_dict: false, resolved, unpacked: None })
+                Ok(Made::of(compiled, Text::Own(source), false, None))
             }
         },
         _ => {
@@ -169,8 +225,8 @@ impl Scenario {
     /// Returns the same scenario with other values: `set(seed=3)`, `set({"robots.0.count": 5})`. A dotted key goes by tables and
     /// by the numbers of arrays, as `--set` of the command does.
     ///
-    /// >>> import sidestep
-    /// >>> scenario = sidestep.Scenario({"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2}]})
+    /// Raises InputError, with the key that is wrong.
+    ///
     /// >>> scenario.set({"robots.0.count": 4}, seed=9).agents
     /// 4
     #[pyo3(signature = (values=None, /, **keys))]
@@ -191,6 +247,9 @@ impl Scenario {
     }
 
     /// Returns what will surprise its author, the weightiest first: `key: words`.
+    ///
+    /// >>> scenario.check()
+    /// []
     fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let remarks = self.0.compiled.remarks();
         list(py, remarks.into_iter().map(|remark| format!("{}: {}", remark.key, remark.words)))
@@ -228,8 +287,21 @@ impl Scenario {
 
     /// The text of its file, with the values that were set.
     #[getter]
-    fn text(&self) -> &str {
-        &self.0.source.text
+    fn text(&self) -> PyResult<&str> {
+        Ok(&self.0.source()?.text)
+    }
+
+    /// Returns the JSON Schema of the scenarios of its world, as a dict.
+    ///
+    /// >>> "robots" in scenario.schema()["properties"]
+    /// True
+    fn schema(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        schema(py, Some(self.world()))
+    }
+
+    /// Returns a picture of the start and the facts, for notebooks.
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        shown(slf.as_any(), "scenario")
     }
 
     /// Pickled with all files that it names.
@@ -258,6 +330,12 @@ pub(crate) fn unpack_scenario(text: String, files: Vec<(String, Vec<u8>)>) -> Py
 }
 
 /// Returns the JSON Schema of the scenarios of a world, or of any, as a dict.
+///
+/// Raises InputError when there is no such world.
+///
+/// >>> import sidestep
+/// >>> "airspace" in sidestep.schema("airspace")["properties"]
+/// True
 #[pyfunction]
 #[pyo3(signature = (world=None))]
 pub(crate) fn schema(py: Python<'_>, world: Option<&str>) -> PyResult<Py<PyAny>> {
@@ -275,6 +353,10 @@ pub(crate) fn schema(py: Python<'_>, world: Option<&str>) -> PyResult<Py<PyAny>>
 }
 
 /// Returns the names of the worlds.
+///
+/// >>> import sidestep
+/// >>> sorted(sidestep.worlds())
+/// ['airspace', 'chain', 'robots']
 #[pyfunction]
 pub(crate) fn worlds() -> Vec<&'static str> {
     WORLDS.names()

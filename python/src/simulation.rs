@@ -1,9 +1,11 @@
 //! Simulations that Python advances, observes and orders.
 
 use crate::arrays::{Whole, column, ids, numbers, rows, texts};
+use crate::blocks::Blocks;
 use crate::decide::{Deciding, Numbered, decided};
 use crate::error::{self, ClosedError, wrong};
 use crate::json::to_python;
+use crate::notebook::shown;
 use crate::scenario::{Bundle, Made, made};
 use crate::space::{Room, Team, named, numbered};
 use crate::table::Table;
@@ -12,26 +14,33 @@ use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
 use sidestep::kernel::control::{self, Orders};
+use sidestep::kernel::ports::{TableSchema, Values};
 use sidestep::kernel::view::{Body, Kind, Look};
 use sidestep::kernel::{Cycle, EntityId, Plan, Simulation as AnySimulation};
 use sidestep::scenario::{Resolved, Source};
-use sidestep_draw::Film;
-use sidestep_session::{Journey, Keep};
+use sidestep_draw::{DrawError, Film, Still};
+use sidestep_session::{Journey, Keep, Wanted, frame_rows};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// Width in pixels of a picture in a notebook.
+const NOTEBOOK_PX: u32 = 480;
 
 /// A run of a scenario, at its start.
 ///
 /// Simulation(scenario, *, seed=None, workers=1, record=False, out=None, replace=False): `scenario` is a Scenario, a path
-/// or a dict. With `record` the rows of all tables are kept in memory (see `tables`); with `out` they go to a run folder, as
-/// `sidestep run --out` writes it, and `close` completes it. Same scenario and seed, same bits: whatever the
-/// workers, as the command and the library.
+/// or a dict. With `record` the rows of all tables are kept in memory, or of those in a list of names (see the method `record`,
+/// and `tables` and `blocks`); with `out` they go to a run folder, as `sidestep run --out` writes it, and `close` completes it.
+/// Same scenario and seed, same bits: whatever the workers, as the command and the library.
 ///
 /// It may be used from several threads, one at a time; Python's lock is released while it advances, and Ctrl-C stops it between
 /// two cycles. It can be pickled: its whole state goes along, but no rows.
 ///
+/// Examples of its methods go on from here:
+///
 /// >>> import sidestep
-/// >>> sim = sidestep.Simulation({"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2}]})
+/// >>> floor = {"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2, "behaviour": {"kind": "external"}}]}
+/// >>> sim = sidestep.Simulation(floor, record=True)
 /// >>> sim.step(10)
 /// 10
 /// >>> sim.cycle
@@ -55,11 +64,8 @@ impl Simulation {
         }
         // Without a folder it is identified by the text that a folder would have: checkpoints fit both.
         let source = match keep.folder {
-            Some(_) => scenario.source.clone(),
-            None => {
-                let text = scenario.resolved()?.text.clone();
-                Source { text, ..scenario.source.clone() }
-            }
+            Some(_) => scenario.source()?.clone(),
+            None => Source::new("scenario.toml", scenario.identity()?, ""),
         };
         let journey = Journey::start(scenario.compiled.as_ref(), &source, workers, keep, None);
         let journey = journey.map_err(|e| error::session(&e))?;
@@ -160,9 +166,56 @@ impl Simulation {
         })
     }
 
+    /// Draws the present state.
+    fn still(&self, py: Python<'_>, width: u32) -> PyResult<(Still, (u32, u32))> {
+        self.with(py, |journey| {
+            let run = journey.simulation_mut();
+            let frame = run.frame(Look::BODIES);
+            let mut film = self.film.lock().unwrap_or_else(PoisonError::into_inner);
+            let made = film.take().filter(|(its, _)| *its == width);
+            let made = made.map_or_else(|| Film::new(run.scenery(), &[], width), |(_, it)| Ok(it));
+            let made = made.map_err(|e| wrong("width", e.to_string(), "give 1 to 4096 pixels"))?;
+            let (caption, size) = (format!("cycle {}", frame.cycle), made.size_px());
+            let still = made.still(&frame, &[], &caption).map_err(|e| undrawn(&e))?;
+            *film = Some((width, made));
+            Ok((still, size))
+        })
+    }
+
     /// Returns the end that the scenario plans, or another one.
     fn end(&self, until: Option<Cycle>) -> Cycle {
         until.unwrap_or_else(|| self.scenario.compiled.plan().cycles)
+    }
+}
+
+fn undrawn(error: &DrawError) -> PyErr {
+    error::RecordError::new_err(error.to_string())
+}
+
+/// Returns tables by name.
+fn tables(py: Python<'_>, rows: Vec<(TableSchema, Vec<Values>)>) -> PyResult<Bound<'_, PyDict>> {
+    let dict = PyDict::new(py);
+    for (schema, columns) in rows {
+        dict.set_item(schema.name.clone(), Table::new(schema, columns)?)?;
+    }
+    Ok(dict)
+}
+
+/// The argument `record`: whether rows are kept, or those of which tables.
+pub(crate) struct Recorded(Option<Wanted>);
+
+impl FromPyObject<'_, '_> for Recorded {
+    type Error = PyErr;
+
+    fn extract(value: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
+        if let Ok(is_wanted) = value.extract::<bool>() {
+            return Ok(Self(is_wanted.then(Wanted::default)));
+        }
+        let names = value.extract::<Vec<String>>().map_err(|_| {
+            let remedy = "give True, False, or a list of names: record=[\"events\"]";
+            wrong("record", format!("{} is no list of tables", &*value), remedy)
+        })?;
+        Ok(Self(Some(Wanted { tables: Some(names), frames: None })))
     }
 }
 
@@ -175,12 +228,12 @@ fn closed() -> PyErr {
 #[pymethods]
 impl Simulation {
     #[new]
-    #[pyo3(signature = (scenario, *, seed=None, workers=Whole(1), record=false, out=None, replace=false), text_signature = "(scenario, *, seed=None, workers=1, record=False, out=None, replace=False)")]
+    #[pyo3(signature = (scenario, *, seed=None, workers=Whole(1), record=Recorded(None), out=None, replace=false), text_signature = "(scenario, *, seed=None, workers=1, record=False, out=None, replace=False)")]
     fn new(
         scenario: &Bound<'_, PyAny>,
         seed: Option<Whole>,
         workers: Whole,
-        record: bool,
+        record: Recorded,
         out: Option<PathBuf>,
         replace: bool,
     ) -> PyResult<Self> {
@@ -191,16 +244,19 @@ impl Simulation {
         }
         let keep = Keep { folder: out.as_deref(), mcap: None, replace };
         let simulation = Self::at_start(scenario, workers.0 as usize, keep)?;
-        if record {
+        if let Recorded(Some(wanted)) = record {
             let mut journey = simulation.journey.lock().unwrap_or_else(PoisonError::into_inner);
             let journey = journey.as_mut().ok_or_else(closed)?;
-            journey.keep_rows().map_err(|e| error::input(&e))?;
+            journey.keep_rows(&wanted).map_err(|e| error::input(&e))?;
         }
         Ok(simulation)
     }
 
     /// Advances by `cycles` cycles (one if not said), and returns how many were done: fewer when nothing can happen
     /// anymore.
+    ///
+    /// >>> sim.step(), sim.step(5)
+    /// (1, 5)
     #[pyo3(signature = (cycles=Whole(1)), text_signature = "($self, cycles=1)")]
     fn step(&self, py: Python<'_>, cycles: Whole) -> PyResult<u64> {
         self.advance_from(py, |now| now.saturating_add(cycles.0))
@@ -211,6 +267,11 @@ impl Simulation {
     /// With `decide`, a function or a dict of functions by team, agents are decided from outside: before each
     /// cycle it is called with a dict of what all agents of a team observe (arrays of the shape (agents, ...)) and with `state`,
     /// and returns their orders: a dict of arrays by name, or the array of the only or first order.
+    ///
+    /// >>> def decide(observed, state):
+    /// ...     return (observed["contact"] > 0).astype(int)        # left where it touched something, else forward
+    /// >>> sim.run(30, decide=decide)
+    /// 20
     #[pyo3(signature = (until=None, *, decide=None, state=None))]
     fn run(
         slf: &Bound<'_, Self>,
@@ -257,11 +318,17 @@ impl Simulation {
     }
 
     /// Returns the measurements of the run so far, as the command's summary has them.
+    ///
+    /// >>> sim.metrics()["contacts"]
+    /// 0
     fn metrics(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         to_python(py, &self.ask(py, |run| run.metrics())?)
     }
 
     /// Returns the measurements of each agent.
+    ///
+    /// >>> len(sim.agent_metrics())
+    /// 2
     fn agent_metrics(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         to_python(py, &self.ask(py, |run| run.agent_metrics())?)
     }
@@ -274,6 +341,11 @@ impl Simulation {
 
     /// Returns what the agents of a team (by number or name) observe before the next cycle: arrays by name, of the shape (agents, ...),
     /// in the order of `Team.agents`. It is what an agent of its own would perceive, errors and all.
+    ///
+    /// Raises OrderError when there is no such team.
+    ///
+    /// >>> sim.observe()["at_boxes"].shape
+    /// (2, 2)
     #[pyo3(signature = (team=None))]
     fn observe<'py>(
         &self,
@@ -289,6 +361,9 @@ impl Simulation {
     /// acted.
     ///
     /// Raises OrderError; nobody is ordered anything then.
+    ///
+    /// >>> sim.order("action", [0, 1])
+    /// >>> sim.order("action", 0, agents=[1])
     #[pyo3(signature = (name, values, *, agents=None, team=None))]
     fn order(
         &self,
@@ -308,6 +383,9 @@ impl Simulation {
     }
 
     /// Returns the state as bytes, for `restore`; run folders of the same scenario hold the like.
+    ///
+    /// >>> isinstance(sim.checkpoint(), bytes)
+    /// True
     fn checkpoint<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let bytes = self.ask(py, |run| run.checkpoint())?;
         Ok(PyBytes::new(py, &bytes))
@@ -316,6 +394,13 @@ impl Simulation {
     /// Goes on from a checkpoint of the same scenario.
     ///
     /// Raises CheckpointError when it is damaged, or belongs to another scenario or version.
+    ///
+    /// >>> before = sim.checkpoint()
+    /// >>> sim.step(5)
+    /// 5
+    /// >>> sim.restore(before)
+    /// >>> sim.cycle
+    /// 10
     fn restore(&self, py: Python<'_>, checkpoint: Vec<u8>) -> PyResult<()> {
         self.with(py, |journey| {
             let restored = journey.simulation_mut().restore(&checkpoint);
@@ -324,6 +409,9 @@ impl Simulation {
     }
 
     /// Returns an independent copy in the same state, which records nothing.
+    ///
+    /// >>> sim.copy().digest == sim.digest
+    /// True
     fn copy(&self, py: Python<'_>) -> PyResult<Self> {
         let bytes = self.ask(py, |run| run.checkpoint())?;
         let copy = Self::at_start(Arc::clone(&self.scenario), self.workers, Keep::default())?;
@@ -349,6 +437,9 @@ impl Simulation {
 
     /// Returns all bodies as arrays: `kind` and `condition` (text), `number`, `part` (-1 where there are no parts), `at_m` (n, 3),
     /// `turn` (n, 4: a unit quaternion x, y, z, w), `velocity_m_s` (n, 3), besides `cycle` and `time_s`.
+    ///
+    /// >>> sim.snapshot()["at_m"].shape
+    /// (2, 3)
     fn snapshot<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let frame = self.with(py, |journey| Ok(journey.simulation_mut().frame(Look::BODIES)))?;
         let (dict, bodies) = (PyDict::new(py), &frame.bodies);
@@ -366,27 +457,35 @@ impl Simulation {
     }
 
     /// Draws the present state: an array (height, width, 3) of red, green and blue (uint8).
+    ///
+    /// Raises InputError when the width is 0 or above 4096 pixels.
+    ///
+    /// >>> sim.picture(100).shape[1:]
+    /// (100, 3)
     #[pyo3(signature = (width=640))]
     fn picture<'py>(&self, py: Python<'py>, width: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        let (pixels, width, height) = self.with(py, |journey| {
-            let run = journey.simulation_mut();
-            let frame = run.frame(Look::BODIES);
-            let mut film = self.film.lock().unwrap_or_else(PoisonError::into_inner);
-            let made = film.take().filter(|(its, _)| *its == width);
-            let made = made.map_or_else(|| Film::new(run.scenery(), &[], width), |(_, it)| Ok(it));
-            let made = made.map_err(|e| wrong("width", e.to_string(), "give 1 to 4096 pixels"))?;
-            let (caption, size) = (format!("cycle {}", frame.cycle), made.size_px());
-            let still = made.still(&frame, &[], &caption);
-            let still = still.map_err(|e| error::RecordError::new_err(e.to_string()))?;
-            *film = Some((width, made));
-            let opaque = still.rgba().chunks_exact(4).flat_map(|pixel| &pixel[..3]);
-            Ok((opaque.copied().collect::<Vec<u8>>(), size.0 as usize, size.1 as usize))
-        })?;
-        PyArray1::from_vec(py, pixels).reshape([height, width, 3])
+        let (still, (width, height)) = self.still(py, width)?;
+        let opaque = still.rgba().chunks_exact(4).flat_map(|pixel| &pixel[..3]);
+        let pixels: Vec<u8> = opaque.copied().collect();
+        PyArray1::from_vec(py, pixels).reshape([height as usize, width as usize, 3])
+    }
+
+    /// Returns the present frame as a table, one row for each body: kind, place, orientation, velocity and condition.
+    ///
+    /// >>> len(sim.frame()), sim.frame().units["x_m"]
+    /// (2, 'm')
+    fn frame(&self, py: Python<'_>) -> PyResult<Table> {
+        let rows = self.with(py, |journey| Ok(frame_rows(journey.simulation_mut())));
+        rows.and_then(|(schema, columns)| Table::new(schema, columns))
     }
 
     /// Returns what a body perceives and decides in the next cycle, and what will come of it, as a dict;
     /// None where nothing is to tell. Looking changes nothing.
+    ///
+    /// Raises InputError when there is no such kind.
+    ///
+    /// >>> [section["title"] for section in sim.inspect("robot", 0)["sections"]][:2]
+    /// ['Now', 'Memory']
     #[pyo3(signature = (kind, number, part=None))]
     fn inspect(
         &self,
@@ -410,7 +509,38 @@ impl Simulation {
         to_python(py, &told)
     }
 
-    /// Takes the rows that were recorded since the last call: tables by name. Needs `record=True`.
+    /// Keeps rows in memory from now on: those of all tables, or of these; with `frames=n` also the table `frames`, with all
+    /// bodies at every n-th cycle. `tables` and `blocks` hand them over.
+    ///
+    /// Raises InputError when there is no such table, rows are kept already, or they go to a folder.
+    ///
+    /// >>> sim = sidestep.Simulation(floor)
+    /// >>> sim.record(["trajectories"], frames=5)
+    /// >>> sim.step(10)
+    /// 10
+    /// >>> {name: len(table) for name, table in sim.tables().items()}
+    /// {'trajectories': 20, 'frames': 6}
+    #[pyo3(signature = (tables=None, *, frames=None))]
+    fn record(
+        &self,
+        py: Python<'_>,
+        tables: Option<Recorded>,
+        frames: Option<Whole>,
+    ) -> PyResult<()> {
+        let Recorded(wanted) = tables.unwrap_or(Recorded(Some(Wanted::default())));
+        let Some(wanted) = wanted else {
+            return Err(wrong("record", "rows that are kept are not dropped", "leave it out"));
+        };
+        let wanted = Wanted { frames: frames.map(|Whole(frames)| frames), ..wanted };
+        self.with(py, |journey| journey.keep_rows(&wanted).map_err(|e| error::input(&e)))
+    }
+
+    /// Takes the rows that were recorded since the last call: tables by name. Needs `record=True`, or `record` before.
+    ///
+    /// Raises InputError when rows are not kept in memory.
+    ///
+    /// >>> len(sim.tables()["trajectories"])
+    /// 20
     fn tables<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let rows = self.with(py, |journey| {
             let remedy = "make it with record=True; with `out` read its folder when it is closed";
@@ -419,15 +549,53 @@ impl Simulation {
             }
             journey.take_rows().map_err(|e| error::record(&e))
         })?;
-        let dict = PyDict::new(py);
-        for (schema, columns) in rows {
-            dict.set_item(schema.name.clone(), Table::new(schema, columns)?)?;
+        tables(py, rows)
+    }
+
+    /// Runs on to cycle `until` (the planned end, by default) and hands the rows over as they come: an iterator that
+    /// advances by `cycles` cycles at a time, and gives the tables of those, by name. So a run of any length takes the
+    /// memory of one block. `decide` and `state` are those of `run`. Rows of all tables are kept from now on, unless
+    /// `record` has said which.
+    ///
+    /// >>> sim = sidestep.Simulation(floor)
+    /// >>> for tables in sim.blocks(40, until=100):
+    /// ...     print(sim.cycle, len(tables["trajectories"]))
+    /// 40 80
+    /// 80 80
+    /// 100 40
+    #[pyo3(
+        signature = (cycles=Whole(1024), until=None, *, decide=None, state=None),
+        text_signature = "($self, cycles=1024, until=None, *, decide=None, state=None)"
+    )]
+    fn blocks(
+        slf: Bound<'_, Self>,
+        cycles: Whole,
+        until: Option<Whole>,
+        decide: Option<Py<PyAny>>,
+        state: Option<Py<PyAny>>,
+    ) -> PyResult<Blocks> {
+        let (py, simulation) = (slf.py(), slf.get());
+        if cycles.0 == 0 {
+            return Err(wrong("cycles", "a block of 0 cycles never ends", "give 1 or more"));
         }
-        Ok(dict)
+        simulation.with(py, |journey| match journey.keeps_rows() {
+            true => Ok(()),
+            false => journey.keep_rows(&Wanted::default()).map_err(|e| error::input(&e)),
+        })?;
+        let until = simulation.end(until.map(|Whole(until)| until));
+        // What functions keep from cycle to cycle, they keep from block to block.
+        let state = state.unwrap_or_else(|| PyDict::new(py).into_any().unbind());
+        let simulation = slf.into_any().unbind();
+        Ok(Blocks { simulation, cycles: cycles.0, until, decide, state })
     }
 
     /// Ends the run. A run folder gets its summary and picture: it is complete at the planned end, and can be
     /// resumed otherwise. Returns the summary as a dict; None if it was closed before.
+    ///
+    /// Raises RecordError when something cannot be stored.
+    ///
+    /// >>> sim.close()["cycles"]
+    /// 10
     fn close(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let signals = Signals::default();
         let summary = py.detach(|| {
@@ -447,6 +615,23 @@ impl Simulation {
     #[pyo3(signature = (*_raised))]
     fn __exit__(&self, py: Python<'_>, _raised: &Bound<'_, PyTuple>) -> PyResult<()> {
         self.close(py).map(drop)
+    }
+
+    /// Returns the picture and the measurements, for notebooks.
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        shown(slf.as_any(), "simulation")
+    }
+
+    /// Returns the picture as PNG, for notebooks; None when it is closed.
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyBytes>>> {
+        match self.still(py, NOTEBOOK_PX) {
+            Ok((still, _)) => {
+                let bytes = still.to_png().map_err(|e| undrawn(&e))?;
+                Ok(Some(PyBytes::new(py, &bytes)))
+            }
+            Err(raised) if raised.is_instance_of::<ClosedError>(py) => Ok(None),
+            Err(raised) => Err(raised),
+        }
     }
 
     fn __repr__(&self, py: Python<'_>) -> String {

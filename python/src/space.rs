@@ -14,6 +14,12 @@ use std::sync::Arc;
 ///
 /// ``low`` and ``high`` are the least and the greatest value, both included; ``choices`` names the values of a
 /// choice, by number from 0, and is None for other quantities.
+///
+/// >>> import sidestep
+/// >>> floor = {"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2, "behaviour": {"kind": "external"}}]}
+/// >>> action = sidestep.Simulation(floor).teams[0].ordered[0]
+/// >>> action.name, action.shape, action.choices
+/// ('action', (), ['forward', 'left', 'right', 'stay'])
 #[pyclass(module = "sidestep", frozen)]
 #[derive(Clone)]
 pub(crate) struct Space(pub(crate) control::Space);
@@ -85,6 +91,12 @@ impl Space {
 }
 
 /// Agents that observe, and are ordered, alike.
+///
+/// >>> import sidestep
+/// >>> floor = {"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2, "behaviour": {"kind": "external"}}]}
+/// >>> team = sidestep.Simulation(floor).teams[0]
+/// >>> team.name, team.agents.tolist(), [space.name for space in team.ordered]
+/// ('robot', [0, 1], ['action', 'trip'])
 #[pyclass(module = "sidestep", frozen)]
 pub(crate) struct Team(pub(crate) Arc<control::Team>);
 

@@ -122,7 +122,7 @@ fn of_any(of: &Bound<'_, PyAny>) -> PyResult<(Sweep, Option<Arc<Made>>)> {
         return Ok((Sweep::parse(&source).map_err(|e| error::input_of_dict(&e))?, None));
     }
     let made = made(of)?;
-    Ok((Sweep::of_source(made.source.clone()), Some(made)))
+    Ok((Sweep::of_source(made.source()?.clone()), Some(made)))
 }
 
 /// The outcome of a sweep.
@@ -292,6 +292,16 @@ pub(crate) fn run_task(
     outcomes.iter().map(text).collect()
 }
 
+/// Returns how far the sweep in a folder is: what `sidestep.sweep_status` stands on.
+///
+/// Raises InputError when there is no sweep, or something in it cannot be read.
+#[pyfunction]
+pub(crate) fn sweep_status(py: Python<'_>, folder: PathBuf) -> PyResult<Py<PyAny>> {
+    let status = py.detach(|| sweep::status(&Folder::open(&folder)?));
+    let status = status.map_err(|e: InputError| error::input(&e))?;
+    to_python(py, &serde_json::to_value(&status).unwrap_or_default())
+}
+
 /// Compares methods of collision avoidance on the same air traffic: what `sidestep.compare` stands on.
 #[pyfunction]
 pub(crate) fn compare_methods(
@@ -303,6 +313,7 @@ pub(crate) fn compare_methods(
     workers: usize,
 ) -> PyResult<Py<PyAny>> {
     let given = made(scenario)?;
+    let source = given.source()?;
     let named = |name: &String| Method::ALL.into_iter().find(|m| m.name() == name);
     let method = |name: &String| {
         let known = Method::ALL.map(Method::name).join(", ");
@@ -320,7 +331,7 @@ pub(crate) fn compare_methods(
         let heeded = watcher.interrupt();
         let run = || {
             let progress = &mut |_: &str, _: f64| ();
-            methods::compare_heeding(&given.source, &methods, span, workers, (progress, &heeded))
+            methods::compare_heeding(source, &methods, span, workers, (progress, &heeded))
         };
         catch_unwind(AssertUnwindSafe(run))
             .unwrap_or_else(|payload| resume_unless(payload, &heeded))

@@ -1,12 +1,15 @@
 //! Tables: rows as Arrow and NumPy arrays.
 
+use crate::arrays::Whole;
 use crate::error;
 use crate::json::list;
+use crate::notebook::shown;
+use arrow_array::cast::AsArray;
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
-use arrow_array::types::UInt32Type;
+use arrow_array::types::{Float64Type, Int32Type, Int64Type, UInt32Type, UInt64Type};
 use arrow_array::{
-    ArrayRef, BooleanArray, DictionaryArray, PrimitiveArray, RecordBatch, RecordBatchIterator,
-    RecordBatchReader, StringArray, UInt32Array,
+    Array, ArrayRef, BooleanArray, DictionaryArray, PrimitiveArray, RecordBatch,
+    RecordBatchIterator, RecordBatchReader, StringArray, UInt32Array,
 };
 use arrow_buffer::{NullBuffer, ScalarBuffer};
 use arrow_schema::ffi::FFI_ArrowSchema;
@@ -15,7 +18,7 @@ use numpy::{PyArray1, ToPyArray};
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
-use pyo3::types::{PyCapsule, PyDict};
+use pyo3::types::{PyCapsule, PyDict, PyList, PyTuple};
 use sidestep::experiment::sweep::{Role, RunColumn};
 use sidestep::kernel::ports::{ColumnSpec, ColumnType, TableSchema, Values};
 use sidestep::scenario::{Meaning, told};
@@ -26,7 +29,15 @@ use std::sync::Arc;
 /// Rows of one table: what a run records.
 ///
 /// It has `__arrow_c_stream__`, so `polars.DataFrame(table)`, `pandas.DataFrame.from_arrow(table)`, `pyarrow.table(table)` and DuckDB take it
-/// without a copy of the numbers; `table["column"]` is a NumPy array.
+/// without a copy of the numbers; `table["column"]` is a NumPy array. Examples of its methods go on from here:
+///
+/// >>> import sidestep
+/// >>> sim = sidestep.Simulation({"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2}]}, record=True)
+/// >>> sim.step(5)
+/// 5
+/// >>> table = sim.tables()["trajectories"]
+/// >>> table["cycle"].tolist()
+/// [0, 1, 2, 3, 4, 0, 1, 2, 3, 4]
 #[pyclass(module = "sidestep", frozen)]
 pub(crate) struct Table {
     schema: TableSchema,
@@ -120,6 +131,20 @@ impl Table {
         values(py, self.batch.column(position), self.schema.columns[position].ty)
     }
 
+    /// Returns the same rows with these columns alone, in this order; nothing is copied.
+    ///
+    /// Raises KeyError when there is no such column.
+    ///
+    /// >>> table.select(["body", "cycle"])
+    /// Table(trajectories, 10 rows: body, cycle)
+    fn select(&self, columns: Vec<String>) -> PyResult<Self> {
+        let places =
+            columns.iter().map(|name| self.position(name)).collect::<PyResult<Vec<_>>>()?;
+        let batch = self.batch.project(&places).map_err(|e| bug(&e))?;
+        let specs = places.iter().map(|&k| self.schema.columns[k].clone()).collect();
+        Ok(Self { schema: TableSchema { columns: specs, ..self.schema.clone() }, batch })
+    }
+
     fn __contains__(&self, name: &str) -> bool {
         self.schema.columns.iter().any(|column| column.name == name)
     }
@@ -131,6 +156,30 @@ impl Table {
     fn __repr__(&self) -> String {
         let columns = self.columns().join(", ");
         format!("Table({}, {} rows: {columns})", self.schema.name, self.batch.num_rows())
+    }
+
+    /// Returns the first rows, for notebooks.
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        shown(slf.as_any(), "table")
+    }
+
+    /// Returns the first rows as tuples of Python's own values; None where one is missing.
+    ///
+    /// >>> [row[:2] for row in table.head(2)]
+    /// [(0, 0), (1, 0)]
+    #[pyo3(signature = (rows=Whole(5)), text_signature = "($self, rows=5)")]
+    fn head<'py>(&self, py: Python<'py>, rows: Whole) -> PyResult<Vec<Bound<'py, PyTuple>>> {
+        let rows = self.batch.num_rows().min(usize::try_from(rows.0).unwrap_or(usize::MAX));
+        let first = self.batch.slice(0, rows);
+        let mut columns = Vec::new();
+        for (array, spec) in first.columns().iter().zip(&self.schema.columns) {
+            columns.push(plain(py, array, spec.ty)?);
+        }
+        let row = |k: usize| {
+            let cells = columns.iter().map(|column: &Bound<'_, PyList>| column.get_item(k));
+            PyTuple::new(py, cells.collect::<PyResult<Vec<_>>>()?)
+        };
+        (0..rows).map(row).collect()
     }
 
     /// The schema as an Arrow capsule.
@@ -197,11 +246,11 @@ fn field(spec: &ColumnSpec) -> Field {
 
 fn array(spec: &ColumnSpec, values: Values) -> Result<ArrayRef, ArrowError> {
     Ok(match values {
-        Values::U32(cells) => numbers::<_, arrow_array::types::UInt32Type>(cells.into_parts()),
-        Values::U64(cells) => numbers::<_, arrow_array::types::UInt64Type>(cells.into_parts()),
-        Values::I32(cells) => numbers::<_, arrow_array::types::Int32Type>(cells.into_parts()),
-        Values::I64(cells) => numbers::<_, arrow_array::types::Int64Type>(cells.into_parts()),
-        Values::F64(cells) => numbers::<_, arrow_array::types::Float64Type>(cells.into_parts()),
+        Values::U32(cells) => numbers::<_, UInt32Type>(cells.into_parts()),
+        Values::U64(cells) => numbers::<_, UInt64Type>(cells.into_parts()),
+        Values::I32(cells) => numbers::<_, Int32Type>(cells.into_parts()),
+        Values::I64(cells) => numbers::<_, Int64Type>(cells.into_parts()),
+        Values::F64(cells) => numbers::<_, Float64Type>(cells.into_parts()),
         Values::Bool(cells) => {
             Arc::new(cells.options().map(|cell| cell.copied()).collect::<BooleanArray>())
         }
@@ -225,31 +274,35 @@ where
     Arc::new(PrimitiveArray::<A>::new(ScalarBuffer::from(values), nulls))
 }
 
-/// Returns an array of objects, so that it can be compared and be a mask.
-fn objects<'py, T: IntoPyObject<'py>>(
-    py: Python<'py>,
-    items: impl IntoIterator<Item = T>,
-) -> PyResult<Bound<'py, PyAny>> {
-    py.import("numpy")?.call_method1("array", (list(py, items)?, "O"))
+/// Returns the cells of a column as Python's own values.
+fn plain<'py>(py: Python<'py>, array: &ArrayRef, ty: ColumnType) -> PyResult<Bound<'py, PyList>> {
+    match ty {
+        ColumnType::U32 => list(py, array.as_primitive::<UInt32Type>()),
+        ColumnType::U64 => list(py, array.as_primitive::<UInt64Type>()),
+        ColumnType::I32 => list(py, array.as_primitive::<Int32Type>()),
+        ColumnType::I64 => list(py, array.as_primitive::<Int64Type>()),
+        ColumnType::F64 => list(py, array.as_primitive::<Float64Type>()),
+        ColumnType::Bool => list(py, array.as_boolean()),
+        ColumnType::Text => list(py, array.as_string::<i32>()),
+        ColumnType::Label => {
+            let labels = array.as_dictionary::<UInt32Type>();
+            let names = labels.values().as_string::<i32>();
+            list(py, labels.keys().iter().map(|key| key.map(|key| names.value(key as usize))))
+        }
+    }
 }
 
 /// Returns a column for NumPy.
 fn values<'py>(py: Python<'py>, array: &ArrayRef, ty: ColumnType) -> PyResult<Bound<'py, PyAny>> {
-    use arrow_array::cast::AsArray;
-    use arrow_array::types::{Float64Type, Int32Type, Int64Type, UInt64Type};
     match ty {
         ColumnType::U32 => to_numpy(array.as_primitive::<UInt32Type>(), py, f64::from),
         ColumnType::U64 => to_numpy(array.as_primitive::<UInt64Type>(), py, |value| value as f64),
         ColumnType::I32 => to_numpy(array.as_primitive::<Int32Type>(), py, f64::from),
         ColumnType::I64 => to_numpy(array.as_primitive::<Int64Type>(), py, |value| value as f64),
         ColumnType::F64 => to_numpy(array.as_primitive::<Float64Type>(), py, |value| value),
-        ColumnType::Bool => objects(py, array.as_boolean().iter()),
-        ColumnType::Text => objects(py, array.as_string::<i32>().iter()),
-        ColumnType::Label => {
-            let labels = array.as_dictionary::<UInt32Type>();
-            let names = labels.values().as_string::<i32>();
-            let name = |key: Option<u32>| key.map(|key| names.value(key as usize));
-            objects(py, labels.keys().iter().map(name))
+        // As objects, so that they can be compared and be a mask.
+        ColumnType::Bool | ColumnType::Text | ColumnType::Label => {
+            py.import("numpy")?.call_method1("array", (plain(py, array, ty)?, "O"))
         }
     }
 }
@@ -263,7 +316,6 @@ where
     A: arrow_array::ArrowPrimitiveType,
     A::Native: numpy::Element,
 {
-    use arrow_array::Array;
     if array.null_count() == 0 {
         return PyArray1::from_slice(py, array.values()).into_bound_py_any(py);
     }

@@ -108,3 +108,21 @@ def test_a_folder_of_python_is_that_of_the_command(root, command, tmp_path):
     assert files
     for file in map(pathlib.Path, files):
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes(), file
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_a_seed_beside_the_scenario_and_one_within_it_are_the_same_run(scenario, root):
+    """Their checkpoints fit each other, and so do their texts when somebody asks for them."""
+    made = sidestep.Scenario(root / scenario)
+    beside, within = sidestep.Simulation(made, seed=11), sidestep.Simulation(made.set(seed=11))
+    beside.step(5)
+    within.restore(beside.checkpoint())
+    beside.restore(within.checkpoint())
+    again = sidestep.Simulation(beside.scenario, seed=12)
+    other = pickle.loads(pickle.dumps(again))
+    for sim in (beside, within):
+        sim.step(5)
+    assert beside.digest == within.digest
+    assert beside.scenario.text == within.scenario.text
+    assert (other.scenario.seed, other.digest) == (12, again.digest)
+    assert made.seed != 11

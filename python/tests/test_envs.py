@@ -11,7 +11,7 @@ pytest.importorskip("gymnasium")
 from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test  # noqa: E402
 from pettingzoo.utils import parallel_to_aec  # noqa: E402
 
-from sidestep.envs import parallel_env  # noqa: E402
+from sidestep.envs import TERMS, Airspace, Chain, Robots, airspace_v0, chain_v0, parallel_env, robots_v0  # noqa: E402
 
 
 @pytest.fixture
@@ -44,6 +44,57 @@ AIRPLANES = {
 def test_the_other_worlds_pass_the_tests_of_the_interface(scenario):
     parallel_api_test(parallel_env(scenario), num_cycles=100)
     parallel_seed_test(lambda: parallel_env(scenario), num_cycles=30)
+
+
+def test_environments_have_versioned_names_and_refuse_other_worlds(make):
+    for env, kind, module in (
+        (make(), Robots, robots_v0),
+        (parallel_env(CHAINS), Chain, chain_v0),
+        (parallel_env(AIRPLANES), Airspace, airspace_v0),
+    ):
+        name = module.__name__.rpartition(".")[2]
+        assert type(env) is kind is module.parallel_env
+        assert env.metadata["name"] == name
+        assert type(env.copy()) is kind
+        turns = module.env(env.scenario)
+        turns.reset(seed=1)
+        assert turns.agent_selection == env.possible_agents[0]
+    with pytest.raises(sidestep.InputError, match="its world is `chain`, and not `robots`"):
+        robots_v0.parallel_env(CHAINS)
+
+
+def test_progress_is_what_an_agent_has_come_on(make):
+    env = parallel_env(AIRPLANES, rewards={"progress": 1.0})
+    env.reset(seed=3)
+    # Straight ahead they fly toward the middle, which is their next way-point or lies before it.
+    _, gains, *_ = env.step({agent: np.zeros((), np.float32) for agent in env.agents})
+    speed_m_s = env.sim.observe()["speed_m_s"]
+    assert np.allclose(list(gains.values()), speed_m_s * env.sim.snapshot()["time_s"], rtol=1e-3)
+    chain = parallel_env(CHAINS, rewards={"progress": 1.0}, orders=["to_m"])
+    chain.reset(seed=1)
+    ahead = chain.sim.observe()["joints_m"][:, -1].astype(np.float32) + np.float32([1.0, 0.0])
+    _, gains, *_ = chain.step(dict(zip(chain.agents, ahead, strict=True)))
+    assert list(gains.values()) == chain.sim.observe()["done_share"].tolist()
+    with pytest.raises(sidestep.InputError, match="it needs .*`done_share`.* or .*which nobody observes"):
+        make(rewards={"progress": 1.0})
+    assert all(term.meaning and term.forms for term in TERMS.values())
+
+
+def test_an_airplane_that_has_landed_earns_nothing_for_it():
+    """What is observed of it is padding."""
+    env = parallel_env(AIRPLANES, rewards={"progress": 1.0, "delay": -1.0}, orders=["velocity_m_s"], max_cycles=500)
+    env.reset(seed=5)
+    most, has_landed = 0.0, False
+    while env.agents and not has_landed:
+        before = env.sim.observe()
+        ahead = np.where(before["due"][:, None] > 0, before["way_point_m"], 1.0).astype(np.float32)
+        _, gains, *_ = env.step(dict(zip(env.agents, ahead, strict=True)))
+        gains, after = np.array(list(gains.values())), env.sim.observe()
+        landed = (before["due"] > 0) & (after["due"] == 0)
+        assert (gains[landed] == 0.0).all()
+        has_landed = bool(landed.any())
+        most = max(most, np.abs(gains).max())
+    assert has_landed and most < 1000.0, "no gain is the distance of a way-point"
 
 
 def test_airplanes_under_a_shield_keep_their_separation_whatever_is_ordered():

@@ -158,6 +158,13 @@ def test_a_number_that_is_out_of_range_is_told_with_the_range(external, number):
         sim.step(0.5)
 
 
+def test_a_seed_that_no_scenario_file_can_have_is_told(external):
+    with pytest.raises(sidestep.InputError, match=r"seed: 9223372036854775808 is too large\n  help: give at most 2\^63 - 1"):
+        sidestep.Simulation(external, seed=2**63)
+    sim = sidestep.Simulation(external, seed=2**63 - 1)
+    assert pickle.loads(pickle.dumps(sim)).digest == sim.digest
+
+
 def test_a_forgotten_return_is_told(external):
     sim = sidestep.Simulation(external)
     with pytest.raises(sidestep.OrderError, match="`robot` returned None; return its orders, {} for none"):

@@ -166,7 +166,7 @@ def test_what_cannot_be_swept_is_an_error_before_any_run(options, words, floor):
 
 
 def test_ctrl_c_stops_a_sweep_and_the_same_call_goes_on(floor, tmp_path):
-    options = {"set": {"cycles": 60_000}, "replicate": 40}
+    options = {"set": {"cycles": 40_000}, "replicate": 24}
     out, done = tmp_path / "s", threading.Event()
 
     def interrupt():
@@ -183,9 +183,9 @@ def test_ctrl_c_stops_a_sweep_and_the_same_call_goes_on(floor, tmp_path):
     finally:
         done.set()
         thread.join()
-    assert 0 < len(sidestep.read(out)["results"]) < 40
+    assert 0 < len(sidestep.read(out)["results"]) < 24
     swept = sidestep.sweep(floor, **options, out=out, workers=2)
-    assert 0 < swept.told["took"]["runs"] < 40
+    assert 0 < swept.told["took"]["runs"] < 24
     whole = sidestep.sweep(floor, **options, out=tmp_path / "whole", workers=2)
     assert files(out) == files(tmp_path / "whole")
 
@@ -196,7 +196,7 @@ from concurrent.futures import ThreadPoolExecutor
 import sidestep
 floor, out = sys.argv[1:]
 with ThreadPoolExecutor(2) as pool:
-    sidestep.sweep(floor, set={"cycles": 60_000}, replicate=40, out=out, engine=pool)
+    sidestep.sweep(floor, set={"cycles": 40_000}, replicate=24, out=out, engine=pool)
 """
 
 
@@ -209,11 +209,11 @@ def test_a_killed_driver_loses_nothing_that_is_in_the_journal(floor, tmp_path):
     driver.kill()
     driver.wait()
     finished = len(sidestep.read(out)["results"])
-    assert 0 < finished < 40
-    options = {"set": {"cycles": 60_000}, "replicate": 40}
+    assert 0 < finished < 24
+    options = {"set": {"cycles": 40_000}, "replicate": 24}
     with ThreadPoolExecutor(2) as pool:
         swept = sidestep.sweep(floor, **options, out=out, engine=pool)
-    assert swept.told["took"]["runs"] == 40 - finished
+    assert swept.told["took"]["runs"] == 24 - finished
     sidestep.sweep(floor, **options, out=tmp_path / "whole")
     assert files(out) == files(tmp_path / "whole")
 
@@ -445,3 +445,39 @@ def test_a_ray_cluster_that_loses_a_node_gives_the_same_table(floor, tmp_path, m
         cluster.shutdown()
     assert swept.told["took"]["at_once"] == 3
     assert files(tmp_path / "ray") == files(tmp_path / "local")
+
+
+def test_the_status_of_a_sweep_is_that_of_the_command(floor, command, tmp_path):
+    """A share that is done, one that was stopped in the middle, and one that nobody has begun."""
+    out = tmp_path / "s"
+    with pytest.raises(sidestep.InputError, match="this is no sweep"):
+        sidestep.sweep_status(out)
+    told(command, "sweep", "plan", floor, "--vary", "robots.count=2,5", "--replicate", 9, "--out", out)
+    planned = sidestep.sweep_status(out)
+    assert (planned.runs, planned.of, planned.shares, planned.runs_per_s) == (0, 18, [], None)
+    for share in (0, 1):
+        told(command, "sweep", "run", out, "--shard", f"{share}/3")
+    # The journal of a share that was killed: its first four runs, the last one with half a line.
+    done = sidestep.sweep_status(out)
+    assert [share["is_done"] for share in done.shares] == [True, True]
+    full = tmp_path / "full"
+    told(command, "sweep", "plan", floor, "--vary", "robots.count=2,5", "--replicate", 9, "--out", full)
+    sidestep.sweep(floor, vary={"robots.count": [2, 5]}, replicate=9, out=full)
+    lines = (full / "shares/0-of-1.journal").read_bytes().splitlines(keepends=True)
+    own = [line for line in lines[1:] if (lambda cell: (cell // 9 + cell % 9) % 3 == 2)(json.loads(line[9:])["cell"])]
+    killed = b"".join([lines[0], *own[:3], own[3][:-20]])
+    (out / "shares/2-of-3.journal").write_bytes(killed)
+    status = sidestep.sweep_status(out)
+    assert (status.runs, status.of, status.failed, status.is_complete) == (15, 18, 0, False)
+    assert [(share["share"], share["runs"], share["of"], share["is_done"]) for share in status.shares] == [
+        ("0/3", 6, 6, True), ("1/3", 6, 6, True), ("2/3", 3, 6, False),
+    ]  # fmt: skip
+    assert 0 < status.idle_s < 600 and status.runs_per_s > 0
+    # The clock goes on between both looks.
+    by_command = told(command, "sweep", "status", out)
+    for name in ("runs", "of", "failed", "failures", "is_complete", "until_precise", "runs_per_s"):
+        assert by_command[name] == getattr(status, name), name
+    assert (out / "shares/2-of-3.journal").read_bytes() == killed, "looking changes nothing"
+    sidestep.sweep(floor, vary={"robots.count": [2, 5]}, replicate=9, out=out)
+    status = sidestep.sweep_status(out)
+    assert (status.runs, status.of, status.is_complete) == (18, 18, True)

@@ -13,25 +13,7 @@ from gymnasium.utils.env_match import check_environments_match  # noqa: E402
 from gymnasium.vector import AutoresetMode, SyncVectorEnv  # noqa: E402
 from test_envs import AIRPLANES, CHAINS  # noqa: E402
 
-from sidestep.envs import Batch, VectorEnv, parallel_env  # noqa: E402
-
-
-class Alone(gymnasium.Env):
-    """The one agent of a parallel environment, as Gymnasium's environment."""
-
-    def __init__(self, scenario, **options):
-        self.env = parallel_env(scenario, **options)
-        (self.agent,) = self.env.possible_agents
-        self.observation_space = self.env.observation_space(self.agent)
-        self.action_space = self.env.action_space(self.agent)
-
-    def reset(self, *, seed=None, options=None):
-        super().reset(seed=seed)
-        observed, infos = self.env.reset(seed=seed)
-        return observed[self.agent], infos[self.agent]
-
-    def step(self, action):
-        return tuple(part[self.agent] for part in self.env.step({self.agent: action}))
+from sidestep.envs import Batch, Env, VectorEnv, parallel_env  # noqa: E402
 
 
 def one(external, **keys):
@@ -54,7 +36,7 @@ SCENARIOS = {
 def test_it_matches_environments_one_by_one(world, mode, external):
     scenario, options = SCENARIOS[world](external), {"max_cycles": 7}
     ours = VectorEnv(scenario, 5, autoreset_mode=mode, workers=2, **options)
-    alone = [lambda: Alone(scenario, **options)] * 5
+    alone = [lambda: Env(scenario, **options)] * 5
     theirs = SyncVectorEnv(alone, autoreset_mode=mode)
     theirs.action_space.seed(4)
     assert data_equivalence(theirs.reset(seed=4), ours.reset(seed=4))
@@ -67,7 +49,13 @@ def test_it_matches_environments_one_by_one(world, mode, external):
 
 
 def test_one_environment_passes_its_checker(external):
-    check_env(Alone(one(external)), skip_render_check=True)
+    check_env(Env(one(external)), skip_render_check=True)
+    env = Env(one(external), render_mode="rgb_array", width=100)
+    env.reset(seed=1)
+    assert env.render().shape[1:] == (100, 3)
+    env.close()
+    with pytest.raises(sidestep.InputError, match="5 agents take orders\n  help: use parallel_env"):
+        Env(external)
 
 
 @pytest.mark.parametrize("copy", [True, False])
@@ -209,3 +197,38 @@ def test_arrays_that_are_not_copied_stay_for_one_more_step(external, mode):
             assert not np.shares_memory(array, after[name]), name
             np.testing.assert_array_equal(array, kept[name])
         before = after
+
+
+def needs(name):
+    return pytest.importorskip(name, reason=f"{name} is not installed, so it is not tested with it")
+
+
+def test_torchrl_takes_it(external):
+    torch, torchrl = needs("torch"), needs("torchrl")
+    from torchrl.envs import GymWrapper, PettingZooWrapper
+    from torchrl.envs.utils import check_env_specs
+
+    single = GymWrapper(Env(one(external), max_cycles=10))
+    check_env_specs(single)
+    assert single.rollout(20)["next", "reward"].shape == (10, 1)
+    many = PettingZooWrapper(parallel_env(external, max_cycles=10))
+    check_env_specs(many)
+    came = many.rollout(20)
+    assert came["next", "robot", "reward"].shape == (10, 5, 1)
+    assert torch.isfinite(came["next", "robot", "reward"]).all()
+    assert torchrl.__version__
+
+
+def test_rllib_takes_it(external):
+    needs("torch")
+    needs("ray.rllib")
+    from ray.rllib.env.wrappers.pettingzoo_env import ParallelPettingZooEnv
+
+    env = ParallelPettingZooEnv(parallel_env(external, max_cycles=5))
+    observed, _ = env.reset(seed=3)
+    assert set(observed) == set(env.par_env.possible_agents)
+    for k in range(5):
+        actions = {agent: env.action_space[agent].sample() for agent in observed}
+        observed, rewards, terminations, truncations, _ = env.step(actions)
+        assert set(rewards) == set(actions)
+        assert truncations["__all__"] == (k == 4) and not terminations["__all__"]

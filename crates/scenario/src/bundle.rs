@@ -2,6 +2,8 @@
 
 use super::Source;
 use super::file::read_bytes;
+use crate::Spanned;
+use serde::Deserialize;
 use sidestep_kernel::InputError;
 use std::fmt::Display;
 use std::path::Path;
@@ -18,6 +20,37 @@ pub struct Resolved {
     pub text: String,
     /// Files by their path relative to the scenario.
     pub files: Vec<(String, Vec<u8>)>,
+}
+
+/// The text of a resolved scenario before and behind its seed: the texts of all others that differ by their
+/// seed alone, without reading or editing any of them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Seedless {
+    before: String,
+    behind: String,
+}
+
+/// The one key of a resolved scenario that is looked for.
+#[derive(Deserialize)]
+struct OfSeed {
+    seed: Spanned<i64>,
+}
+
+impl Resolved {
+    /// Returns its text without its seed; `None` if it is no resolved scenario, which has one.
+    pub fn seedless(&self) -> Option<Seedless> {
+        let OfSeed { seed } = toml::from_str(&self.text).ok()?;
+        let span = seed.span();
+        let (before, behind) = (&self.text[..span.start], &self.text[span.end..]);
+        Some(Seedless { before: before.into(), behind: behind.into() })
+    }
+}
+
+impl Seedless {
+    /// Returns the text with a seed.
+    pub fn with(&self, seed: u64) -> String {
+        format!("{}{seed}{}", self.before, self.behind)
+    }
 }
 
 /// A scenario that is being resolved.
@@ -71,5 +104,34 @@ impl<'a> Bundle<'a> {
     pub fn finish(self) -> Result<Resolved, InputError> {
         let text = self.source.clone().with(&self.overrides)?.text;
         Ok(Resolved { text: format!("{}{text}", self.source.heading()), files: self.files })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn resolved(text: &str, seed: u64) -> Resolved {
+        let source = Source::new("s.toml", text, "");
+        let mut bundle = Bundle::new(&source, seed, 100);
+        bundle.set("map.file", "\"seed = 4\"");
+        bundle.finish().expect("resolved")
+    }
+
+    #[test]
+    fn the_text_of_another_seed_is_that_of_resolving_with_it() {
+        for text in [
+            "format = 1\nworld = \"w\"\n[map]\n# seed = 3\n",
+            "seed = 0x10 # why\nformat = 1\n[map]\nseed = 5\n",
+            "format = 1\nname = 'seed = 1'\nseed =    7\nmap = {}\n",
+        ] {
+            let one = resolved(text, 7);
+            let seedless = one.seedless().expect("it has a seed");
+            for seed in [0, 7, 12_345_678_901, i64::MAX as u64] {
+                assert_eq!(seedless.with(seed), resolved(text, seed).text);
+            }
+        }
+        let none = Resolved { text: "format = 1\n".into(), files: Vec::new() };
+        assert_eq!(none.seedless(), None);
     }
 }

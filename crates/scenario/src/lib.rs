@@ -24,7 +24,7 @@ mod sections;
 mod source;
 mod spanned;
 
-pub use bundle::{Bundle, Resolved};
+pub use bundle::{Bundle, Resolved, Seedless};
 pub use checked::{
     AboveBelow, AboveTo, AboveZero, Any, Between, FromBelow, FromTo, FromZero, Limits, NonNegative,
     Number, Point, Positive, Rule, Share, Whole, refused,

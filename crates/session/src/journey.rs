@@ -1,15 +1,16 @@
 //! One run, from its present cycle to its end, with everything that it records.
 
 use crate::driver::{Effort, Sinks, drive};
-use crate::film::{Ending, Film, McapFilm};
+use crate::film::{Ending, Film, FrameRows, McapFilm};
 use crate::identity::Maker;
 use crate::live::{Steered, ViewersAt};
 use crate::orders::has_orders;
 use crate::recording::{Recording, restore};
+use crate::rows::{Rows, Wanted};
 use crate::summary::{Cost, Status, Summary, SummaryFile};
 use crate::{Error, Watcher, picture};
 use sidestep::VERSION;
-use sidestep::kernel::ports::{MemoryRecorder, RecordError, Recorder, TableSchema, Values};
+use sidestep::kernel::ports::{RecordError, Recorder, TableSchema, Values};
 use sidestep::kernel::{Cycle, InputError, Simulation};
 use sidestep::scenario::{Compiled, Foreign, Source, Worlds};
 use sidestep_record::{Existing, McapRecorder, RunFolder};
@@ -22,8 +23,9 @@ pub struct Journey {
     run: Box<dyn Simulation>,
     recording: Option<Recording>,
     film: Option<McapFilm>,
-    /// Rows that are kept in memory.
-    rows: Option<MemoryRecorder>,
+    /// Rows and frames that are kept in memory.
+    rows: Option<Rows>,
+    frames: Option<FrameRows>,
     viewers: Option<Steered>,
     workers: usize,
     /// The cycle to stop at, if before the planned end.
@@ -136,6 +138,7 @@ impl Journey {
             recording,
             film,
             rows: None,
+            frames: None,
             viewers: None,
             workers,
             until: None,
@@ -172,36 +175,49 @@ impl Journey {
         self.run.cycle()
     }
 
-    /// Keeps the rows of all tables in memory from now on.
+    /// Keeps rows, and frames where they are wanted, in memory from now on.
     ///
     /// # Errors
-    /// When they go to a folder already: rows are handed over once.
-    pub fn keep_rows(&mut self) -> Result<(), InputError> {
+    /// When a table is none of the run's, rows are kept already, or go to a folder: they are handed over once.
+    pub fn keep_rows(&mut self, wanted: &Wanted) -> Result<(), InputError> {
         if let Some(recording) = &self.recording {
             let folder = recording.folder().path().display();
             let remedy = "read the tables from there when the run is finished";
             return Err(InputError::new(folder, "the rows of this run go to a folder", remedy));
         }
-        if self.rows.is_none() {
-            self.run.begin_recording();
-            self.rows = Some(MemoryRecorder::new(&self.run.schemas()));
+        if self.rows.is_some() {
+            let remedy = "say which tables are wanted when you begin";
+            return Err(InputError::new("record", "the rows of this run are kept already", remedy));
         }
+        if wanted.frames.is_some() && self.film.is_some() {
+            let remedy = "read them from there, or leave one of both out";
+            let cause = "the frames of this run go to an MCAP file";
+            return Err(InputError::new("frames", cause, remedy));
+        }
+        if wanted.frames == Some(0) {
+            let remedy = "give 1 or more cycles";
+            return Err(InputError::new("frames", "0 cycles cannot lie between frames", remedy));
+        }
+        self.run.begin_recording();
+        self.rows = Some(Rows::new(&self.run.schemas(), wanted.tables.as_deref())?);
+        self.frames = wanted.frames.map(FrameRows::new);
         Ok(())
     }
 
-    /// Whether the rows of all tables are kept in memory.
+    /// Whether rows are kept in memory.
     pub fn keeps_rows(&self) -> bool {
         self.rows.is_some()
     }
 
-    /// Takes the rows that were kept in memory so far; none if they are not kept.
+    /// Takes the rows that were kept in memory so far, by table; none if they are not kept.
     ///
     /// # Errors
     /// When the last ones cannot be handed over.
     pub fn take_rows(&mut self) -> Result<Vec<(TableSchema, Vec<Values>)>, RecordError> {
         let Some(rows) = &mut self.rows else { return Ok(Vec::new()) };
         self.run.record(rows)?;
-        Ok(rows.take())
+        let frames = self.frames.as_mut().map(FrameRows::take);
+        Ok(rows.take().into_iter().chain(frames).collect())
     }
 
     /// Drives the run to its end, or until the watcher asks to stop, and stores everything.
@@ -220,11 +236,13 @@ impl Journey {
     /// # Errors
     /// When something cannot be stored; a bug of the simulation.
     pub fn advance_to(&mut self, until: Cycle, watcher: &dyn Watcher) -> Result<(), Error> {
-        let Self { run, recording, film, rows, viewers, effort, .. } = self;
+        let Self { run, recording, film, rows, frames, viewers, effort, .. } = self;
+        // Only a caller who keeps rows keeps frames, and such a run has no other film.
+        let frames = frames.as_mut().map(|frames| frames as &mut dyn Film);
         let sinks = Sinks {
             recording: recording.as_mut(),
             rows: rows.as_mut().map(|rows| rows as &mut dyn Recorder),
-            film: film.as_mut().map(|film| film as &mut dyn Film),
+            film: film.as_mut().map(|film| film as &mut dyn Film).or(frames),
             viewers: viewers.as_mut(),
         };
         let driven = drive_guarded(run.as_mut(), until, sinks, watcher);

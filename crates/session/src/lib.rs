@@ -12,7 +12,8 @@
 //! sweep/        many runs of one scenario              summary.rs    the results of a run
 //! live/         viewers that watch and steer           beat.rs       when a cycle is due
 //! watcher.rs    progress, and whether to go on         identity.rs   the build that made a run
-//! attend.rs     work that its caller looks after fleet.rs      the job of agents as processes
+//! attend.rs     work that its caller looks after       rows.rs       rows that are kept in memory
+//! fleet.rs      the job of agents as processes
 //! ```
 //!
 //! Nothing here knows a terminal, the options of a command, or a world: functions that need the
@@ -36,6 +37,7 @@ mod recorded;
 mod recording;
 mod replay;
 mod rerun;
+mod rows;
 mod scenario;
 mod summary;
 mod watcher;
@@ -50,7 +52,7 @@ pub use beat::Beat;
 pub use driver::{Effort, Sinks, drive};
 pub use error::Error;
 pub use files::replace;
-pub use film::{Ending, Film, McapFilm};
+pub use film::{Ending, Film, McapFilm, frame_rows};
 pub use identity::{adds_code, build};
 pub use journey::{Journey, Keep};
 pub use live::{Steered, Viewers, ViewersAt, next_free};
@@ -59,6 +61,7 @@ pub use recorded::{csv_table, stored_summary};
 pub use recording::Recording;
 pub use replay::{Replayed, replay_all, replay_to};
 pub use rerun::Recorded;
+pub use rows::Wanted;
 pub use scenario::{problems, read};
 pub use sidestep_record::{Playback, Playing, Steering};
 pub use summary::{Phases, Status, Summary};

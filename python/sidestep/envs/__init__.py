@@ -1,6 +1,7 @@
 """Environments for reinforcement learning from any scenario whose agents take orders.
 
-PettingZoo's ``ParallelEnv``, many worlds at once as arrays (``Batch``), and Gymnasium's ``VectorEnv`` of one agent.
+PettingZoo's ``ParallelEnv`` (``Robots``, ``Chain``, ``Airspace``; ``robots_v0`` and so on as modules), many worlds at once as arrays
+(``Batch``), and Gymnasium's ``Env`` and ``VectorEnv`` of one agent.
 
 Needs the extra ``rl``: ``pip install 'sidestep[rl]'``.
 
@@ -26,9 +27,23 @@ except ImportError as error:
     ) from error
 
 from ._batch import Batch, VectorEnv
-from ._parallel import ParallelEnv, parallel_env
-from ._rewards import DEFAULTS, TERMS, Reward
+from ._parallel import Airspace, Chain, ParallelEnv, Robots, parallel_env
+from ._rewards import DEFAULTS, TERMS, Reward, Term
+from ._single import Env
 
-__all__ = ["DEFAULTS", "TERMS", "Batch", "ParallelEnv", "Reward", "VectorEnv", "parallel_env"]
+__all__ = [
+    "DEFAULTS",
+    "TERMS",
+    "Airspace",
+    "Batch",
+    "Chain",
+    "Env",
+    "ParallelEnv",
+    "Reward",
+    "Robots",
+    "Term",
+    "VectorEnv",
+    "parallel_env",
+]
 
 del _gymnasium, _pettingzoo

@@ -4,7 +4,7 @@ use crate::console::{Console, aligned, grouped};
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::plan::{ChangeArgs, WorkersArg};
-use crate::sweep::{ManyArgs, Told, go_on, tell, tell_share};
+use crate::sweep::{ManyArgs, Told, go_on, tell, tell_share, tell_status};
 use crate::watch::Watch;
 use crate::worlds;
 use clap::{Args, Subcommand};
@@ -25,6 +25,7 @@ Examples:
 On a cluster (docs/src/clusters.md has a Slurm array and a Kubernetes job):
   sidestep sweep plan methods.toml --out sweeps/methods
   sidestep sweep run sweeps/methods --shard 0/8   and so on to 7/8
+  sidestep sweep status sweeps/methods            how far it is; for any sweep with a folder
   sidestep sweep collect sweeps/methods
 
 A sweep file is TOML: format = 1, scenario = \"FILE\", replicates, [set], [vary], [[variant]], \
@@ -64,8 +65,10 @@ enum Step {
     Plan(Box<PlanArgs>),
     /// Run one share (shard) of a planned sweep
     Run(ShareArgs),
+    /// Show how far a sweep is that others work on: shares, rate, time left, failed runs
+    Status(FolderArgs),
     /// Collect the shares of a sweep into one table
-    Collect(CollectArgs),
+    Collect(FolderArgs),
 }
 
 #[derive(Debug, Args)]
@@ -104,7 +107,7 @@ struct ShareArgs {
 }
 
 #[derive(Debug, Args)]
-struct CollectArgs {
+struct FolderArgs {
     /// Folder of the sweep
     #[arg(value_name = "DIR")]
     folder: PathBuf,
@@ -119,6 +122,7 @@ pub(crate) fn sweep(args: &SweepArgs, console: Console) -> Result<ExitCode, Fail
     match (step, file) {
         (Some(Step::Plan(args)), _) => plan(args, console),
         (Some(Step::Run(args)), _) => share(args, console),
+        (Some(Step::Status(args)), _) => status(args, console),
         (Some(Step::Collect(args)), _) => collect(args, console),
         (None, Some(file)) => {
             many_runs((file, changes), many, out.as_deref(), workers.count(), console)
@@ -159,11 +163,17 @@ fn share(args: &ShareArgs, console: Console) -> Result<ExitCode, Failure> {
     Ok(tell_share(told, args.shard, ended))
 }
 
-fn collect(args: &CollectArgs, console: Console) -> Result<ExitCode, Failure> {
+fn collect(args: &FolderArgs, console: Console) -> Result<ExitCode, Failure> {
     let folder = Folder::open(&args.folder)?;
     let ended = sweep::collect(&folder, &Watch::new(console))?;
     let told = Told { plan: folder.plan(), folder: Some(&folder), console };
     tell(told, ended, "The runs are collected already.")
+}
+
+fn status(args: &FolderArgs, console: Console) -> Result<ExitCode, Failure> {
+    let folder = Folder::open(&args.folder)?;
+    tell_status(&folder, &sweep::status(&folder)?, console);
+    Ok(ExitCode::Done)
 }
 
 fn plan(args: &PlanArgs, console: Console) -> Result<ExitCode, Failure> {

@@ -2,10 +2,12 @@
 //!
 //! ```text
 //! ask.rs      options and files -> a sweep         say.rs       its results, as text and JSON
+//! status.rs   how far it is
 //! ```
 
 mod ask;
 mod say;
+mod status;
 
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
@@ -15,6 +17,7 @@ use crate::worlds;
 pub(crate) use ask::ManyArgs;
 pub(crate) use say::{Told, tell, tell_share};
 use sidestep_session::sweep::{self, Folder};
+pub(crate) use status::tell_status;
 
 /// Runs all cells of a sweep's folder that are not finished.
 ///

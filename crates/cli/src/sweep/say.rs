@@ -132,7 +132,7 @@ fn text(
 }
 
 /// Returns a number of things: `1 run`, `2 000 runs`.
-fn counted(n: usize, what: &str) -> String {
+pub(super) fn counted(n: usize, what: &str) -> String {
     format!("{} {what}{}", grouped(n as u64), if n == 1 { "" } else { "s" })
 }
 

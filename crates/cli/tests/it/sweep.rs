@@ -52,6 +52,28 @@ fn the_table_of_runs_does_not_depend_on_workers_shares_or_order() {
 }
 
 #[test]
+fn the_status_of_a_sweep_tells_its_shares_and_what_comes_next() {
+    let place = place();
+    place.json(&["sweep", "plan", "sweep.toml", "--out", "shared"]);
+    let status = || place.json(&["sweep", "status", "shared"]);
+    assert_eq!((&status()["runs"], &status()["of"]), (&0.into(), &18.into()));
+    place.json(&["sweep", "run", "shared", "--shard", "2/3"]);
+    let told = status();
+    assert_eq!((&told["runs"], &told["failed"]), (&6.into(), &0.into()));
+    assert_eq!(told["shares"][0]["is_done"], true);
+    let words = || place.run(&["sweep", "status", "shared"]).out();
+    for part in ["crowds: 6 of 18 runs", "share 2/3", "6 of 6, done", "sidestep resume shared"] {
+        assert!(words().contains(part), "no {part} in {}", words());
+    }
+    place.json(&["resume", "shared"]);
+    assert_eq!((&status()["runs"], &status()["is_complete"]), (&18.into(), &true.into()));
+    assert!(words().contains("sidestep report shared"), "{}", words());
+    let none = place.run(&["sweep", "status", "nowhere"]);
+    assert_eq!(none.code(), 2);
+    assert!(none.err().contains("this is no sweep"), "{}", none.err());
+}
+
+#[test]
 fn a_row_is_what_run_gives_for_the_scenario_of_its_variant_and_its_seed() {
     let place = place();
     let swept = place.json(&["sweep", "sweep.toml", "--out", "d"]);

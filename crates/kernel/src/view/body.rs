@@ -172,6 +172,23 @@ pub enum Condition {
     Failed,
 }
 
+impl Condition {
+    /// All conditions.
+    pub const ALL: [Self; 5] =
+        [Self::Plain, Self::Leading, Self::Open, Self::Touching, Self::Failed];
+
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Plain => "plain",
+            Self::Leading => "leading",
+            Self::Open => "open",
+            Self::Touching => "touching",
+            Self::Failed => "failed",
+        }
+    }
+}
+
 /// The shape of a body, around its pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase", tag = "type")]

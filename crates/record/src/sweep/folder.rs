@@ -311,6 +311,33 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         Ok(())
     }
 
+    /// Returns the shares that somebody has begun, in order, and whether each is done.
+    ///
+    /// # Errors
+    /// A folder that cannot be read.
+    pub fn shares(&self) -> Result<Vec<(Share, bool)>, InputError> {
+        // Journals first: a share that ends between both looks is seen as one that is done.
+        let mut shares = self.shares_with("journal")?;
+        let done = self.shares_with("parquet")?;
+        shares.extend(&done);
+        shares.sort();
+        shares.dedup();
+        Ok(shares.into_iter().map(|share| (share, done.contains(&share))).collect())
+    }
+
+    /// Passes on the finished runs of a share that is in progress or was stopped.
+    ///
+    /// # Errors
+    /// A journal that cannot be read, also because the share has ended meanwhile.
+    pub fn journal_of<T: DeserializeOwned>(
+        &self,
+        share: Share,
+        each: impl FnMut(T),
+    ) -> Result<(), InputError> {
+        let path = self.share_file(share, "journal");
+        read_journal(&path, &self.manifest.program_version, each)
+    }
+
     /// Begins the table of runs, with columns of these names, roles and types, and that of their times.
     ///
     /// # Errors

@@ -4,12 +4,15 @@ mod bag;
 mod gif;
 mod mcap;
 mod pictures;
+mod rows;
 
 pub(crate) use bag::BagFilm;
 pub(crate) use gif::write_gif;
 pub(crate) use mcap::LOOK;
 pub use mcap::{Ending, McapFilm};
 pub(crate) use pictures::Pictures;
+pub(crate) use rows::FrameRows;
+pub use rows::frame_rows;
 
 use crate::Error;
 use sidestep::kernel::Cycle;

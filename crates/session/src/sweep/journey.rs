@@ -6,6 +6,7 @@ use super::gather::{Folder, gather, share_of, table_of};
 use super::look::finished;
 use super::piles::{PILE, Piles};
 use super::prepare::{Make, prepare};
+use super::stamped::Stamped;
 use super::work::{Take, Work};
 use crate::identity::Maker;
 use crate::identity::build;
@@ -174,7 +175,7 @@ pub fn go_on<'a>(
     let mut effort = Effort::default();
     if let Some(mut journal) = folder.journal(share_of(Shard::ALL), |o: Outcome| log.note(&o))? {
         with_work(worlds, folder, engine.into(), watcher, |work| {
-            let mut keep = |outcome: &Outcome| Ok(journal.append(outcome)?);
+            let mut keep = |outcome: &Outcome| Ok(journal.append(&Stamped::now(outcome))?);
             effort = log.run_all(work, &mut keep).map_err(|e| saved(e, folder.path()))?;
             Ok(())
         })?;
@@ -262,7 +263,7 @@ pub fn share(
     let mut effort = Effort::default();
     with_work(worlds, folder, workers.into(), watcher, |work| {
         let mut keep = |outcome: &Outcome| {
-            journal.append(outcome)?;
+            journal.append(&Stamped::now(outcome))?;
             rows.push(outcome);
             Ok(())
         };

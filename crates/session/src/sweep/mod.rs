@@ -7,7 +7,8 @@
 //! crew.rs      others who run cells            task.rs      cells that another process sends
 //! piles.rs     finished runs -> the table, in blocks
 //! told.rs      the results, for programs
-//! look.rs      finished runs, for reports
+//! look.rs      finished runs, for reports         stamped.rs   lines of a journal
+//! status.rs    a sweep that others work on
 //! ```
 
 mod crew;
@@ -17,6 +18,8 @@ mod journey;
 mod look;
 mod piles;
 mod prepare;
+mod stamped;
+mod status;
 mod task;
 mod told;
 mod work;
@@ -27,5 +30,6 @@ pub use gather::Folder;
 pub use journey::{Done, Ended, collect, go_on, in_memory, planned, planned_or_there, share};
 pub(crate) use look::picture_of;
 pub use look::{Finished, finished};
+pub use status::{Failure, ShareStatus, Status, status};
 pub use task::Task;
 pub use told::failed;

@@ -2,9 +2,12 @@
 
 use crate::support::{InterruptAt, Place, StopAt, WORLDS};
 use sidestep_kernel::Interrupt;
+use sidestep_kernel::ports::Values;
 use sidestep_record::read_table;
 use sidestep_session::report::document;
-use sidestep_session::{Error, Journey, Keep, Recorded, Status, Unwatched, replay_all, replay_to};
+use sidestep_session::{
+    Error, Journey, Keep, Recorded, Status, Unwatched, Wanted, frame_rows, replay_all, replay_to,
+};
 
 #[test]
 fn the_number_of_workers_changes_nothing() {
@@ -93,4 +96,27 @@ fn a_run_is_reported() {
         assert!(pages.markdown.contains(words), "no {words} in the report");
     }
     assert!(!pages.pictures.is_empty());
+}
+
+#[test]
+fn rows_are_kept_of_the_tables_that_are_wanted_and_frames_at_multiples() {
+    let place = Place::new();
+    let mut journey = place.start(1, Keep::default()).expect("started");
+    let unknown = Wanted { tables: Some(vec!["toads".into()]), frames: None };
+    let told = journey.keep_rows(&unknown).expect_err("no such table").to_string();
+    assert!(told.contains("there is no table `toads`"), "{told}");
+    let wanted = Wanted { tables: Some(Vec::new()), frames: Some(50) };
+    journey.keep_rows(&wanted).expect("kept");
+    assert!(journey.keep_rows(&wanted).is_err(), "twice");
+    for until in [20, 70, 120] {
+        journey.advance_to(until, &Unwatched).expect("advanced");
+    }
+    let rows = journey.take_rows().expect("rows");
+    let [(schema, columns)] = &rows[..] else { panic!("{} tables", rows.len()) };
+    let Values::U64(cycles) = &columns[0] else { panic!("cycles come first") };
+    let mut cycles = cycles.to_vec();
+    cycles.dedup();
+    assert_eq!((schema.name.as_str(), cycles), ("frames", vec![0, 50, 100]));
+    let (_, now) = frame_rows(journey.simulation_mut());
+    assert_eq!(now[0], Values::U64(vec![120; now[0].len()].into()));
 }

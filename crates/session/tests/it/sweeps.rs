@@ -5,6 +5,7 @@ use sidestep::experiment::sweep::{Cell, Outcome, RunTable, Shard, Sweep};
 use sidestep_session::report::document;
 use sidestep_session::sweep::{
     Crew, Deal, Ended, Engine, Folder, Taken, Task, collect, go_on, in_memory, planned, share,
+    status,
 };
 use sidestep_session::{Error, Unwatched, build};
 
@@ -47,6 +48,38 @@ fn two_variants_with_three_seeds_come_to_one_table_however_they_are_run() {
         assert_eq!(done(ended).runs(), 3);
     }
     assert_eq!(done(collect(&folder, &Unwatched).expect("collected")), table);
+}
+
+#[test]
+fn the_status_counts_each_run_once_and_tells_those_that_failed() {
+    let place = Place::new();
+    let sweep = sweep(&place);
+    let folder = planned(WORLDS, &sweep, &place.path("s"), &Unwatched).expect("planned");
+    let shard: Shard = "1/2".parse().expect("a share");
+    share(WORLDS, &folder, shard, 1, &Unwatched).expect("run");
+    // A run of that share again, one of another build of the shares, and one that failed.
+    let journal = place.path("s/shares/0-of-1.journal");
+    let outcome =
+        |cell: u64| Outcome::failed(folder.plan().cell_of(cell).expect("a cell"), "no frogs");
+    let is_in_share = |cell: &u64| folder.plan().share(shard).any(|other| other.id == *cell);
+    let (own, other) = ((0..6).find(is_in_share), (0..6).find(|cell| !is_in_share(cell)));
+    let all = sidestep_record::sweep::Share { index: 0, count: 1 };
+    let mut writing = folder.journal(all, |_: Outcome| ()).expect("a journal").expect("not done");
+    for cell in [own, other].map(|cell| cell.expect("a cell")) {
+        writing.append(&outcome(cell)).expect("written");
+    }
+    drop(writing);
+    let found = status(&folder).expect("read");
+    assert_eq!((found.runs, found.of, found.failed, found.is_complete), (4, 6, 1, false));
+    assert_eq!(found.failures[0].why, "no frogs");
+    assert_eq!(found.failures[0].cell, other.expect("a cell"));
+    // Lines of early journals have no times.
+    assert_eq!((found.runs_per_s, found.idle_s, found.left_s), (None, None, None));
+    let shares: Vec<_> =
+        found.shares.iter().map(|s| (s.share.as_str(), s.runs, s.is_done)).collect();
+    assert_eq!(shares, [("0/1", 2, false), ("1/2", 3, true)]);
+    std::fs::write(journal, "no journal\nat all\n").expect("written");
+    assert!(status(&folder).is_err(), "damage is told");
 }
 
 #[test]

@@ -6,11 +6,13 @@
 use super::{read, root};
 use serde_json::Value;
 use sidestep::kernel::Simulation;
+use sidestep::kernel::control::Space;
 use sidestep::kernel::ports::table::split_unit;
 use sidestep::kernel::ports::{ColumnSpec, TableSchema};
 use sidestep::scenario::{Source, told};
 use sidestep::worlds::WORLDS;
 use std::fmt::Write;
+use std::sync::{Mutex, PoisonError};
 
 const CHAPTER: &str = "docs/src/columns.md";
 
@@ -34,7 +36,8 @@ const SCENARIOS: [(&str, &str); 3] = [
 const EXTERNAL: [(&str, &str); 3] = [
     (
         "robots",
-        "[map]\nascii = \"....\"\n[robots]\ncount = 1\nbehaviour = { kind = \"external\" }\n",
+        "[map]\nascii = \"....\"\n[radio]\nrange_m = 100\n[robots]\ncount = 2\nsensors = [\"sonar-8\"]\n\
+         effector = \"nomad\"\nbehaviour = { kind = \"external\" }\n",
     ),
     (
         "airspace",
@@ -87,6 +90,20 @@ fn rendered(schemas: &[TableSchema]) -> String {
     text + "\n"
 }
 
+/// Returns spaces as a table, a row each, in the order in which arrays have them.
+fn rendered_spaces(spaces: &[Space]) -> String {
+    let mut text = "\n| | name | shape | unit | values | meaning |\n".to_string();
+    text += "| --- | --- | --- | --- | --- | --- |\n";
+    for (k, space) in spaces.iter().enumerate() {
+        let shape: Vec<_> = space.shape.iter().map(ToString::to_string).collect();
+        let (name, unit, words) = (&space.name, space.unit().unwrap_or(""), space.words());
+        let (shape, meaning) = (shape.join(" x "), &space.meaning);
+        writeln!(text, "| {k} | `{name}` | {shape} | {unit} | {words} | {meaning} |")
+            .expect("text");
+    }
+    text + "\n"
+}
+
 /// Returns the names of a run's metrics; counts by kind of something are one, by reason too.
 fn metrics(value: &Value, path: &str) -> Vec<String> {
     let is_leaf = path.contains("_by_") || value.as_object().is_none();
@@ -99,6 +116,9 @@ fn metrics(value: &Value, path: &str) -> Vec<String> {
 
 /// Compares a marked part of the chapter with what it should be, or writes it.
 fn compare(name: &str, expected: &str) {
+    // Two tests that write would undo each other's parts.
+    static WRITING: Mutex<()> = Mutex::new(());
+    let _one = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
     let chapter = read(CHAPTER);
     let mark = format!("<!-- {name} -->\n");
     let found = marked(&chapter, name);
@@ -123,6 +143,16 @@ fn the_chapter_of_columns_has_the_tables_that_a_run_declares() {
     let of_worlds = EXTERNAL.map(|external| only("orders", external));
     compare("tables of orders", &of_worlds[0]);
     assert!(of_worlds.iter().all(|one| *one == of_worlds[0]), "{of_worlds:?}");
+}
+
+#[test]
+fn the_chapter_of_columns_has_what_agents_observe_and_take() {
+    for (world, scenario) in EXTERNAL {
+        let run = started(world, scenario);
+        let team = &run.teams()[0];
+        compare(&format!("observed of {world}"), &rendered_spaces(&team.observed));
+        compare(&format!("ordered of {world}"), &rendered_spaces(&team.ordered));
+    }
 }
 
 #[test]

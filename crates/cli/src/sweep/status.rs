@@ -1,0 +1,67 @@
+//! The state of a sweep that others work on, as text and as JSON.
+
+use super::say::counted;
+use crate::console::{Console, aligned, duration, grouped};
+use serde_json::json;
+use sidestep_session::sweep::{Folder, ShareStatus, Status};
+
+/// Largest number of failed runs that are listed.
+const NAMED: usize = 5;
+
+/// Prints how far a sweep is.
+pub(crate) fn tell_status(folder: &Folder, status: &Status, console: Console) {
+    let plan = folder.plan();
+    let mut json = json!({ "folder": folder.path(), "name": plan.name, "world": plan.world });
+    if let (Some(all), Ok(serde_json::Value::Object(told))) =
+        (json.as_object_mut(), serde_json::to_value(status))
+    {
+        all.extend(told);
+    }
+    let of = if status.until_precise && !status.is_complete { "of at most" } else { "of" };
+    let short = || format!("{} {of} {}\n", status.runs, status.of);
+    console.result_or_short(&json, short, || {
+        let name = if plan.name.is_empty() { &plan.world } else { &plan.name };
+        let (runs, all) = (grouped(status.runs), counted(status.of as usize, "run"));
+        format!("# {name}: {runs} {of} {all}\n\n{}", aligned(&lines(folder, status)))
+    });
+}
+
+fn lines(folder: &Folder, status: &Status) -> Vec<(String, String)> {
+    let path = folder.path().display();
+    let mut lines: Vec<(String, String)> = Vec::new();
+    let mut line = |name: &str, words: String| lines.push((name.to_string(), words));
+    for share in &status.shares {
+        line(&format!("share {}", share.share), share_words(share));
+    }
+    if let Some(rate) = status.runs_per_s.filter(|_| !status.is_complete) {
+        line("rate", format!("{rate:.3} runs a second of late"));
+    }
+    if let Some(left_s) = status.left_s.filter(|_| !status.is_complete) {
+        line("time left", duration(left_s));
+    }
+    line("failed", grouped(status.failed as u64));
+    for failure in status.failures.iter().take(NAMED) {
+        line("", format!("{}, seed {}: {}", failure.variant, failure.seed, failure.why));
+    }
+    let (is_all, nobody) = (status.runs == status.of, status.left_s.is_none());
+    let next = match status.is_complete {
+        true => Some(("look at it", format!("sidestep report {path}"))),
+        false if is_all => Some(("join them", format!("sidestep sweep collect {path}"))),
+        // Where a precision ends the sweep nobody knows what is left, so that tells nothing.
+        false if nobody && !status.until_precise => {
+            Some(("go on", format!("sidestep resume {path}")))
+        }
+        false => None,
+    };
+    lines.extend(next.map(|(name, words)| (name.to_string(), words)));
+    lines
+}
+
+fn share_words(share: &ShareStatus) -> String {
+    let runs = format!("{} of {}", grouped(share.runs), grouped(share.of));
+    match share.idle_s {
+        _ if share.is_done => format!("{runs}, done"),
+        Some(idle_s) => format!("{runs}, the last {} ago", duration(idle_s)),
+        None => runs,
+    }
+}

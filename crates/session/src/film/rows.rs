@@ -1,0 +1,103 @@
+//! Frames of a run as rows of a table, one for each body.
+
+use super::Film;
+use crate::Error;
+use sidestep::kernel::ports::table::label_of;
+use sidestep::kernel::ports::{Buffer, RowBuffer, Table, TableSchema, Values};
+use sidestep::kernel::view::{Body, Condition, Frame, Kind, Look};
+use sidestep::kernel::{Cycle, Simulation};
+
+/// Name of the table.
+const FRAMES: &str = "frames";
+
+/// A body at a moment.
+struct Row {
+    cycle: Cycle,
+    time_s: f64,
+    body: Body,
+}
+
+/// Frames that are kept in memory: the first when the run is looked at first, then those at multiples of a number of
+/// cycles, and the last one of a run that is over.
+pub(crate) struct FrameRows {
+    every: Cycle,
+    last: Option<Cycle>,
+    rows: RowBuffer<Row>,
+}
+
+impl FrameRows {
+    /// Returns frames that are taken every `every` cycles.
+    pub(crate) fn new(every: Cycle) -> Self {
+        let mut rows = RowBuffer::default();
+        rows.begin(Some(table()));
+        Self { every: every.max(1), last: None, rows }
+    }
+
+    /// Takes the rows that were kept so far.
+    pub(crate) fn take(&mut self) -> (TableSchema, Vec<Values>) {
+        (table().schema(), self.rows.take().unwrap_or_default())
+    }
+
+    fn is_due(&self, run: &dyn Simulation) -> bool {
+        let cycle = run.cycle();
+        let is_wanted = self.last.is_none() || cycle.is_multiple_of(self.every) || run.is_over();
+        is_wanted && self.last != Some(cycle)
+    }
+}
+
+impl Film for FrameRows {
+    fn every(&self) -> Cycle {
+        self.every
+    }
+
+    fn shoot(&mut self, run: &mut dyn Simulation) -> Result<(), Error> {
+        // Whoever advances a run in small steps looks at it more often than frames are due.
+        if self.is_due(run) {
+            self.last = Some(run.cycle());
+            self.rows.extend(rows(run.frame(Look::BODIES)));
+        }
+        Ok(())
+    }
+}
+
+/// Returns the present frame of a run as a table.
+pub fn frame_rows(run: &mut dyn Simulation) -> (TableSchema, Vec<Values>) {
+    let (table, rows) = (table(), rows(run.frame(Look::BODIES)).collect::<Vec<_>>());
+    (table.schema(), table.block(&rows))
+}
+
+fn rows(frame: Frame) -> impl Iterator<Item = Row> {
+    let Frame { cycle, time_s, bodies, .. } = frame;
+    bodies.into_iter().map(move |body| Row { cycle, time_s, body })
+}
+
+fn table() -> Table<Row> {
+    let at = |k: usize| move |row: &Row| row.body.pose.at_m[k];
+    let turn = |k: usize| move |row: &Row| row.body.pose.turn[k];
+    let velocity = |k: usize| move |row: &Row| row.body.velocity_m_s[k];
+    Table::new(FRAMES)
+        .u64("cycle", "cycles done: the frame shows the start of this cycle", |row: &Row| row.cycle)
+        .f64("time_s", "simulated time since the start", |row| row.time_s)
+        .label("kind", "kind of the body", Kind::ALL.map(Kind::name), |row| {
+            label_of(&Kind::ALL, &row.body.kind)
+        })
+        .u32("number", "its number among the bodies of its kind", |row| row.body.number)
+        .u32("part", "its part, where the thing has parts", |row| row.body.part)
+        .f64("x_m", "its place, east", at(0))
+        .f64("y_m", "its place, north", at(1))
+        .f64("z_m", "its place, up", at(2))
+        .f64("turn_x", "its orientation, a unit quaternion: x", turn(0))
+        .f64("turn_y", "its orientation: y", turn(1))
+        .f64("turn_z", "its orientation: z", turn(2))
+        .f64("turn_w", "its orientation: w", turn(3))
+        .f64(
+            "velocity_x_m_s",
+            "velocity, east, of a thing that is moved without acting",
+            velocity(0),
+        )
+        .f64("velocity_y_m_s", "the same, north", velocity(1))
+        .f64("velocity_z_m_s", "the same, up", velocity(2))
+        .label("condition", "its condition", Condition::ALL.map(Condition::name), |row| {
+            label_of(&Condition::ALL, &row.body.state)
+        })
+}

@@ -1,0 +1,207 @@
+//! The state of a sweep that others work on, as its folder tells it; looking changes nothing.
+
+use super::journey::{Folder, table_of};
+use super::stamped::{Read, now_unix_s};
+use serde::Serialize;
+use sidestep::experiment::sweep::{Outcome, Plan, Shard};
+use sidestep::kernel::InputError;
+use sidestep_record::sweep::Share;
+use std::collections::BTreeSet;
+
+/// Runs that came in within this many seconds before the last one tell the rate.
+const WINDOW_S: f64 = 600.0;
+/// Whoever works on a sweep has finished a run within as many times the usual time between two,
+const IDLE_RUNS: f64 = 10.0;
+/// or within this many seconds.
+const IDLE_S: f64 = 60.0;
+/// Largest number of failed runs that are told one by one.
+const MOST_TOLD: usize = 100;
+
+/// The state of a sweep.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Status {
+    /// Whether the table of all runs exists.
+    pub is_complete: bool,
+    /// Number of finished runs, those that failed among them.
+    pub runs: u64,
+    /// Number of runs that there will be; at most as many where a precision ends the sweep.
+    pub of: u64,
+    /// Whether a precision ends the sweep.
+    pub until_precise: bool,
+    /// Number of runs that failed.
+    pub failed: usize,
+    /// The first of them.
+    pub failures: Vec<Failure>,
+    /// The shares that somebody has begun, in order.
+    pub shares: Vec<ShareStatus>,
+    /// Finished runs per second of late; none before the second run, and none once it is complete.
+    pub runs_per_s: Option<f64>,
+    /// Seconds since the last run came in.
+    pub idle_s: Option<f64>,
+    /// Seconds until the last run comes in, if all goes on as of late; none where nobody seems to work on it, and
+    /// where a precision ends it.
+    pub left_s: Option<f64>,
+}
+
+/// A run that failed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Failure {
+    /// Number of its cell.
+    pub cell: u64,
+    /// Name of its variant.
+    pub variant: String,
+    /// Its seed.
+    pub seed: u64,
+    /// The reason.
+    pub why: String,
+}
+
+/// The state of a share.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ShareStatus {
+    /// Its name, as `--shard` takes it.
+    pub share: String,
+    /// Number of finished runs that it has.
+    pub runs: u64,
+    /// Number of runs that it is to have; at most as many where a precision ends the sweep.
+    pub of: u64,
+    /// Whether it is done.
+    pub is_done: bool,
+    /// Seconds since its last run came in; none for one that is done.
+    pub idle_s: Option<f64>,
+}
+
+/// The findings in the folder.
+#[derive(Default)]
+struct Found {
+    cells: BTreeSet<u64>,
+    failed: Vec<(u64, String)>,
+    /// The times at which runs came in, of shares in progress.
+    stamps: Vec<f64>,
+}
+
+impl Found {
+    fn note(&mut self, outcome: Outcome) {
+        let is_new = self.cells.insert(outcome.cell);
+        if let Some(why) = outcome.failure.filter(|_| is_new) {
+            self.failed.push((outcome.cell, why));
+        }
+    }
+}
+
+/// Returns the state of the sweep in a folder.
+///
+/// # Errors
+/// When something in it cannot be read.
+pub fn status(folder: &Folder) -> Result<Status, InputError> {
+    let (plan, now_s) = (folder.plan(), now_unix_s());
+    let (mut found, mut shares) = (Found::default(), Vec::new());
+    let is_complete = folder.is_complete();
+    if is_complete {
+        table_of(folder.results()?).outcomes(|outcome| found.note(outcome));
+    } else {
+        folder.parts(|part| table_of(part).outcomes(|outcome| found.note(outcome)))?;
+        for (share, is_done) in folder.shares()? {
+            shares.push(share_status(folder, share, is_done, &mut found, now_s)?);
+        }
+    }
+    let (runs, until_precise) = (found.cells.len() as u64, plan.until.is_some());
+    let of = if is_complete { runs } else { plan.runs() };
+    let newest_s = found.stamps.iter().copied().reduce(f64::max);
+    let idle_s = newest_s.map(|newest_s| (now_s - newest_s).max(0.0));
+    let runs_per_s = newest_s.and_then(|newest_s| rate(&found.stamps, newest_s));
+    let left_s = left_s(of.saturating_sub(runs), runs_per_s, idle_s).filter(|_| !until_precise);
+    let failures = failures(plan, &mut found.failed);
+    let failed = found.failed.len();
+    Ok(Status {
+        is_complete,
+        runs,
+        of,
+        until_precise,
+        failed,
+        failures,
+        shares,
+        runs_per_s,
+        idle_s,
+        left_s,
+    })
+}
+
+fn share_status(
+    folder: &Folder,
+    share: Share,
+    is_done: bool,
+    found: &mut Found,
+    now_s: f64,
+) -> Result<ShareStatus, InputError> {
+    let shard = Shard { index: share.index, count: share.count };
+    let of = folder.plan().share(shard).count() as u64;
+    let done =
+        || ShareStatus { share: shard.to_string(), runs: of, of, is_done: true, idle_s: None };
+    if is_done {
+        return Ok(done());
+    }
+    let (mut runs, mut newest_s) = (0, None::<f64>);
+    let read = folder.journal_of(share, |Read { outcome, ended_unix_s }| {
+        runs += 1;
+        found.note(outcome);
+        found.stamps.extend(ended_unix_s);
+        newest_s =
+            ended_unix_s.map(|s| newest_s.map_or(s, |newest_s| newest_s.max(s))).or(newest_s);
+    });
+    if let Err(error) = read {
+        // A share that has ended meanwhile has no journal any more.
+        return match folder.shares()?.contains(&(share, true)) {
+            true => Ok(done()),
+            false => Err(error),
+        };
+    }
+    let idle_s = newest_s.map(|newest_s| (now_s - newest_s).max(0.0));
+    Ok(ShareStatus { share: shard.to_string(), runs, of, is_done: false, idle_s })
+}
+
+/// Returns the runs per second of late.
+fn rate(stamps: &[f64], newest_s: f64) -> Option<f64> {
+    let late: Vec<f64> = stamps.iter().copied().filter(|s| newest_s - s <= WINDOW_S).collect();
+    let oldest_s = late.iter().copied().fold(newest_s, f64::min);
+    let (spaces, span_s) = (late.len() - 1, newest_s - oldest_s);
+    (spaces > 0 && span_s > 0.0).then(|| spaces as f64 / span_s)
+}
+
+fn left_s(left: u64, runs_per_s: Option<f64>, idle_s: Option<f64>) -> Option<f64> {
+    let (runs_per_s, idle_s) = (runs_per_s?, idle_s?);
+    let is_worked_on = idle_s <= IDLE_S.max(IDLE_RUNS / runs_per_s);
+    is_worked_on.then(|| left as f64 / runs_per_s)
+}
+
+/// Returns the first runs that failed, in order.
+fn failures(plan: &Plan, failed: &mut [(u64, String)]) -> Vec<Failure> {
+    failed.sort();
+    let names = plan.names();
+    let told = |(cell, why): &(u64, String)| {
+        let its = plan.cell_of(*cell)?;
+        let variant = names[its.variant as usize].clone();
+        Some(Failure { cell: *cell, variant, seed: its.seed, why: why.clone() })
+    };
+    failed.iter().take(MOST_TOLD).filter_map(told).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rate_is_that_of_the_last_minutes_and_what_is_left_is_told_while_somebody_works() {
+        assert_eq!(rate(&[100.0], 100.0), None);
+        assert_eq!(rate(&[100.0, 102.0, 104.0], 104.0), Some(0.5));
+        assert_eq!(
+            rate(&[1.0, 5000.0, 5004.0], 5004.0),
+            Some(0.25),
+            "the night between is none of it"
+        );
+        assert_eq!(left_s(10, Some(0.5), Some(30.0)), Some(20.0));
+        assert_eq!(left_s(10, Some(0.5), Some(61.0)), None);
+        assert_eq!(left_s(10, Some(0.01), Some(900.0)), Some(1000.0), "long runs come in seldom");
+        assert_eq!(left_s(10, None, Some(1.0)), None);
+    }
+}

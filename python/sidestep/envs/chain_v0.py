@@ -1,0 +1,20 @@
+"""The environment :class:`sidestep.envs.Chain` by the names that PettingZoo's users expect.
+
+>>> from sidestep.envs import chain_v0
+>>> chain_v0.parallel_env.metadata["name"]
+'chain_v0'
+"""
+
+from typing import Any
+
+from pettingzoo import AECEnv
+from pettingzoo.utils import parallel_to_aec
+
+from ._parallel import Chain as parallel_env
+
+__all__ = ["env", "parallel_env"]
+
+
+def env(*args: Any, **options: Any) -> AECEnv[str, Any, Any]:
+    """Returns it with one agent after the other (AEC); it takes what ``parallel_env`` takes."""
+    return parallel_to_aec(parallel_env(*args, **options))
