@@ -30,6 +30,7 @@ impl<const D: usize> Acting<'_, D> {
             true => self.lead(task, to),
             false => self.climb(task, to),
         };
+        let climbed = self.joints_climb(task, to, climbed);
         self.note(|notes| notes.climbed = Some(climbed.clone()));
         let way = sub(self.body.chain.points()[task.agent], at);
         self.body.driving.way_m.wanted += distance(at, to);

@@ -5,6 +5,7 @@
 //!           -> bounds.rs (back into the claim) -> follow.rs -> measure.rs
 //! broken.rs -> drive.rs -> go.rs, later.rs         where nothing can object
 //!              drive.rs -> plan.rs                 where local rules come no nearer
+//!              joints.rs                           after every motion of an arm
 //! ```
 
 mod bounds;
@@ -12,6 +13,7 @@ mod broken;
 mod drive;
 mod follow;
 mod go;
+mod joints;
 mod later;
 mod measure;
 mod obey;
@@ -103,6 +105,7 @@ impl<'a, const D: usize> Acting<'a, D> {
         self.scratch.before.clear();
         self.scratch.before.extend_from_slice(self.body.chain.points());
         self.scratch.escaped.clone_from(&self.scratch.before);
+        self.note_joints();
         if self.body.scattered.is_some() {
             self.come_together();
         } else {
