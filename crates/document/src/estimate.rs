@@ -16,6 +16,9 @@ pub struct Estimate {
     pub interval: Option<Interval>,
     /// Number of values.
     pub n: usize,
+    /// The interval before bounds of the quantity cut it, from which p-values follow.
+    #[serde(skip)]
+    uncut: Option<Interval>,
     /// Whether it is a geometric mean, and Student's interval that of the logarithms.
     #[serde(skip)]
     is_factor: bool,
@@ -26,7 +29,7 @@ impl Estimate {
     pub fn of(values: impl IntoIterator<Item = Option<f64>>) -> Self {
         let values: Vec<f64> = values.into_iter().flatten().filter(|v| v.is_finite()).collect();
         let (mean, interval) = (mean(&values), mean_interval(&values));
-        Self { mean, interval, n: values.len(), is_factor: false }
+        Self { mean, interval, n: values.len(), uncut: interval, is_factor: false }
     }
 
     /// Returns the geometric mean of those factors that are there and above 0, with the interval
@@ -37,7 +40,15 @@ impl Estimate {
         let of = Self::of(values.into_iter().map(|factor| factor.and_then(logarithm)));
         let factors = |i: Interval| Interval { low: i.low.exp(), high: i.high.exp() };
         let (mean, interval) = (of.mean.map(f64::exp), of.interval.map(factors));
-        Self { mean, interval, is_factor: true, ..of }
+        Self { mean, interval, uncut: interval, is_factor: true, ..of }
+    }
+
+    /// Returns the same estimate of a quantity that is never below `low` nor above `high`, and so neither is an end of
+    /// its interval.
+    #[must_use]
+    pub fn within(self, low: f64, high: f64) -> Self {
+        let cut = |i: Interval| Interval { low: i.low.max(low), high: i.high.min(high) };
+        Self { interval: self.interval.map(cut), ..self }
     }
 
     /// Returns the mean of `a[i] - b[i]` over the pairs in which both have a value: two treatments
@@ -55,7 +66,7 @@ impl Estimate {
     /// Returns the two-sided p-value of Student's test that the mean is `value`; `None` with fewer
     /// than two values.
     pub fn p_value(&self, value: f64) -> Option<f64> {
-        let Interval { low, high } = self.interval?;
+        let Interval { low, high } = self.uncut?;
         if !self.is_factor {
             return Some(mean_p_value(Interval { low, high }, self.n, value));
         }
@@ -121,6 +132,15 @@ mod tests {
         assert_eq!((difference.mean, difference.n), (Some(1.0), 3));
         assert!(difference.is_above(0.5) && !difference.is_above(1.0));
         assert_eq!(Estimate::ratio(&[Some(1.0), Some(1.0)], &[Some(0.0), Some(2.0)]).n, 1);
+    }
+
+    #[test]
+    fn an_interval_of_a_share_ends_at_its_bounds_and_tests_as_before() {
+        let shares = Estimate::of([100.0, 100.0, 90.0].map(Some));
+        let within = shares.within(0.0, 100.0);
+        assert!(shares.interval.unwrap().high > 100.0 && within.interval.unwrap().high == 100.0);
+        assert_eq!(within.interval.unwrap().low, shares.interval.unwrap().low);
+        assert_eq!((within.mean, within.p_value(80.0)), (shares.mean, shares.p_value(80.0)));
     }
 
     #[test]

@@ -88,6 +88,18 @@ impl Runs<'_> {
         Value::Estimate(Estimate::of(self.each().map(|run| Some(of(&run)))))
     }
 
+    /// Returns the mean of shares in percent, one of each run: neither it nor its interval leaves 0 to 100.
+    pub(crate) fn mean_share(&self, of: impl Fn(&Run<'_>) -> f64) -> Value {
+        let mean = Estimate::of(self.each().map(|run| Some(of(&run))));
+        Value::Estimate(mean.within(0.0, 100.0))
+    }
+
+    /// Returns the mean of a count of steps in percent of all, of which a step may have several.
+    pub(crate) fn mean_rate(&self, metric: &str) -> Value {
+        let mean = Estimate::of(self.each().map(|run| Some(run.percent(metric))));
+        Value::Estimate(mean.within(0.0, f64::INFINITY))
+    }
+
     /// Returns the share of the runs for which this holds.
     pub(crate) fn share(&self, holds: impl Fn(&Run<'_>) -> bool) -> Value {
         Value::Share(Share::of(self.each().map(|run| holds(&run))))

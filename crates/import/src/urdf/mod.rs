@@ -60,6 +60,8 @@ pub struct Joint {
     pub axis: [f64; 3],
     /// Lowest and highest value, in rad or m; `None` for joints without such limits.
     pub limits: Option<Limits>,
+    /// Highest speed, in rad/s or m/s; `None` where the file gives none, or 0, which many files have for that.
+    pub max_speed: Option<f64>,
     /// The joint that this one follows.
     pub mimic: Option<Mimic>,
 }

@@ -167,6 +167,7 @@ fn joint(element: Element, links: &Links) -> Result<Joint, InputError> {
         origin: origin(element)?,
         axis: axis(element, kind)?,
         limits: limits(element, kind)?,
+        max_speed: max_speed(element, kind)?,
         mimic: None,
     })
 }
@@ -226,6 +227,21 @@ fn limits(joint: Element, kind: JointKind) -> Result<Option<Limits>, InputError>
         return Err(element.error(cause, "write the smaller number into `lower`"));
     }
     Ok(Some(limits))
+}
+
+/// Reads the highest speed of a joint, which continuous joints need not have.
+fn max_speed(joint: Element, kind: JointKind) -> Result<Option<f64>, InputError> {
+    if !kind.has_one_value() {
+        return Ok(None);
+    }
+    let Some(element) = joint.child("limit")? else { return Ok(None) };
+    let Some(value) = element.attribute("velocity") else { return Ok(None) };
+    let speed = value.number()?;
+    if speed < 0.0 {
+        let cause = format!("a velocity of {speed}");
+        return Err(value.error(cause, "give the highest speed, in rad/s or m/s, above 0"));
+    }
+    Ok((speed > 0.0).then_some(speed))
 }
 
 fn read_mimics(

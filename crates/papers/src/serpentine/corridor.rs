@@ -48,7 +48,7 @@ const COLUMNS: Columns = Columns {
         column("speed_m_s", "speed, m/s", |r| {
             r.mean_of(|run| run.or_zero("way_m") / (run.or_zero("steps") * DT_S))
         }),
-        column("in_band_percent", "0.7-0.9 m, %", |r| r.mean_of(|run| run.percent("in_band"))),
+        column("in_band_percent", "0.7-0.9 m, %", |r| r.mean_share(|run| run.percent("in_band"))),
     ],
 };
 

@@ -9,10 +9,12 @@
 //! corridor.rs, rotation.rs, field.rs    the swarm and its leader
 //! pushing.rs, movers.rs, snake.rs       chains among static and moving obstacles
 //! scaling.rs, broken.rs, postures.rs, initiators.rs    experiments without a world
+//! arm.rs           an arm of joints
 //! scenes.rs        pictures of bodies
 //! claims/          the verdicts
 //! ```
 
+mod arm;
 mod broken;
 mod claims;
 mod corridor;
@@ -179,6 +181,7 @@ pub struct Report {
     broken: broken::Broken,
     postures: postures::Postures,
     initiators: initiators::Initiators,
+    arms: arm::Arms,
     /// The slides' claims and our verdicts.
     pub claims: Vec<Claim>,
     /// Pictures of bodies: no numbers are taken from them.
@@ -205,7 +208,8 @@ pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, InputErro
     let snakes = snake::Snakes::run(plan, &mut stage(progress, 0.8, 0.93))?;
     let broken = broken::Broken::run(plan, &mut stage(progress, 0.93, 0.94))?;
     let postures = postures::Postures::run(plan, &mut stage(progress, 0.94, 0.97))?;
-    let initiators = initiators::Initiators::run(plan, &mut stage(progress, 0.97, 0.99))?;
+    let initiators = initiators::Initiators::run(plan, &mut stage(progress, 0.97, 0.98))?;
+    let arms = arm::Arms::run(plan, &mut stage(progress, 0.98, 0.99))?;
     let scenes = scenes::all(plan)?;
     let mut report = Report {
         plan: plan.clone(),
@@ -220,6 +224,7 @@ pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, InputErro
         broken,
         postures,
         initiators,
+        arms,
         claims: Vec::new(),
         scenes,
     };
@@ -243,6 +248,7 @@ impl Report {
             (Vec::new(), vec![self.broken.table()]),
             (vec![self.postures.figure()], vec![self.postures.table()]),
             (Vec::new(), self.initiators.tables().into()),
+            (Vec::new(), vec![self.arms.table()]),
         ])
     }
 

@@ -33,12 +33,10 @@ const COLUMNS: Columns = Columns {
     ],
     came: &[
         column("inside_percent", "steps inside, %", |r| {
-            r.mean_of(|run| run.percent("penetrations"))
+            r.mean_share(|run| run.percent("penetrations"))
         }),
-        column("veto_percent", "vetoes, %", |r| r.mean_of(|run| run.percent("vetoes"))),
-        column("stuck_percent", "no way out, %", |r| {
-            r.mean_of(|run| run.percent("escapes.vetoes"))
-        }),
+        column("veto_percent", "vetoes, %", |r| r.mean_rate("vetoes")),
+        column("stuck_percent", "no way out, %", |r| r.mean_rate("escapes.vetoes")),
         FASTEST,
         OWN_PARTS,
         ROD_VIOLATION,

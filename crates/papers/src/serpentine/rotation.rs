@@ -28,7 +28,7 @@ const COLUMNS: Columns = Columns {
     came: &[
         column("arrived", "arrived", |r| r.share(|run| run.or_zero("done") == 1.0)),
         column("progress_percent", "progress, %", |r| {
-            r.mean_of(|run| 100.0 * run.or_zero("furthest"))
+            r.mean_share(|run| 100.0 * run.or_zero("furthest"))
         }),
         column("vetoes", "vetoes", |r| r.sum("vetoes")),
         column("penetrations", "steps inside", |r| r.sum("penetrations")),

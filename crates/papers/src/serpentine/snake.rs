@@ -27,13 +27,13 @@ const COLUMNS: Columns = Columns {
         column("real_time", "times real time", |r| {
             r.mean_of(|run| run.or_zero("steps_per_cpu_s") * DT_S)
         }),
-        column("veto_percent", "vetoes, %", |r| r.mean_of(|run| run.percent("vetoes"))),
+        column("veto_percent", "vetoes, %", |r| r.mean_rate("vetoes")),
         column("penetrations", "steps inside", |r| r.sum("penetrations")),
         column("steps", "steps", |r| r.sum("steps")),
         CLEARANCE,
         OWN_PARTS,
         FASTEST,
-        column("way_percent", "way, %", |r| r.mean_of(|run| 100.0 * run.or_zero("progress"))),
+        column("way_percent", "way, %", |r| r.mean_share(|run| 100.0 * run.or_zero("progress"))),
         ROD_VIOLATION,
     ],
 };
@@ -72,8 +72,8 @@ impl Snakes {
     }
 
     pub(super) fn table(&self) -> Table {
-        let note = "Rods of 0.1 m, balls of 0.4 m in a room of 16 m, steps of 1 cm; a step \
-                    includes looking for the least distance of every part. Real time is 50 steps \
+        let note = "Rods of 0.1 m, balls of 0.4 m in a room of 16 m, in which the snake lies in folds at \
+                    the start, with balls between them; steps of 1 cm; a step includes looking for the least distance of every part. Real time is 50 steps \
                     a second.";
         COLUMNS.table("A snake in space", note, &self.cells)
     }

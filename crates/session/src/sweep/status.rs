@@ -1,6 +1,6 @@
 //! The state of a sweep that others work on, as its folder tells it; looking changes nothing.
 
-use super::journey::{Folder, table_of};
+use super::gather::{Folder, table_of};
 use super::stamped::{Read, now_unix_s};
 use serde::Serialize;
 use sidestep::experiment::sweep::{Outcome, Plan, Shard};

@@ -54,6 +54,10 @@ const EXTERNAL: [(&str, &str); 3] = [
 const FLOWN: &str = "[airspace]\ndeployment = \"team\"\n[airspace.generator]\nkind = \"superconflict\"\nn = 2\n\
                      [record]\ncontrols = true\n";
 
+/// An arm, whose joints are a table that no other chain has.
+const ARM: &str = "[chain]\ndimensions = 3\n[[chains]]\narm = { urdf = \"scenarios/chain/arm.urdf\" }\n\
+                   [[chains.tasks]]\nkind = \"rest\"\n";
+
 fn started(world: &str, scenario: &str) -> Box<dyn Simulation> {
     let text = format!("format = 1\nworld = \"{world}\"\n{scenario}");
     let source = Source::new(world, &text, root());
@@ -135,6 +139,9 @@ fn the_chapter_of_columns_has_the_tables_that_a_run_declares() {
     for (world, scenario) in SCENARIOS {
         compare(&format!("tables of {world}"), &rendered(&started(world, scenario).schemas()));
     }
+    let mut of_arms = started("chain", ARM).schemas();
+    of_arms.retain(|schema| schema.name == "joints");
+    compare("tables of arms", &rendered(&of_arms));
     let only = |table: &str, (world, scenario)| {
         let schemas = started(world, scenario).schemas();
         rendered(&schemas.into_iter().filter(|schema| schema.name == table).collect::<Vec<_>>())

@@ -110,7 +110,7 @@ pub struct Driving {
     pub late: u32,
     /// Motions of the script, or targets, that are finished.
     pub next: u32,
-    /// Cycles that it has rested, for whichever reason: the script says so, a robot is late, or something moves ahead.
+    /// Cycles that it has rested because the script says so, or because a robot is late.
     pub rested: u32,
     /// Place and heading at the start of the task.
     pub start: Turtle,

@@ -322,9 +322,6 @@ pub struct Metrics {
     pub not_reformed: u64,
     /// Number of parts that were missing in the gaps that were too long, the most of each chain.
     pub missing_parts: u64,
-    /// Arms whose joints cannot reproduce their connectors' positions, and why; by chain.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub joints_errors: BTreeMap<EntityId, String>,
     /// Motions and targets that were given up, by chain.
     pub given_up: Vec<ChainGivenUp>,
     /// Rungs by which initiators continued after vetoes.
@@ -398,12 +395,9 @@ pub struct ChainMetrics {
     pub name: String,
     /// See [`Metrics::progress`].
     pub progress: f64,
-    /// Joint values of an arm that reproduce its connectors' positions, rad or m, by name.
+    /// Joint values of an arm, rad or m, by name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joints: Option<BTreeMap<String, f64>>,
-    /// The reason why an arm has no joint values, if it has none.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub joints_error: Option<String>,
     /// Counts of the run.
     #[serde(flatten)]
     pub tally: Tally,
@@ -440,7 +434,6 @@ impl Metrics {
             reformed: sum(|t| t.reformed),
             not_reformed: sum(|t| t.not_reformed),
             missing_parts: sum(|t| t.missing_parts),
-            joints_errors: BTreeMap::new(),
             given_up: given_up.collect(),
             rungs: tallies.iter().fold(RungTally::default(), |all, t| all.add(&t.rungs)),
             escapes: tallies.iter().fold(EscapeTally::default(), |all, t| all.joined(&t.escapes)),

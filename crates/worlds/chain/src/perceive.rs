@@ -43,7 +43,7 @@ impl<'a, const D: usize> Looking<'a, D> {
         let body = state.leading(slot as usize);
         let task = world.chains[slot as usize].tasks.get(body.driving.task as usize)?;
         let Driver::Navigate(navigator) = &task.driver else { return None };
-        let (leader, rested) = (body.leader(task), body.driving.rested);
+        let (leader, stood) = (body.leader(task), body.stood);
         drop(body);
         self.see_others(slot, task.agent, navigator, &leader);
         self.scratch.gather(world, state, now, std::iter::empty());
@@ -51,7 +51,7 @@ impl<'a, const D: usize> Looking<'a, D> {
         let Scratch { obstacles, scan, seen, .. } = &mut *self.scratch;
         let target = navigator.goal.as_ref().and_then(Goal::target);
         let around = Surroundings { obstacles: obstacles.in_plane()?, bodies: seen, target };
-        let is_patient = world.starts_s(u64::from(rested)) < STANDS_S;
+        let is_patient = world.starts_s(u64::from(stood)) < STANDS_S;
         let percept = navigator.leader.perceive(&leader.pose, &around, noise, scan, is_patient);
         Some(Sight { navigator, agent: task.agent, leader, percept })
     }

@@ -1,6 +1,6 @@
 //! Remarks on a valid scenario: what will surprise its author. `sidestep check` shows them.
 
-use super::arms::freedom::Freedom;
+use super::arms::kinematics::{Motion, Variable};
 use super::scenario::Compiled;
 use super::world::{ChainSpec, ChainWorld};
 use sidestep_scenario::Remark;
@@ -9,7 +9,7 @@ use sidestep_scenario::Remark;
 pub(super) fn remarks<const D: usize>(compiled: &Compiled<D>) -> Vec<Remark> {
     let chains = || compiled.world.chains.iter().enumerate();
     let slow = chains().find_map(|chain| slow(&compiled.world, chain));
-    chains().filter_map(stiff).chain(slow).collect()
+    chains().filter_map(unlimited).chain(slow).collect()
 }
 
 /// Returns a warning on a chain whose agents talk too slowly to move all of it in a cycle.
@@ -39,16 +39,22 @@ fn slow<const D: usize>(
     })
 }
 
-/// Returns a warning on an arm that moves as its chain does and not as its joints can.
-fn stiff<const D: usize>((k, chain): (usize, &ChainSpec<D>)) -> Option<Remark> {
-    let freedom = Freedom::of(chain.arm.as_deref()?);
-    (!freedom.is_whole()).then(|| {
-        let Freedom { of_joints, of_rods } = freedom;
+/// Returns a note on joints for whose speed the model gives no limit.
+fn unlimited<const D: usize>((k, chain): (usize, &ChainSpec<D>)) -> Option<Remark> {
+    let arm = chain.arm.as_deref()?;
+    let speeds = arm.serial.variables.iter().zip(arm.follower.speeds());
+    let taken = |(v, speed): (&Variable, &f64)| {
+        let unit = if v.motion == Motion::Turn { "rad/s" } else { "m/s" };
+        v.max_speed.is_none().then(|| format!("`{}` {speed:.4} {unit}", v.name))
+    };
+    let taken: Vec<String> = speeds.filter_map(taken).collect();
+    (!taken.is_empty()).then(|| {
         let words = format!(
-            "its rods can move in {of_rods} independent ways and its joints in {of_joints}: joints cannot \
-             follow the chain's motion; `sidestep ik` finds postures that joints can take"
+            "the model gives no velocity for some joints, which are taken to reach: {}; write \
+             <limit velocity=\"...\"/> for others",
+            taken.join(", ")
         );
-        Remark::warning(format!("chains.{k}.arm"), words)
+        Remark::note(format!("chains.{k}.arm"), words)
     })
 }
 
@@ -91,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn an_arm_whose_joints_cannot_follow_its_chain_is_told() {
+    fn joints_without_a_velocity_are_told_with_the_speed_that_they_are_taken_to_reach() {
         let folder = tempfile::tempdir().expect("a folder");
         std::fs::write(folder.path().join("arm.urdf"), planar(4)).expect("written");
         let text = "format = 1\nworld = \"chain\"\n[chain]\ndimensions = 3\n[[chains]]\n\
@@ -101,6 +107,6 @@ mod tests {
         let compiled = Compiled::<3>::new(&source).expect("valid");
         let [told] = &remarks(&compiled)[..] else { panic!("one remark") };
         assert_eq!(told.key, "chains.0.arm");
-        assert!(told.words.contains("6 independent ways and its joints in 3"), "{}", told.words);
+        assert!(told.words.contains("`j0` 3.1416 rad/s"), "{}", told.words);
     }
 }

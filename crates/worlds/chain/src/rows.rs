@@ -22,6 +22,15 @@ struct Place {
     at: [f64; 3],
 }
 
+/// Value of an arm's joint at the start of a cycle.
+#[derive(Debug)]
+struct JointValue {
+    cycle: Cycle,
+    chain: EntityId,
+    joint: u32,
+    value: f64,
+}
+
 /// Adds one column per dimension of a position.
 fn axes(table: Table<Place>, dimensions: usize) -> Table<Place> {
     let axes = ["x_m", "y_m", "z_m"].into_iter().take(dimensions).enumerate();
@@ -51,6 +60,14 @@ fn robots() -> Table<Place> {
         .f64("heading_rad", "heading, counter-clockwise from east", |p| p.at[2])
 }
 
+fn joints() -> Table<JointValue> {
+    Table::new("joints")
+        .u64("cycle", "cycle of dt at whose start this holds", |j: &JointValue| j.cycle)
+        .u32("chain", "entity id", |j| j.chain)
+        .u32("joint", "its number among the arm's variables, from base to tip", |j| j.joint)
+        .f64("value", "rad, or m where it slides", |j| j.value)
+}
+
 fn movers(dimensions: usize) -> Table<Place> {
     axes(table_of_places("movers").u32("obstacle", "its number", |p| p.id), dimensions)
 }
@@ -76,6 +93,7 @@ fn events() -> Table<Event> {
 pub(super) struct Rows {
     record: RecordSection,
     trajectories: RowBuffer<Place>,
+    joints: RowBuffer<JointValue>,
     robots: RowBuffer<Place>,
     movers: RowBuffer<Place>,
     events: RowBuffer<Event>,
@@ -96,8 +114,10 @@ impl Rows {
     pub(super) fn begin<const D: usize>(&mut self, world: &ChainWorld<D>) {
         let record = self.record;
         let has_robots = world.chains.iter().any(|spec| spec.robots.is_some());
+        let has_arms = world.chains.iter().any(|spec| spec.arm.is_some());
         let has_movers = !world.movers.is_empty();
         self.trajectories.begin(record.trajectories.then(|| trajectories(D)));
+        self.joints.begin((record.joints && has_arms).then(joints));
         self.robots.begin((record.robots && has_robots).then(robots));
         self.movers.begin((record.movers && has_movers).then(|| movers(D)));
         self.events.begin(record.events.then(events));
@@ -116,6 +136,19 @@ impl Rows {
         if self.trajectories.is_kept() {
             for slot in 0..state.len() {
                 self.trajectories.extend(connectors(now, slot, state.body(slot).chain.points()));
+            }
+        }
+        if self.joints.is_kept() {
+            for slot in 0..state.len() {
+                let body = state.body(slot);
+                let values = body.joints.iter().flatten();
+                let row = |(joint, value): (u32, &f64)| JointValue {
+                    cycle: now,
+                    chain: slot as EntityId,
+                    joint,
+                    value: *value,
+                };
+                self.joints.extend((0..).zip(values).map(row));
             }
         }
         if self.robots.is_kept() {
@@ -161,10 +194,16 @@ fn middle<const D: usize>(core: &Core<D>) -> [f64; D] {
 
 impl Buffers for Rows {
     fn buffers(&self) -> Vec<&dyn Buffer> {
-        vec![&self.trajectories, &self.robots, &self.movers, &self.events]
+        vec![&self.trajectories, &self.joints, &self.robots, &self.movers, &self.events]
     }
 
     fn buffers_mut(&mut self) -> Vec<&mut dyn Buffer> {
-        vec![&mut self.trajectories, &mut self.robots, &mut self.movers, &mut self.events]
+        vec![
+            &mut self.trajectories,
+            &mut self.joints,
+            &mut self.robots,
+            &mut self.movers,
+            &mut self.events,
+        ]
     }
 }

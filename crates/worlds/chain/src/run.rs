@@ -1,10 +1,8 @@
 //! The hooks that a run calls on the world beside its phases.
 
 use super::arms::arm::Arm;
-use super::arms::kinematics::Recovered;
 use super::events::Event;
 use super::metrics::{ChainMetrics, Metrics, Tally};
-use super::rods::geometry::in_dimensions;
 use super::rows::Rows;
 use super::scenario::{AnyCompiled, Compiled};
 use super::scratch::Scratch;
@@ -79,22 +77,14 @@ impl<const D: usize> ChainWorld<D> {
     pub fn metrics_of(&self, state: &ChainState<D>, slot: usize) -> ChainMetrics {
         let body = state.body(slot);
         let spec = &self.chains[slot];
-        let points: Vec<_> = body.chain.points().iter().map(|p| in_dimensions(*p)).collect();
-        let joints = spec.arm.as_ref().map(|arm| (arm, arm.joints(&points)));
-        let named = |(arm, recovered): (&Arm, Recovered)| {
+        let named = |(arm, values): (&Arc<Arm>, &Vec<f64>)| {
             let names = arm.serial.variables.iter().map(|variable| variable.name.clone());
-            names.zip(recovered.values).collect()
-        };
-        let (joints, joints_error) = match joints {
-            None => (None, None),
-            Some((arm, Ok(recovered))) => (Some(named((arm, recovered))), None),
-            Some((_, Err(error))) => (None, Some(error.to_string())),
+            names.zip(values.iter().copied()).collect()
         };
         ChainMetrics {
             chain: slot as EntityId,
             name: spec.name.clone(),
-            joints,
-            joints_error,
+            joints: spec.arm.as_ref().zip(body.joints.as_ref()).map(named),
             progress: self.progress(slot, &body),
             tally: body.tally.clone(),
         }
@@ -230,12 +220,7 @@ impl<const D: usize> World for ChainWorld<D> {
         let progress: Vec<f64> =
             (0..state.len()).map(|slot| self.progress(slot, &state.body(slot))).collect();
         let steps = tallies.iter().map(|t| t.steps).sum::<u64>() - books.steps_before;
-        let told = |slot| Some((slot as EntityId, self.metrics_of(state, slot).joints_error?));
-        let arms = (0..tallies.len()).filter(|&slot| self.chains[slot].arm.is_some());
-        Metrics {
-            joints_errors: arms.filter_map(told).collect(),
-            ..Metrics::of(&tallies, &progress, effort.cpu_ns as f64 / 1e9, steps)
-        }
+        Metrics::of(&tallies, &progress, effort.cpu_ns as f64 / 1e9, steps)
     }
 
     fn agent_metrics(&self, state: &ChainState<D>, _: &Books, _: Cycle) -> Value {

@@ -238,6 +238,8 @@ enum EscapeWord {
 pub struct RecordSection {
     /// One row per connector and recorded cycle.
     pub trajectories: bool,
+    /// One row per joint of an arm and recorded cycle.
+    pub joints: bool,
     /// One row per robot of a swarm and recorded cycle.
     pub robots: bool,
     /// One row per moving obstacle and recorded cycle.
@@ -256,6 +258,7 @@ impl Default for RecordSection {
     fn default() -> Self {
         Self {
             trajectories: true,
+            joints: true,
             robots: true,
             movers: true,
             events: true,

@@ -35,6 +35,10 @@ pub struct Scratch<const D: usize> {
     pub(crate) own: OwnBody<D>,
     /// Positions before a cycle.
     pub(crate) before: Vec<Point<D>>,
+    /// Joint values of an arm before a cycle,
+    pub(crate) joints_before: Vec<f64>,
+    /// and after it got out of the way.
+    pub(crate) joints_escaped: Vec<f64>,
     /// Least gap around a robot in this cycle, meters.
     pub(crate) robots_gap_m: f64,
     /// Positions after parts got out of the way.
@@ -62,6 +66,8 @@ impl<const D: usize> Scratch<D> {
             scan: Scan::default(),
             own: OwnBody::default(),
             before: Vec::new(),
+            joints_before: Vec::new(),
+            joints_escaped: Vec::new(),
             robots_gap_m: f64::INFINITY,
             escaped: Vec::new(),
             events: Vec::new(),

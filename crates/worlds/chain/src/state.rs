@@ -54,12 +54,16 @@ pub struct Body<const D: usize> {
     pub(crate) robot_radius_m: f64,
     /// Counts so far.
     pub tally: Tally,
+    /// Cycles that its navigator has stood because something moves ahead.
+    pub(crate) stood: u32,
     /// Memory of how it gets out of where it was caught.
     pub(crate) way_out: WayOut,
     /// The motions of the present script, which follow from the place where it started.
     pub(crate) motions: Vec<Motion>,
     /// Orders from outside, and the answer to the last ones.
     pub(crate) external: External,
+    /// Joint values of an arm, in rad or m: its connectors are where forward kinematics puts them.
+    pub joints: Option<Vec<f64>>,
     /// The way that it follows because local rules came no nearer.
     pub(crate) plan: Option<Plan<D>>,
     /// The nearest lost connectors below and above, as each connector knows; empty while nobody is lost.
@@ -84,11 +88,13 @@ pub struct Scattered {
     pub goals_m: Vec<f64>,
 }
 
-/// A way to a target: postures, each straight from the one before.
+/// A way to a target: the postures that are not reached yet, each straight from the one before; at least one.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Plan<const D: usize> {
-    /// The postures that are not reached yet; at least one.
-    pub(crate) way: VecDeque<Vec<Point<D>>>,
+pub(crate) enum Plan<const D: usize> {
+    /// Places of all connectors.
+    Rods(VecDeque<Vec<Point<D>>>),
+    /// Values of an arm's joints.
+    Joints(VecDeque<Vec<f64>>),
 }
 
 /// A plan in a snapshot.
@@ -96,8 +102,8 @@ pub(crate) struct Plan<const D: usize> {
 pub struct PlanRecord {
     /// The chain.
     pub chain: EntityId,
-    /// Its postures that are not reached yet, each coordinate after coordinate.
-    pub way_m: Vec<Vec<f64>>,
+    /// Its postures that are not reached yet, each coordinate after coordinate, or of an arm joint after joint.
+    pub way: Vec<Vec<f64>>,
 }
 
 /// One chain in a snapshot.
@@ -120,10 +126,14 @@ pub struct Snapshot {
     pub cycle: Cycle,
     /// The chains by id.
     pub chains: Vec<ChainRecord>,
+    /// Joint values of arms, by id.
+    pub joints: Vec<(EntityId, Vec<f64>)>,
     /// Their plans, of those that have one; by id.
     pub plans: Vec<PlanRecord>,
     /// Chains that are on a way out of where they were caught, by id.
     pub(crate) ways_out: Vec<(u32, WayOut)>,
+    /// Cycles for which navigators have stood because something moves ahead, where they have, by id.
+    pub(crate) stood: Vec<(EntityId, u32)>,
     /// Orders from outside and answers, of chains that have any, by id.
     pub(crate) externals: Vec<(u32, External)>,
     /// Lost connectors, as those of their chain know, of chains in which somebody is lost; by id.
@@ -145,9 +155,11 @@ impl<const D: usize> Body<D> {
             chain,
             scattered: None,
             tally: Tally::default(),
+            stood: 0,
             way_out: WayOut::default(),
             motions: Vec::new(),
             external: External::default(),
+            joints: spec.arm.as_ref().map(|arm| arm.values.clone()),
             plan: None,
             missing: Vec::new(),
             handed: None,
@@ -265,13 +277,22 @@ impl<const D: usize> ChainState<D> {
         let bodies =
             all.map(|((spec, record), tally)| Body::restore(spec, record, tally, snapshot.cycle));
         let mut bodies = bodies.collect::<Result<Vec<_>, _>>()?;
+        for (slot, values) in &snapshot.joints {
+            let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
+            let joints = body.joints.as_mut().filter(|joints| joints.len() == values.len());
+            joints.ok_or(CheckpointError::Damaged)?.clone_from(values);
+        }
         for record in &snapshot.plans {
             let body = bodies.get_mut(record.chain as usize).ok_or(CheckpointError::Damaged)?;
-            body.plan = Some(Plan::restore(record, body.chain.points().len())?);
+            let n = body.chain.points().len();
+            body.plan = Some(Plan::restore(record, body.joints.as_deref(), n)?);
         }
         for (slot, way_out) in &snapshot.ways_out {
             let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
             body.way_out = *way_out;
+        }
+        for (slot, stood) in &snapshot.stood {
+            bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?.stood = *stood;
         }
         for (slot, external) in &snapshot.externals {
             let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
@@ -348,14 +369,18 @@ impl<const D: usize> ChainState<D> {
     pub fn snapshot(&self, cycle: Cycle) -> Snapshot {
         let slots = 0..self.len();
         let plan = |slot| Some(self.body(slot).plan.as_ref()?.record(slot as EntityId));
+        let joints = slots.clone().map(|slot| (slot as EntityId, self.body(slot).joints.clone()));
         let ways_out = slots.clone().map(|slot| (slot as EntityId, self.body(slot).way_out));
+        let stood = slots.clone().map(|slot| (slot as EntityId, self.body(slot).stood));
         let externals = slots.clone().map(|slot| (slot as EntityId, self.body(slot).external));
         let missing = slots.clone().map(|slot| (slot as EntityId, self.body(slot).missing.clone()));
         Snapshot {
             cycle,
             chains: slots.clone().map(|slot| self.body(slot).record()).collect(),
+            joints: joints.filter_map(|(slot, values)| Some((slot, values?))).collect(),
             plans: slots.filter_map(plan).collect(),
             ways_out: ways_out.filter(|(_, way_out)| !way_out.is_none()).collect(),
+            stood: stood.filter(|(_, cycles)| *cycles > 0).collect(),
             externals: externals.filter(|(_, external)| !external.is_none()).collect(),
             missing: missing.filter(|(_, missing)| !missing.is_empty()).collect(),
         }
@@ -368,18 +393,38 @@ impl<const D: usize> ChainState<D> {
 }
 
 impl<const D: usize> Plan<D> {
-    fn record(&self, chain: EntityId) -> PlanRecord {
-        PlanRecord { chain, way_m: self.way.iter().map(|posture| flat(posture)).collect() }
+    /// Returns the number of postures that are not reached yet.
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::Rods(way) => way.len(),
+            Self::Joints(way) => way.len(),
+        }
     }
 
-    /// Returns the plan that a record describes, of a chain of `n` connectors.
-    fn restore(record: &PlanRecord, n: usize) -> Result<Self, CheckpointError> {
-        if record.way_m.is_empty() || record.way_m.iter().any(|posture| posture.len() != n * D) {
+    fn record(&self, chain: EntityId) -> PlanRecord {
+        let way = match self {
+            Self::Rods(way) => way.iter().map(|posture| flat(posture)).collect(),
+            Self::Joints(way) => way.iter().cloned().collect(),
+        };
+        PlanRecord { chain, way }
+    }
+
+    /// Returns the plan that a record describes, of a chain of `n` connectors, or of an arm with these joints.
+    fn restore(
+        record: &PlanRecord,
+        joints: Option<&[f64]>,
+        n: usize,
+    ) -> Result<Self, CheckpointError> {
+        let values = joints.map_or(n * D, <[f64]>::len);
+        if record.way.is_empty() || record.way.iter().any(|posture| posture.len() != values) {
             return Err(CheckpointError::Damaged);
+        }
+        if joints.is_some() {
+            return Ok(Self::Joints(record.way.iter().cloned().collect()));
         }
         let point = |at: &[f64]| std::array::from_fn(|i| at[i]);
         let posture = |m: &Vec<f64>| m.chunks_exact(D).map(point).collect();
-        Ok(Self { way: record.way_m.iter().map(posture).collect() })
+        Ok(Self::Rods(record.way.iter().map(posture).collect()))
     }
 }
 
@@ -389,8 +434,10 @@ impl Snapshot {
         let mut hasher = Hasher::default();
         add(&mut hasher, &(self.cycle, &self.chains));
         // Nothing is added for nobody, so that worlds without plans, ways out and orders keep their digests.
+        add_any(&mut hasher, &self.joints);
         add_any(&mut hasher, &self.plans);
         add_any(&mut hasher, &self.ways_out);
+        add_any(&mut hasher, &self.stood);
         add_any(&mut hasher, &self.externals);
         add_any(&mut hasher, &self.missing);
         hasher.finish()

@@ -80,9 +80,6 @@ pub(super) fn outcome(m: &Metrics) -> Lines {
     if m.not_reformed > 0 {
         lines.push(line("NOT re-formed", not_reformed(m)));
     }
-    lines.extend(m.joints_errors.iter().map(|(chain, error)| {
-        line("joints", format!("of chain {chain} cannot follow its connectors: {error}"))
-    }));
     lines.extend(m.given_up.iter().take(MOST_TOLD).map(given_up));
     if m.given_up.len() > MOST_TOLD {
         let more = grouped((m.given_up.len() - MOST_TOLD) as u64);

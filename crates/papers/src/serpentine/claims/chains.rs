@@ -1,6 +1,7 @@
 //! Claims about chains of any kind: their invariants, their initiators, their cost.
 
 use super::super::Report;
+use super::super::arm::{Arms, PLANNERS};
 use super::super::broken::Broken;
 use super::super::initiators::Initiators;
 use super::super::movers::{ESCAPES, Movers};
@@ -24,6 +25,7 @@ pub(super) fn claims(report: &Report) -> Vec<Claim> {
         moving_obstacles(&report.movers),
         local_cost(&report.scaling),
         few_and_many(report),
+        joints(&report.arms),
         structure_kept(report),
         creeps(&report.snakes),
         any_initiator(&report.initiators),
@@ -89,6 +91,29 @@ fn few_and_many(report: &Report) -> Claim {
         in_every_run(repeats, all_move),
     ]);
     claim("P6", verdict, ours)
+}
+
+fn joints(arms: &Arms) -> Claim {
+    let ours = listed(PLANNERS, |planner| {
+        let told = |c: &Cell| {
+            format!(
+                "{} pillars: {} runs reach all, fastest joint at {:.3} of its limit",
+                c.count("pillars"),
+                c.share("reached"),
+                c.number("fastest")
+            )
+        };
+        format!("planner {planner}: {}", listed(arms.with(planner), told))
+    });
+    let is_kept = |c: &Cell| {
+        let broken = ["outside", "too_fast", "penetrations"].map(|name| c.count(name));
+        broken == [0; 3] && c.number("off_m") <= ROD_TOLERANCE_M
+    };
+    let verdict = both(&[
+        every(PLANNERS.into_iter().flat_map(|planner| arms.with(planner)), is_kept),
+        every_trial(arms.with(PLANNERS[1]).map(|c| c.share("reached"))),
+    ]);
+    claim("K1, K4", verdict, ours)
 }
 
 fn structure_kept(report: &Report) -> Claim {

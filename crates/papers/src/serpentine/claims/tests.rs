@@ -35,7 +35,7 @@ fn word(text: &str) -> Value {
 
 /// Values of any cell of a run, if all is well.
 fn clean() -> Vec<(&'static str, Value)> {
-    let counts = ["vetoes", "penetrations", "bumper_events", "too_long"];
+    let counts = ["vetoes", "penetrations", "bumper_events", "too_long", "outside", "too_fast"];
     let shares = ["arrived", "untouched", "reached", "whole", "can", "ends_kept"];
     let mut all: Vec<_> = counts.map(|name| (name, Count(0))).into();
     all.extend(shares.map(|name| (name, yes(TARGETS))));
@@ -43,6 +43,8 @@ fn clean() -> Vec<(&'static str, Value)> {
         ("steps", Count(100)),
         ("min_clearance_m", Maybe(Some(0.1))),
         ("rod_violation_m", Number(1e-15)),
+        ("off_m", Number(1e-16)),
+        ("fastest", Number(1.0)),
         ("min_gap_m", Number(0.1)),
         ("max_lag_m", Number(0.1)),
         ("median_us", Number(1.0)),
@@ -72,6 +74,7 @@ fn ideal() -> Report {
         ];
         Cell::new(case, clean())
     };
+    let reached = |planner| Cell::new([("pillars", Count(3)), ("planner", word(planner))], clean());
     let met = |escape| Cell::new([("escape", word(escape))], clean());
     let solved = |way: postures::Way| {
         let case = [("way", word(way.key())), ("links", Count(7)), ("slack", Number(0.1))];
@@ -138,6 +141,7 @@ fn ideal() -> Report {
             told: all,
             bends: vec![bend],
         },
+        arms: arm::Arms { cells: arm::PLANNERS.map(reached).into() },
         claims: Vec::new(),
         scenes: Vec::new(),
     }
@@ -151,7 +155,7 @@ fn ids(report: &Report, verdict: Verdict) -> Vec<&'static str> {
 fn ideal_numbers_hold_all_claims_but_the_one_without_a_measure() {
     let report = ideal();
     let held = ids(&report, Verdict::Held);
-    assert_eq!(held.len(), 23, "{held:?}");
+    assert_eq!(held.len(), 24, "{held:?}");
     assert_eq!(ids(&report, Verdict::Lost), ["E5"]);
     assert!(judge(&report).iter().all(|c| !c.ours.is_empty() && !c.reason.is_empty()));
 }
@@ -174,7 +178,7 @@ fn nothing_measured_is_undecided() {
 #[test]
 fn each_claim_has_a_number_that_refutes_it() {
     type Spoil = fn(&mut Report);
-    let cases: [(Spoil, &[&str]); 24] = [
+    let cases: [(Spoil, &[&str]); 27] = [
         (|r| r.corridor.cells[0].put("bumper_events", Count(1)), &["E2"]),
         (|r| r.corridor.cells[0].put("vetoes", Count(1)), &["E3"]),
         (|r| r.corridor.cells[0].put("penetrations", Count(1)), &["N6a", "E2"]),
@@ -185,6 +189,9 @@ fn each_claim_has_a_number_that_refutes_it() {
         (|r| r.fields.cells[1].put("arrived", no()), &["N5a"]),
         (|r| r.fields.cells[2].put("arrived", no()), &["N6b"]),
         (|r| r.movers.cells[1].put("inside_percent", sure(0.1)), &["P2"]),
+        (|r| r.arms.cells[0].put("too_fast", Count(1)), &["K1, K4"]),
+        (|r| r.arms.cells[1].put("outside", Count(1)), &["K1, K4"]),
+        (|r| r.arms.cells[1].put("reached", no()), &["K1, K4"]),
         (|r| r.snakes.cells[0].put("real_time", sure(0.9)), &["E1"]),
         (|r| r.snakes.cells[0].put("penetrations", Count(1)), &["V6", "F4"]),
         (|r| r.snakes.cells[0].put("way_percent", sure(50.0)), &["V6"]),
@@ -207,7 +214,7 @@ fn each_claim_has_a_number_that_refutes_it() {
         assert_eq!(ids(&report, Verdict::Refuted), expected);
         refuted.extend(expected);
     }
-    assert_eq!(refuted.len(), 23, "{refuted:?}");
+    assert_eq!(refuted.len(), 24, "{refuted:?}");
 }
 
 #[test]

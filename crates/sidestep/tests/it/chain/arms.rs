@@ -105,6 +105,18 @@ fn bases_on_a_rail_a_line_and_in_a_box_reach_all_that_they_can_with_the_same_bit
     }
 }
 
+#[test]
+fn a_script_leads_the_tool_of_a_chain_with_a_fixed_base_to_its_end() {
+    let text = "[[chains]]\nconnectors = 6\nat_m = [0.0, 0.0]\nalong = [1.0, 0.3]\nrod_m = 0.5\n\
+                [[chains.limits]]\nconnector = 0\nmobility = \"fixed\"\n\
+                [[chains.tasks]]\nkind = \"script\"\nconnector = 5\nscript = \"goto 1.5, 1.0\"\n";
+    let mut run = run::<2>(&source(1, text), 1);
+    advance_to(&mut run, 1000);
+    assert_eq!(run.metrics().progress, 1.0, "{:?}", run.metrics());
+    let [x, y] = run.state().body(0).chain.points()[5];
+    assert!(hypot(x - 1.5, y - 1.0) <= 1e-7, "{x}, {y}");
+}
+
 /// Wanderers among each other and pillars, whose rods turn aside: no part is thrown about.
 #[test]
 fn no_part_is_thrown_about_where_a_rod_turns_aside() {

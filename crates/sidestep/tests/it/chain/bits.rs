@@ -113,3 +113,27 @@ fn the_golden_digests_of_chains_are_what_every_machine_gets() {
         + &digest::<2>("told", TOLD);
     assert_eq!(found, include_str!("../golden/serpentine.txt"), "found:\n{found}");
 }
+
+/// Two arms of one model whose tools pass each other; a plan is followed when the run is resumed.
+#[test]
+fn arms_of_joints_have_the_same_bits_however_they_are_run() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/chain/arm.urdf");
+    let arm = |at: &str, target: &str| {
+        format!(
+            "[[chains]]\narm = {{ urdf = {file:?}, joints = [0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0] }}\nat_m = {at}\n\
+             radius_m = 0.05\n[[chains.tasks]]\nkind = \"targets\"\nconnector = 3\nspeed_m_s = 0.4\n\
+             targets_m = [{target}]\nplans_after_s = 0.1\n"
+        )
+    };
+    let pillar = "[[obstacles]]\nends_m = [[0.45, 0.0, 0.0], [0.45, 0.0, 0.7]]\nradius_m = 0.06\n";
+    let text = format!(
+        "[chain]\ndimensions = 3\n{pillar}{}{}",
+        arm("[0.0, 0.0, 0.0]", "[0.4, 0.35, 0.45], [0.4, -0.35, 0.45]"),
+        arm("[0.9, 0.0, 0.0]", "[0.5, 0.35, 0.45]"),
+    );
+    assert_d1::<3>(&text, 300, &[0, 1, 60, 120, 180, 240, 299]);
+    let mut run = run::<3>(&source(1, &text), 1);
+    advance_to(&mut run, 300);
+    let arms = [0, 1].map(|slot| run.world().metrics_of(run.state(), slot));
+    assert!(arms.iter().any(|arm| arm.tally.rungs.planned > 0), "one plans");
+}

@@ -21,9 +21,13 @@ impl<const D: usize> Acting<'_, D> {
         );
         // Out of the range of coordinates nothing escapes.
         let Ok(escaped) = escaped else { return };
+        self.joints_escape();
         self.body.tally.escapes.add(&escaped);
         self.note(|notes| notes.escapes = escaped.moves);
         self.scratch.escaped.copy_from_slice(self.body.chain.points());
+        if let Some(joints) = &self.body.joints {
+            self.scratch.joints_escaped.clone_from(joints);
+        }
         self.take_leader_along();
         // Only the first of several cycles of escape in a row is an event.
         let first = escaped.first.filter(|_| !self.body.tally.is_escaping);
@@ -49,6 +53,9 @@ impl<const D: usize> Acting<'_, D> {
         let mut ways = self.body.chain.points().iter().zip(&self.scratch.before);
         let Some(by) = ways.position(is_beyond) else { return };
         self.body.chain.points_mut().copy_from_slice(&self.scratch.escaped);
+        if let Some(joints) = &mut self.body.joints {
+            joints.clone_from(&self.scratch.joints_escaped);
+        }
         let from = self.task().map_or(0, |task| task.agent);
         let reached = self.body.chain.points()[from];
         self.take_leader_along();

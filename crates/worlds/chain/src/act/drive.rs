@@ -7,6 +7,7 @@ use crate::events::EventKind;
 use crate::notes::Wanted;
 use crate::rods::geometry::{Point, along, distance, in_dimensions, towards};
 use crate::script::Motion;
+use crate::state::Plan;
 use crate::swarm::drive::Pose;
 use crate::world::purpose;
 
@@ -78,14 +79,22 @@ impl<const D: usize> Acting<'_, D> {
                 of = errand.first;
                 (if self.gives_way { WAIT } else { "go, as ordered" }, Some(errand.to[0]))
             }
-            Wish::Follow => {
-                let plan = self.body.plan.as_ref().and_then(|plan| plan.way.front());
-                ("follow its plan", plan.map(|posture| posture[task.agent]))
-            }
+            Wish::Follow => ("follow its plan", self.planned_place(task)),
             Wish::Steer(pose) => ("steer", Some(in_dimensions(pose.at))),
             Wish::Done => ("its task is done", None),
         };
         Wanted { of, words, to }
+    }
+
+    /// Returns the next place of the initiator on its planned way.
+    fn planned_place(&self, task: &Task<D>) -> Option<Point<D>> {
+        match self.body.plan.as_ref()? {
+            Plan::Rods(way) => Some(way.front()?[task.agent]),
+            Plan::Joints(way) => {
+                let places = self.spec.arm.as_ref()?.places(way.front()?);
+                places.get(task.agent).copied()
+            }
+        }
     }
 
     /// Returns where the initiator wants to be at the end of the cycle.
@@ -156,6 +165,7 @@ impl<const D: usize> Acting<'_, D> {
 
     /// Returns the wish of a script. Turning takes no time.
     fn by_script(&mut self, at: Point<D>, step_m: f64) -> Wish<D> {
+        let there_m = self.there_m();
         let driving = &mut self.body.driving;
         loop {
             match self.body.motions.get(driving.next as usize) {
@@ -171,7 +181,7 @@ impl<const D: usize> Acting<'_, D> {
                     let to = in_dimensions(*position_m);
                     let left_m = distance(at, to);
                     driving.nearest_m = driving.nearest_m.min(left_m);
-                    if left_m > self.body.chain.least_move_m() {
+                    if left_m > there_m {
                         return Wish::Go(towards(at, to, step_m));
                     }
                 }
@@ -184,7 +194,7 @@ impl<const D: usize> Acting<'_, D> {
     pub(super) fn next_task(&mut self, how: EventKind) {
         let Some(task) = self.task() else { return };
         self.body.catch_up();
-        self.body.plan = None;
+        (self.body.plan, self.body.stood) = (None, 0);
         let driving = &mut self.body.driving;
         let next = self.spec.tasks.get(driving.task as usize + 1).unwrap_or(task);
         let ended = f64::from(driving.task);

@@ -31,6 +31,7 @@ impl<const D: usize> Acting<'_, D> {
             false if self.is_team() => self.climb_as_team(task, to),
             false => Some(self.climb(task, to)),
         };
+        let climbed = climbed.map(|climbed| self.joints_climb(task, to, climbed));
         self.note(|notes| notes.climbed.clone_from(&climbed));
         let way = sub(self.body.chain.points()[task.agent], at);
         self.body.driving.way_m.wanted += distance(at, to);

@@ -6,6 +6,7 @@
 //! broken.rs -> drive.rs -> go.rs, later.rs         where nothing can object
 //!              drive.rs -> plan.rs                 where local rules come no nearer
 //!              go.rs -> talk.rs                    where each connector has an agent
+//!              joints.rs                           after every motion of an arm
 //! ```
 
 mod bounds;
@@ -13,6 +14,7 @@ mod broken;
 mod drive;
 mod follow;
 mod go;
+mod joints;
 mod later;
 mod measure;
 mod obey;
@@ -108,6 +110,7 @@ impl<'a, const D: usize> Acting<'a, D> {
         self.scratch.before.clear();
         self.scratch.before.extend_from_slice(self.body.chain.points());
         self.scratch.escaped.clone_from(&self.scratch.before);
+        self.note_joints();
         if self.body.scattered.is_some() {
             self.come_together();
         } else {

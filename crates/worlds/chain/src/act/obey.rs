@@ -107,6 +107,7 @@ impl<const D: usize> Acting<'_, D> {
         let chain = &mut self.body.chain;
         let outcome = go(&mut scratch.propagator, chain, &scratch.obstacles, &request);
         let outcome = outcome.unwrap_or_else(|_| Outcome::Vetoed(self.beyond(errand.first)));
+        let outcome = self.joints_obey(errand, part, outcome);
         if let Outcome::Moved(moved) = &outcome {
             self.body.tally.add_moved(moved);
         }

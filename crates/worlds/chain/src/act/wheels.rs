@@ -33,11 +33,12 @@ impl<const D: usize> Acting<'_, D> {
     pub(super) fn steered(&mut self, task: &Task<D>, navigator: &Navigator) -> Option<Pose> {
         let decision = self.decision?;
         let pace = self.pace();
-        let rested = &mut self.body.driving.rested;
-        *rested = match decision.wheels == Wheels::default() || pace == 0.0 {
-            true => rested.saturating_add(1),
+        let driving = &mut self.body.driving;
+        driving.rested = if pace == 0.0 { driving.rested.saturating_add(1) } else { 0 };
+        self.body.stood = match decision.wheels == Wheels::default() {
+            true => self.body.stood.saturating_add(1),
             // Whose patience has ended does not lose it again at once.
-            false if decision.is_mover_ahead => *rested,
+            false if decision.is_mover_ahead => self.body.stood,
             false => 0,
         };
         let mut leader = self.body.leader(task);

@@ -1,7 +1,8 @@
 //! An arm of joints as a chain of this world (slides K1 to K4).
 
-use super::kinematics::{RecoverError, Recovered, SerialChain, Skeleton, Vector};
+use super::kinematics::{ArmGoal, Follower, SerialChain, Skeleton, Vector};
 use crate::rods::chain::{Chain, Connector, Mobility, Rod};
+use crate::rods::geometry::{Point, in_dimensions, sub};
 use sidestep_kernel::InputError;
 use std::f64::consts::PI;
 
@@ -11,7 +12,7 @@ const LEAST_ROD_M: f64 = 1e-6;
 const MOST_ROD_M: f64 = 1e6;
 
 /// An arm: its joints, its connectors, and the place of its base.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub struct Arm {
     /// Joints from base to tip.
     pub serial: SerialChain,
@@ -21,23 +22,24 @@ pub struct Arm {
     pub at_m: Vector,
     /// Joint values at the start, rad or m.
     pub values: Vec<f64>,
+    pub(crate) follower: Follower,
 }
 
 impl Arm {
-    /// Returns an arm at a posture.
+    /// Returns an arm at a posture. Values that are outside their limits by rounding are put inside.
     pub fn new(serial: SerialChain, at_m: Vector, values: Vec<f64>) -> Self {
-        Self { skeleton: serial.skeleton(), serial, at_m, values }
+        let skeleton = serial.skeleton();
+        let follower = Follower::new(&serial, &skeleton);
+        Self { values: follower.inside(values), skeleton, serial, at_m, follower }
     }
 
-    /// Returns the arm as a chain whose base is fixed. Joint limits become bend limits if those are
-    /// equivalent; only [`Self::joints`] checks the others.
+    /// Returns the arm as a chain whose base is fixed: the guide of its joints. Joint limits become bend limits if
+    /// those are equivalent; the joints themselves keep to all of them.
     ///
     /// # Errors
     /// When its connectors make no chain, e.g. because a rod has length 0.
     pub fn chain(&self, radius_m: f64, rod_radius_m: f64) -> Result<Chain<3>, InputError> {
-        let frames = self.serial.forward(&self.values);
-        let points = self.serial.connectors(&self.skeleton, &frames);
-        let points: Vec<Vector> = points.iter().map(|p| self.in_world(*p)).collect();
+        let points: Vec<Vector> = self.places(&self.values);
         let limits = self.serial.bend_limits(&self.skeleton);
         let connector = |k: usize| {
             let exact = limits[k].as_ref().filter(|limit| limit.is_exact && k > 0);
@@ -53,14 +55,26 @@ impl Arm {
         Chain::new(points.clone(), (0..points.len()).map(connector).collect(), rods.collect())
     }
 
-    /// Returns the joint values that reproduce the connectors' positions in the world.
-    ///
-    /// # Errors
-    /// As [`SerialChain::recover`].
-    pub fn joints(&self, points_m: &[Vector]) -> Result<Recovered, RecoverError> {
-        let in_base: Vec<Vector> =
-            points_m.iter().map(|p| [0, 1, 2].map(|i| p[i] - self.at_m[i])).collect();
-        self.serial.recover(&self.skeleton, &in_base, &self.values)
+    /// Returns the places of the connectors in the world at these joint values.
+    pub(crate) fn places<const D: usize>(&self, values: &[f64]) -> Vec<Point<D>> {
+        let in_world = |p: &Vector| in_dimensions(self.in_world(*p));
+        self.follower.places(values).iter().map(in_world).collect()
+    }
+
+    /// Returns a place of the world in the frame of the base.
+    pub(crate) fn in_base<const D: usize>(&self, p: Point<D>) -> Vector {
+        sub(in_dimensions(p), self.at_m)
+    }
+
+    /// Returns a goal for connector `k` at a place of the world, and the arm up to it.
+    pub(crate) fn goal<const D: usize>(
+        &self,
+        k: usize,
+        at: Point<D>,
+        tolerance_m: f64,
+    ) -> (SerialChain, ArmGoal) {
+        let goal = ArmGoal { tolerance_m, ..ArmGoal::new(self.in_base(at)) };
+        (self.serial.up_to(&self.skeleton, k), goal)
     }
 
     fn in_world(&self, p: Vector) -> Vector {

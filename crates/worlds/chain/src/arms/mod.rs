@@ -3,12 +3,10 @@
 //!
 //! ```text
 //! kinematics/: joints -> connectors -> joints     ik/: postures of chains that reach a target
-//! arm.rs: an arm with a place in the world, as a chain; freedom.rs: whether joints can follow it
 //! plan/: ways among obstacles from one posture to another
 //! ```
 
 pub(crate) mod arm;
-pub(crate) mod freedom;
 pub mod ik;
 pub mod kinematics;
 pub(crate) mod plan;

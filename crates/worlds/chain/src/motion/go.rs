@@ -238,7 +238,7 @@ fn out_of_reach<const D: usize>(chain: &Chain<D>, order: &Reach<D>) -> Option<us
 const LONGEST_JUMP: f64 = 0.5;
 
 /// Distance at which a connector's step counts as complete, meters.
-const TOLERANCE_M: f64 = 1e-7;
+pub(crate) const TOLERANCE_M: f64 = 1e-7;
 
 /// Returns what has moved, by comparison.
 fn moved_since<const D: usize>(before: &[Point<D>], chain: &Chain<D>, k: usize) -> Moved<D> {

@@ -92,11 +92,13 @@ pub enum Reason {
     Limit,
     /// No posture of the chain reaches the target, or none was found.
     OutOfReach,
+    /// A joint of an arm would leave its limits.
+    JointLimit,
 }
 
 impl Reason {
     /// All reasons.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Fixed,
         Self::Failed,
         Self::Mobility,
@@ -109,6 +111,7 @@ impl Reason {
         Self::StepLimit,
         Self::Limit,
         Self::OutOfReach,
+        Self::JointLimit,
     ];
 
     /// Returns its number among all, from 0.
@@ -131,6 +134,7 @@ impl Reason {
             Self::StepLimit => "step-limit",
             Self::Limit => "limit",
             Self::OutOfReach => "out-of-reach",
+            Self::JointLimit => "joint-limit",
         }
     }
 }
@@ -150,6 +154,7 @@ impl fmt::Display for Reason {
             Self::StepLimit => "it would have to move too far in one step",
             Self::Limit => "the search for a way out was given up",
             Self::OutOfReach => "no posture of the chain reaches there",
+            Self::JointLimit => "a joint would leave its limits",
         })
     }
 }

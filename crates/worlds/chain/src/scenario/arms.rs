@@ -15,7 +15,9 @@ use std::ops::Range;
 #[serde(deny_unknown_fields)]
 pub(super) struct ArmSection {
     /// File of the arm (URDF).
-    urdf: String,
+    urdf: Option<String>,
+    /// The arm itself (URDF), in place of a file.
+    urdf_text: Option<String>,
     /// Link that stands still; the root by default.
     base: Option<String>,
     /// Link that is the tip.
@@ -36,8 +38,7 @@ impl<const D: usize> Compiler<'_, D> {
         at_m: [f64; 3],
     ) -> Result<Arm, InputError> {
         let (s, at) = (section.get_ref(), section.span());
-        let model = Model::load(&self.source.path(s.urdf.as_ref()));
-        let model = self.source.named(at.clone(), "urdf", model)?;
+        let model = self.model(s, at.clone())?;
         let link = |name: &Option<String>, key: &str, preset: usize| match name {
             Some(name) => {
                 let at = || self.source.within(at.clone(), &[key]);
@@ -47,7 +48,7 @@ impl<const D: usize> Compiler<'_, D> {
         };
         let base = link(&s.base, "base", model.root)?;
         let tip = link(&s.tip, "tip", model.default_tip())?;
-        let serial = SerialChain::new(&model, base, tip, &s.urdf)
+        let serial = SerialChain::new(&model, base, tip, s.urdf.as_deref().unwrap_or("urdf_text"))
             .map_err(|error| self.source.error_of(at.clone(), &error))?;
         let values = self.values(s, &model, &serial, at.clone())?;
         let at = || self.source.within(at, &["joints", "posture"]);
@@ -55,6 +56,25 @@ impl<const D: usize> Compiler<'_, D> {
             .check_limits("joints", &values)
             .map_err(|error| self.source.error_of(at(), &error))?;
         Ok(Arm::new(serial, at_m, values))
+    }
+
+    /// Returns the model of an arm: from a file, or from the scenario itself.
+    fn model(&self, s: &ArmSection, at: Range<usize>) -> Result<Model, InputError> {
+        match (&s.urdf, &s.urdf_text) {
+            (Some(file), None) => {
+                let model = Model::load(&self.source.path(file.as_ref()));
+                self.source.named(at, "urdf", model)
+            }
+            (None, Some(text)) => {
+                let model = Model::parse("urdf_text", text);
+                self.source.named(at, "urdf_text", model)
+            }
+            _ => {
+                let remedy = "give urdf = \"FILE\", or urdf_text = the text of such a file";
+                let at = self.source.within(at, &["urdf_text", "urdf"]);
+                Err(self.source.error(at, "an arm needs one model", remedy))
+            }
+        }
     }
 
     /// Returns the joint values at the start: given, of a named posture, or at rest.

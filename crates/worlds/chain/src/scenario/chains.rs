@@ -6,7 +6,7 @@ use super::super::formation::Robots;
 use super::super::ground::Site;
 use super::super::ground::route::{Wanted, find};
 use super::super::rods::chain::{Chain, Connector, Mobility, Rod};
-use super::super::rods::geometry::{Point, along, first_axis, unit};
+use super::super::rods::geometry::{Point, along, first_axis, perpendicular, unit};
 use super::super::rods::obstacle::Obstacles;
 use super::super::world::{ChainSpec, Change, What};
 use super::arms::ArmSection;
@@ -15,7 +15,7 @@ use super::mobility::MobilitySection;
 use super::navigators::RobotsSection;
 use super::obstacles::fitted;
 use super::tasks::TaskSection;
-use super::{Compiler, Place, Room};
+use super::{Compiler, Measure, Place, Room};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::{InputError, Seed, math};
@@ -28,12 +28,13 @@ const ROOM: f64 = 1.2;
 /// Room for robots that follow their connectors on wheels, meters.
 const MARGIN_M: f64 = 0.08;
 /// Keys of a chain that an arm has none of, and the arm.
-const BESIDE_ARMS: [&str; 10] = [
+const BESIDE_ARMS: [&str; 11] = [
     "connectors",
     "points_m",
     "rod_m",
     "along",
     "heading_deg",
+    "folded_m",
     "max_bend_deg",
     "within_m",
     "robots",
@@ -59,6 +60,8 @@ pub(super) struct ChainSection<const D: usize> {
     at_m: Option<Place<D>>,
     along: Option<Spanned<Place<D>>>,
     heading_deg: Option<f64>,
+    /// Length of the legs in which it lies, and the distance from one to the next.
+    folded_m: Option<[Measure; 2]>,
     points_m: Option<Vec<Place<D>>>,
     #[serde(default)]
     pub(super) anywhere: bool,
@@ -174,6 +177,12 @@ impl<const D: usize> Compiler<'_, D> {
         let (s, at) = (section.get_ref(), section.span());
         let (start, arm) = self.shape(s, site, at.clone())?;
         let tasks = self.tasks(s, &start, at.clone())?;
+        if let Some(arm) = &arm {
+            let sections = s.tasks.0.iter().zip(&tasks);
+            sections
+                .into_iter()
+                .try_for_each(|(section, task)| self.joints_reach(section, task, arm))?;
+        }
         let changes = self.changes(s, &start, dt_s, at.clone())?;
         let speed_m_s = tasks.iter().map(|task| task.speed_m_s).fold(0.0, f64::max);
         self.check_steps(&start, speed_m_s * dt_s, at.clone())?;
@@ -393,8 +402,33 @@ impl<const D: usize> Compiler<'_, D> {
         for limit in &s.limits.0 {
             self.limit(&mut connectors, limit)?;
         }
+        self.stays_whole(s, &connectors, at.clone())?;
         let chain = Chain::new(points, connectors, solid.rods().to_vec());
         Ok((chain.map_err(|error| self.source.error_of(at, &error))?, Some(Arc::new(arm))))
+    }
+
+    /// Refuses an arm whose base may move, and changes that take it apart: its connectors are where its joints put
+    /// them.
+    fn stays_whole(
+        &self,
+        s: &ChainSection<D>,
+        connectors: &[Connector<D>],
+        at: Range<usize>,
+    ) -> Result<(), InputError> {
+        if connectors.first().is_some_and(|base| base.mobility != Mobility::Fixed) {
+            let at = self.source.within(at, &["limits"]);
+            let remedy = "leave the mobility of connector 0 out; at_m says where the base stands";
+            return Err(self.source.error(at, "an arm whose base may move", remedy));
+        }
+        match s.changes.0.iter().find(|change| change.get_ref().takes_apart()) {
+            None => Ok(()),
+            Some(change) => {
+                let remedy = "let a connector fail, or give a chain of rods in place of the arm";
+                let cause =
+                    "an arm is as its joints put it: it is never scattered, nor off its base";
+                Err(self.source.error(change.span(), cause, remedy))
+            }
+        }
     }
 
     fn rod(&self, s: &ChainSection<D>, radius_m: f64, at: Range<usize>) -> Result<Rod, InputError> {
@@ -425,10 +459,11 @@ impl<const D: usize> Compiler<'_, D> {
             let at = self.source.within(at, &["anywhere"]);
             return Err(self.source.error(at, "a chain anywhere on no map", remedy));
         };
-        if s.at_m.is_some() || s.points_m.is_some() || s.along.is_some() || s.heading_deg.is_some()
-        {
-            let remedy = "leave out at_m, points_m, along and heading_deg";
-            let at = self.source.within(at, &["at_m", "points_m", "along", "heading_deg"]);
+        let is_placed = s.at_m.is_some() || s.points_m.is_some() || s.folded_m.is_some();
+        if is_placed || s.along.is_some() || s.heading_deg.is_some() {
+            let remedy = "leave out at_m, points_m, along, heading_deg and folded_m";
+            let keys = ["at_m", "points_m", "along", "heading_deg", "folded_m"];
+            let at = self.source.within(at, &keys);
             return Err(self.source.error(at, "a chain placed in two ways", remedy));
         }
         let obstacles = Obstacles::new(site.obstacles(0), rod.max_m.max(1e-3))
@@ -454,7 +489,7 @@ impl<const D: usize> Compiler<'_, D> {
         at: Range<usize>,
     ) -> Result<Vec<Point<D>>, InputError> {
         if let Some(given) = &s.points_m {
-            if s.connectors.is_some() || s.at_m.is_some() {
+            if s.connectors.is_some() || s.at_m.is_some() || s.folded_m.is_some() {
                 let remedy = "give points_m alone, or connectors and at_m";
                 let at = self.source.within(at, &["points_m"]);
                 return Err(self.source.error(at, "a chain placed in two ways", remedy));
@@ -477,7 +512,10 @@ impl<const D: usize> Compiler<'_, D> {
         };
         let start = s.at_m.map_or([0.0; D], Place::get);
         let u = self.direction(s)?;
-        Ok((0..n).map(|k| along(start, u, length_m * k as f64)).collect())
+        Ok(match s.folded_m {
+            None => (0..n).map(|k| along(start, u, length_m * k as f64)).collect(),
+            Some(folds_m) => folded(n, (start, u), length_m, folds_m.map(f64::from)),
+        })
     }
 
     /// Returns the direction from the first connector to the last.
@@ -526,5 +564,42 @@ impl<const D: usize> Compiler<'_, D> {
             connector.radius_m = radius_m;
         }
         Ok(())
+    }
+}
+
+/// Returns the places of connectors in legs there and back, each beside the one before: to the left in the plane. The
+/// legs and what is between them are as many rods as come nearest to their lengths, one at least.
+fn folded<const D: usize>(
+    n: usize,
+    (start, u): (Point<D>, Point<D>),
+    rod_m: f64,
+    [leg_m, apart_m]: [f64; 2],
+) -> Vec<Point<D>> {
+    let rods = |length_m: f64| (length_m / rod_m).round().max(1.0) as usize;
+    let (leg, apart, aside) = (rods(leg_m), rods(apart_m), perpendicular(u));
+    let place = |k: usize| {
+        let (fold, rest) = (k / (leg + apart), k % (leg + apart));
+        let (on, aside_by) = (rest.min(leg), fold * apart + rest.saturating_sub(leg));
+        let along_by = if fold % 2 == 0 { on } else { leg - on };
+        let at = along(start, u, rod_m * along_by as f64);
+        along(at, aside, rod_m * aside_by as f64)
+    };
+    (0..n).map(place).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rods::geometry::distance;
+
+    #[test]
+    fn a_folded_chain_has_rods_of_one_length_and_lies_in_its_room() {
+        let places = folded(30, ([1.0, 1.0, 1.0], [0.0, 0.0, 1.0]), 0.5, [2.1, 0.9]);
+        assert!(places.windows(2).all(|p| (distance(p[0], p[1]) - 0.5).abs() < 1e-12));
+        // Legs of 4 rods, 2 rods apart: the second leg comes back, 1 m beside the first.
+        let [a, b] = [places[4], places[6]];
+        assert!(distance(a, [1.0, 1.0, 3.0]) < 1e-12 && distance(a, b) < 1.0 + 1e-12);
+        assert!(distance(places[10], [2.0, 1.0, 1.0]) < 1e-12, "{:?}", places[10]);
+        assert!(places.iter().all(|p| (1.0 - 1e-12..=3.0 + 1e-12).contains(&p[2])));
     }
 }

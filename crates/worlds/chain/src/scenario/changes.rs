@@ -54,6 +54,11 @@ impl<const D: usize> ChangeSection<D> {
         self.connector == Some(connector) && (self.failed == Some(false) || self.mobility.is_some())
     }
 
+    /// Whether it would take an arm from where its joints can put it: apart, or off its base.
+    pub(super) fn takes_apart(&self) -> bool {
+        self.scatter.is_some() || (self.connector == Some(0) && self.mobility.is_some())
+    }
+
     /// Returns the time at which it joins the chain again, if it does.
     pub(super) fn joins_at_s(&self) -> Option<f64> {
         (self.reform == Some(true)).then(|| self.at_s.get())

@@ -1,5 +1,6 @@
 //! Refusals of tasks whose connector can never do them.
 
+use super::super::arms::arm::Arm;
 use super::super::driver::{Driver, Task};
 use super::super::rods::chain::{Chain, Mobility};
 use super::super::rods::geometry::distance;
@@ -37,6 +38,29 @@ impl<const D: usize> Compiler<'_, D> {
             return Err(self.source.error(at, cause, remedy));
         }
         self.targets_are_on_its_line(section, task, start)
+    }
+
+    /// Refuses targets to which no joints of an arm bring the connector that leads, with the reason.
+    pub(super) fn joints_reach(
+        &self,
+        section: &Spanned<TaskSection<D>>,
+        task: &Task<D>,
+        arm: &Arm,
+    ) -> Result<(), InputError> {
+        let Driver::Targets(targets) = &task.driver else { return Ok(()) };
+        for (i, at) in targets.places.iter().enumerate() {
+            let (chain, goal) = arm.goal(task.agent, *at, targets.tolerance_m);
+            let answer = chain.solve(&goal, &arm.values);
+            let answer = answer.map_err(|error| self.source.error_of(section.span(), &error))?;
+            if let Some(reason) = answer.reason {
+                let cause = format!("connector {} cannot reach target {i}: {reason}", task.agent);
+                let at = self.source.within(section.span(), &["targets_m"]);
+                let remedy =
+                    "give a target that the joints reach; `sidestep ik` tells which they do";
+                return Err(self.source.error(at, cause, remedy));
+            }
+        }
+        Ok(())
     }
 
     /// Refuses targets where the connector that leads may never be.
@@ -104,5 +128,43 @@ mod tests {
         assert_eq!(told(rail, &goes("[2.0, 0.0]"), ""), None);
         let cause = told(rail, &goes("[2.0, 0.3]"), "").expect("refused");
         assert!(cause.starts_with("target 1 is 0.3000 m off"), "{cause}");
+    }
+
+    /// Compiles the shipped arm with a task, and what it is given beside that.
+    fn told_of_arm(beside: &str, task: &str) -> Option<String> {
+        let text = format!(
+            "format = 1\nworld = \"chain\"\n[chain]\ndimensions = 3\n[[chains]]\n\
+             arm = {{ urdf = \"scenarios/chain/arm.urdf\" }}\n[[chains.tasks]]\n{task}\n{beside}"
+        );
+        let source = Source::new("s.toml", text, sidestep_testing::root());
+        Compiled::<3>::new(&source).err().map(|error| error.cause().to_string())
+    }
+
+    #[test]
+    fn targets_of_an_arm_are_where_its_joints_reach() {
+        let goes = |to: &str| format!("kind = \"targets\"\nconnector = 3\ntargets_m = [{to}]");
+        assert_eq!(told_of_arm("", &goes("[0.4, 0.1, 0.6]")), None);
+        let cause = told_of_arm("", &goes("[0.4, 0.1, 0.6], [2.0, 0.0, 0.3]")).expect("refused");
+        let says = "connector 3 cannot reach target 1: the target is 2.000000 m from the arm's first connector, \
+                    and its rods reach 0.950000 m";
+        assert_eq!(cause, says);
+        // As near to its shoulder as this, its elbow would have to bend beyond its limit.
+        let cause = told_of_arm("", &goes("[0.02, 0.0, 0.35]")).expect("refused");
+        assert!(cause.starts_with("connector 3 cannot reach target 0"), "{cause}");
+    }
+
+    #[test]
+    fn an_arm_stays_whole_and_on_its_base() {
+        let rests = "kind = \"rest\"";
+        for (beside, words) in [
+            ("[[chains.limits]]\nconnector = 0\nmobility = \"free\"", "whose base may move"),
+            ("[[chains.changes]]\nat_s = 1.0\nscatter = [1, 2]\nby_m = 0.1", "never scattered"),
+            ("[[chains.changes]]\nat_s = 1.0\nconnector = 0\nmobility = \"free\"", "off its base"),
+        ] {
+            let cause = told_of_arm(beside, rests).expect("refused");
+            assert!(cause.contains(words), "{cause}");
+        }
+        let fails = "[[chains.changes]]\nat_s = 1.0\nconnector = 2\nfailed = true";
+        assert_eq!(told_of_arm(fails, rests), None);
     }
 }

@@ -40,6 +40,7 @@ pub use inverse::{
     Against, ArmAnswer, ArmGoal, ArmReason, Asked, Axis, Hit, MOST_SOLUTIONS, Part, Posture,
     Sphere, Turn,
 };
+pub(crate) use inverse::{Aim, Follower};
 pub use pose::{Pose, Vector};
 pub use recover::{RecoverError, Recovered};
 pub use serial::{Frames, Motion, SerialChain, Variable};

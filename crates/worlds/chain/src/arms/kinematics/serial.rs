@@ -32,6 +32,8 @@ pub struct Variable {
     pub motion: Motion,
     /// Lowest and highest value; none for continuous joints.
     pub limits: Option<Limits>,
+    /// Highest speed, in rad/s or m/s; none where the model gives none.
+    pub max_speed: Option<f64>,
 }
 
 /// The kind of a joint's motion.
@@ -79,6 +81,7 @@ pub(super) struct MovingJoint {
     pub(super) origin: Pose,
     pub(super) axis: Vector,
     pub(super) limits: Option<Limits>,
+    pub(super) max_speed: Option<f64>,
     pub(super) drive: Drive,
 }
 
@@ -179,6 +182,7 @@ impl SerialChain {
             origin,
             axis: joint.axis,
             limits: joint.limits,
+            max_speed: joint.max_speed,
             drive: Drive { variable, multiplier, offset },
         });
         self.to_tip = Pose::IDENTITY;
@@ -320,5 +324,6 @@ fn variable(model: &Model, joint: usize) -> Variable {
         JointKind::Prismatic => Motion::Slide,
         _ => Motion::Turn,
     };
-    Variable { name: joint.name.clone(), motion, limits: joint.limits }
+    let (limits, max_speed) = (joint.limits, joint.max_speed);
+    Variable { name: joint.name.clone(), motion, limits, max_speed }
 }

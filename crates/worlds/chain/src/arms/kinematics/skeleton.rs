@@ -5,7 +5,7 @@
 //! the one farthest out that shares a link with the last one, so that points between which nothing
 //! bends (such as the elbow offsets of a Panda) drop out.
 
-use super::pose::{Line, Vector};
+use super::pose::{Line, Pose, Vector};
 use super::serial::{Frames, Motion, SerialChain};
 use sidestep_kernel::geometry::{across, add, dot, norm, scaled, sub};
 
@@ -65,6 +65,18 @@ impl SerialChain {
     /// the base's frame.
     pub fn connectors(&self, skeleton: &Skeleton, frames: &Frames) -> Vec<Vector> {
         skeleton.connectors.iter().map(|anchor| anchor.position_m(frames)).collect()
+    }
+
+    /// Returns the arm up to connector `k` of `skeleton` (this chain's), as if that were its tip, with all its
+    /// variables.
+    pub(crate) fn up_to(&self, skeleton: &Skeleton, k: usize) -> Self {
+        let anchor = &skeleton.connectors[k];
+        Self {
+            tip: format!("connector {k}"),
+            joints: self.joints[..anchor.first].to_vec(),
+            to_tip: Pose::shift(anchor.point_m),
+            ..self.clone()
+        }
     }
 
     /// Returns the joints' axes at `frames`.

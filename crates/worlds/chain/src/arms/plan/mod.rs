@@ -2,14 +2,15 @@
 //! target, where no local rule finds one.
 //!
 //! ```text
-//! space.rs: postures, the straight way between two, and whether it is free
-//! tree.rs:  two trees of postures that grow toward each other (RRT-Connect), and shortcuts
+//! space.rs:  postures of rods, the straight way between two, and whether it is free
+//! joints.rs: the same for the joints of an arm
+//! tree.rs:   two trees of postures that grow toward each other (RRT-Connect), and shortcuts
 //! ```
 //!
 //! Source: Kuffner and LaValle, "RRT-Connect: an efficient approach to single-query path planning",
-//! ICRA 2000. Postures are those of the rods, so a way keeps rods, bend limits and mobilities; the
-//! joint limits of arms hold as far as they are bend limits, as for every motion of a chain.
+//! ICRA 2000. A way of rods keeps rods, bend limits and mobilities; one of joints keeps their limits as well.
 
+mod joints;
 mod space;
 #[cfg(test)]
 mod tests;
@@ -20,9 +21,10 @@ use crate::rods::chain::Chain;
 use crate::rods::geometry::Point;
 use crate::rods::obstacle::Obstacles;
 use crate::rods::rules::Rules;
+pub(crate) use joints::JointSpace;
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Draws;
-pub(crate) use space::Space;
+pub(crate) use space::RodSpace;
 
 /// Most postures at the target from which the second tree grows, and searches for them.
 const GOALS: usize = 4;
@@ -44,6 +46,36 @@ pub(crate) struct Errand<const D: usize> {
 /// A posture: the places of all connectors.
 pub(crate) type Posture<const D: usize> = Vec<Point<D>>;
 
+/// The postures of something that moves from one to another.
+pub(crate) trait Postures {
+    type Posture: Clone;
+
+    /// Returns the present posture.
+    fn present(&self) -> Self::Posture;
+
+    /// Returns the length in which ways are measured, such as that of what moves when it is stretched out, meters.
+    fn length_m(&self) -> f64;
+
+    /// Returns the longest way of a connector between two postures, or a bound on it, meters.
+    fn apart_m(&self, a: &Self::Posture, b: &Self::Posture) -> f64;
+
+    /// Returns a measure of nearness: the sum of the squared ways of all that moves.
+    fn spread2(&self, a: &Self::Posture, b: &Self::Posture) -> f64;
+
+    /// Returns the posture at a part of the straight way from one to another: everything turns and changes its length
+    /// evenly.
+    fn at(&self, a: &Self::Posture, b: &Self::Posture, part: f64) -> Self::Posture;
+
+    /// Whether a posture is good in itself.
+    fn is_free(&self, posture: &Self::Posture) -> bool;
+
+    /// Whether the straight way from one good posture to another is free.
+    fn is_way_free(&self, a: &Self::Posture, b: &Self::Posture) -> bool;
+
+    /// Returns any posture, good or not.
+    fn any(&self, draws: &mut Draws) -> Self::Posture;
+}
+
 /// Finds a way of a chain to a target: the postures after the present one, between any two of which
 /// the straight way is free; none if the search found none.
 ///
@@ -56,18 +88,40 @@ pub(crate) fn plan<const D: usize>(
     errand: &Errand<D>,
     draws: &mut Draws,
 ) -> Result<Option<Vec<Posture<D>>>, InputError> {
-    let space = Space::new(chain, obstacles, rules.self_collision, errand.k)?;
+    let space = RodSpace::new(chain, obstacles, rules.self_collision, errand.k)?;
     let goals = goals(&space, rules, errand, draws)?;
+    Ok(way_to(&space, goals, draws))
+}
+
+/// Finds a way of an arm to a target, as [`plan`] does: the joint values after the present ones.
+///
+/// # Errors
+/// As [`SerialChain::solve`](crate::kinematics::SerialChain::solve).
+pub(crate) fn plan_joints<const D: usize>(
+    space: &JointSpace<'_, D>,
+    errand: &Errand<D>,
+    draws: &mut Draws,
+) -> Result<Option<Vec<Vec<f64>>>, InputError> {
+    let goals = space.goals(errand, draws)?;
+    Ok(way_to(space, goals, draws))
+}
+
+fn way_to<S: Postures>(
+    space: &S,
+    goals: Vec<S::Posture>,
+    draws: &mut Draws,
+) -> Option<Vec<S::Posture>> {
     if goals.is_empty() {
-        return Ok(None);
+        return None;
     }
-    Ok(tree::way(&space, goals, draws).map(|way| tree::shortened(&space, way, draws)))
+    let way = tree::way(space, goals, draws)?;
+    Some(tree::shortened(space, way, draws))
 }
 
 /// Returns good postures that reach the target: the first sought from the present posture, the others
 /// from any, because those near the present one may be cut off from it by the chain's own body.
 fn goals<const D: usize>(
-    space: &Space<'_, D>,
+    space: &RodSpace<'_, D>,
     rules: Rules,
     errand: &Errand<D>,
     draws: &mut Draws,

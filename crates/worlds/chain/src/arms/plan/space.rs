@@ -1,6 +1,6 @@
 //! Postures of a chain with a fixed base, and the straight way between two.
 
-use super::Posture;
+use super::{Posture, Postures};
 use crate::arms::ik::legal::Judge;
 use crate::rods::chain::Chain;
 use crate::rods::geometry::{
@@ -13,7 +13,7 @@ use sidestep_kernel::stream::Draws;
 use std::f64::consts::PI;
 
 /// The postures of one chain among obstacles.
-pub(crate) struct Space<'a, const D: usize> {
+pub(crate) struct RodSpace<'a, const D: usize> {
     judge: Judge<'a, D>,
     /// The connectors from the one that keeps its place outward, to the end of the chain.
     limb: Vec<usize>,
@@ -22,7 +22,7 @@ pub(crate) struct Space<'a, const D: usize> {
     step_m: f64,
 }
 
-impl<'a, const D: usize> Space<'a, D> {
+impl<'a, const D: usize> RodSpace<'a, D> {
     /// Returns the postures that connector `k` can bring a chain to.
     ///
     /// # Errors
@@ -48,11 +48,6 @@ impl<'a, const D: usize> Space<'a, D> {
         Ok(Self { judge, limb, k, step_m: chain.step_m() })
     }
 
-    /// Returns the present posture.
-    pub(crate) fn present(&self) -> Posture<D> {
-        self.judge.chain.points().to_vec()
-    }
-
     pub(super) fn chain(&self) -> &'a Chain<D> {
         self.judge.chain
     }
@@ -64,35 +59,33 @@ impl<'a, const D: usize> Space<'a, D> {
     pub(super) fn base(&self) -> usize {
         self.limb[0]
     }
+}
 
-    /// Returns the length of the limb when it is stretched out, meters.
-    pub(super) fn length_m(&self) -> f64 {
+impl<const D: usize> Postures for RodSpace<'_, D> {
+    type Posture = Posture<D>;
+
+    fn present(&self) -> Posture<D> {
+        self.judge.chain.points().to_vec()
+    }
+
+    fn length_m(&self) -> f64 {
         let rods = self.limb.windows(2);
         rods.map(|pair| self.judge.chain.rod_between(pair[0], pair[1]).max_m).sum()
     }
 
-    /// Whether a posture is good in itself.
-    pub(super) fn is_free(&self, posture: &[Point<D>]) -> bool {
-        self.judge.objection(posture, self.k).is_none()
-    }
-
-    /// Returns the longest way of a connector between two postures, meters.
-    pub(crate) fn apart_m(&self, a: &[Point<D>], b: &[Point<D>]) -> f64 {
+    fn apart_m(&self, a: &Posture<D>, b: &Posture<D>) -> f64 {
         self.limb.iter().map(|&i| distance(a[i], b[i])).fold(0.0, f64::max)
     }
 
-    /// Returns a measure of nearness: the sum of the squared ways of all connectors.
-    pub(super) fn spread2(&self, a: &[Point<D>], b: &[Point<D>]) -> f64 {
+    fn spread2(&self, a: &Posture<D>, b: &Posture<D>) -> f64 {
         self.limb.iter().map(|&i| norm2(sub(a[i], b[i]))).sum()
     }
 
-    /// Returns the posture at a part of the straight way from one to another: every rod turns and
-    /// changes its length evenly.
-    pub(crate) fn at(&self, a: &[Point<D>], b: &[Point<D>], part: f64) -> Posture<D> {
+    fn at(&self, a: &Posture<D>, b: &Posture<D>, part: f64) -> Posture<D> {
         if part >= 1.0 {
-            return b.to_vec();
+            return b.clone();
         }
-        let mut posture = a.to_vec();
+        let mut posture = a.clone();
         for pair in self.limb.windows(2) {
             let [inner, outer] = [pair[0], pair[1]];
             let [from, to] = [a, b].map(|points| sub(points[outer], points[inner]));
@@ -105,10 +98,13 @@ impl<'a, const D: usize> Space<'a, D> {
         posture
     }
 
-    /// Whether the chain can go straight from one good posture to another.
-    pub(crate) fn is_way_free(&self, a: &[Point<D>], b: &[Point<D>]) -> bool {
+    fn is_free(&self, posture: &Posture<D>) -> bool {
+        self.judge.objection(posture, self.k).is_none()
+    }
+
+    fn is_way_free(&self, a: &Posture<D>, b: &Posture<D>) -> bool {
         let n = (self.apart_m(a, b) / self.step_m).ceil().max(1.0) as usize;
-        let mut before = a.to_vec();
+        let mut before = a.clone();
         (1..=n).all(|step| {
             let next = self.at(a, b, step as f64 / n as f64);
             // Rods that nearly turn round jump in between.
@@ -118,8 +114,7 @@ impl<'a, const D: usize> Space<'a, D> {
         })
     }
 
-    /// Returns any posture, good or not: a walk of random stiffness.
-    pub(super) fn any(&self, draws: &mut Draws) -> Posture<D> {
+    fn any(&self, draws: &mut Draws) -> Posture<D> {
         let mut posture = self.present();
         let stiffness = STIFFNESS[draws.below(STIFFNESS.len() as u32) as usize];
         let mut u: Point<D> = direction(draws);

@@ -33,7 +33,7 @@ fn a_way_round_a_wall_is_found_and_free_all_along() {
     for seed in 0..20 {
         let way = plan(&chain, &obstacles, Rules::default(), &BEHIND, &mut draws(seed)).unwrap();
         let way = way.unwrap_or_else(|| panic!("{seed}: no way"));
-        let space = Space::new(&chain, &obstacles, false, 5).unwrap();
+        let space = RodSpace::new(&chain, &obstacles, false, 5).unwrap();
         let mut at = chain.clone();
         for next in &way {
             let from = at.points().to_vec();

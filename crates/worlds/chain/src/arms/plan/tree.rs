@@ -1,7 +1,6 @@
 //! Two trees of postures that grow toward each other.
 
-use super::{Posture, Space};
-use crate::rods::geometry::Point;
+use super::Postures;
 use sidestep_kernel::stream::Draws;
 
 /// Most random postures that the trees grow toward.
@@ -14,18 +13,18 @@ const MOST_WAY: f64 = 4.0;
 const SHORTCUTS: usize = 120;
 
 /// Postures, each with the one that it grew from.
-struct Tree<const D: usize> {
-    postures: Vec<Posture<D>>,
+struct Tree<S: Postures> {
+    postures: Vec<S::Posture>,
     from: Vec<Option<usize>>,
 }
 
-impl<const D: usize> Tree<D> {
-    fn new(roots: Vec<Posture<D>>) -> Self {
+impl<S: Postures> Tree<S> {
+    fn new(roots: Vec<S::Posture>) -> Self {
         Self { from: vec![None; roots.len()], postures: roots }
     }
 
     /// Returns the posture nearest to another; of equal ones the first.
-    fn nearest(&self, space: &Space<'_, D>, to: &[Point<D>]) -> usize {
+    fn nearest(&self, space: &S, to: &S::Posture) -> usize {
         let spread2 = |i: usize| space.spread2(&self.postures[i], to);
         let all = (0..self.postures.len()).map(|i| (spread2(i), i));
         all.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0, |(_, i)| i)
@@ -35,8 +34,8 @@ impl<const D: usize> Tree<D> {
     /// and whether it is that one, or `None` if there was no stride at all.
     fn grow(
         &mut self,
-        space: &Space<'_, D>,
-        to: &[Point<D>],
+        space: &S,
+        to: &S::Posture,
         stride_m: f64,
         most: usize,
     ) -> Option<(usize, bool)> {
@@ -59,7 +58,7 @@ impl<const D: usize> Tree<D> {
     }
 
     /// Returns the postures from one back to its root.
-    fn back(&self, mut i: usize) -> Vec<Posture<D>> {
+    fn back(&self, mut i: usize) -> Vec<S::Posture> {
         let mut way = vec![self.postures[i].clone()];
         while let Some(from) = self.from[i] {
             i = from;
@@ -70,11 +69,11 @@ impl<const D: usize> Tree<D> {
 }
 
 /// Returns postures from the present one to one of the goals, both included.
-pub(super) fn way<const D: usize>(
-    space: &Space<'_, D>,
-    goals: Vec<Posture<D>>,
+pub(super) fn way<S: Postures>(
+    space: &S,
+    goals: Vec<S::Posture>,
     draws: &mut Draws,
-) -> Option<Vec<Posture<D>>> {
+) -> Option<Vec<S::Posture>> {
     let present = space.present();
     let stride_m = STRIDE * space.length_m();
     let most = (MOST_WAY / STRIDE).ceil() as usize;
@@ -101,11 +100,11 @@ pub(super) fn way<const D: usize>(
 
 /// Returns the way after its first posture, with straight ways between random places of it where
 /// they are free.
-pub(super) fn shortened<const D: usize>(
-    space: &Space<'_, D>,
-    mut way: Vec<Posture<D>>,
+pub(super) fn shortened<S: Postures>(
+    space: &S,
+    mut way: Vec<S::Posture>,
     draws: &mut Draws,
-) -> Vec<Posture<D>> {
+) -> Vec<S::Posture> {
     for _ in 0..SHORTCUTS {
         if way.len() < 3 {
             break;

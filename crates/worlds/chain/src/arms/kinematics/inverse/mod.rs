@@ -16,6 +16,7 @@
 //! search     descents from many postures, and the reason if none leads there
 //! many       several postures, and those nearest to the start
 //! guide      the connectors' solution as a posture to start from
+//! follow     joint values for the places of all connectors, within one cycle
 //! ```
 //!
 //! Every answer's error is that of forward kinematics at its values.
@@ -23,6 +24,7 @@
 mod answer;
 mod contacts;
 mod descent;
+mod follow;
 mod goal;
 mod guide;
 mod many;
@@ -34,6 +36,7 @@ mod step;
 mod tests;
 
 pub use answer::{Against, ArmAnswer, ArmReason, Hit, Part, Posture};
+pub(crate) use follow::{Aim, Follower};
 pub use goal::{ArmGoal, Asked, Axis, MOST_SOLUTIONS, Sphere, Turn};
 
 use super::serial::SerialChain;

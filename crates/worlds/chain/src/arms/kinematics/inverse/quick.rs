@@ -7,6 +7,7 @@ use sidestep_kernel::geometry::{add, along, dot, scaled};
 use sidestep_kernel::math::sin_cos;
 
 /// An arm, prepared.
+#[derive(Debug)]
 pub(super) struct Quick {
     joints: Vec<QuickJoint>,
     to_tip: Pose,
@@ -14,6 +15,7 @@ pub(super) struct Quick {
 
 /// A joint whose frame in the link before it is turned by `still + cos(q) cosine + sin(q) sine`
 /// (Rodrigues' formula, with the constant origin multiplied in).
+#[derive(Debug)]
 struct QuickJoint {
     motion: Motion,
     drive: Drive,

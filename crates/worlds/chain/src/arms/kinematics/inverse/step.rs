@@ -3,6 +3,7 @@
 use super::super::serial::SerialChain;
 
 /// The range of each variable.
+#[derive(Debug)]
 pub(super) struct Bounds {
     pub(super) ranges: Vec<[f64; 2]>,
 }

@@ -15,6 +15,8 @@ mod contacts;
 mod given;
 mod laws;
 mod lengths;
+#[cfg(test)]
+mod pinch;
 mod posture;
 mod solve;
 #[cfg(test)]

@@ -1,0 +1,131 @@
+//! Arms in runs: whatever they do, no joint leaves its limits or is faster than it may be, and the connectors are where
+//! the joints put them.
+
+use crate::arms::kinematics::SerialChain;
+use crate::run::ChainRun;
+use crate::scenario::Compiled;
+use sidestep_import::urdf::Model;
+use sidestep_kernel::geometry::distance;
+use sidestep_kernel::stream::{Draws, Purpose, Streams};
+use sidestep_kernel::{Seed, Simulation};
+use sidestep_scenario::Source;
+use sidestep_testing::{ROBOT_MODELS, robot_model, root};
+use std::path::Path;
+
+/// The arm that is shipped, of seven joints; connector 3 is its tool.
+fn shipped() -> String {
+    let file = root().join("scenarios/chain/arm.urdf");
+    format!("{:?}, joints = [0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0]", file.display().to_string())
+}
+
+/// Returns a run of one arm with a task.
+fn arm(urdf: &str, rest: &str, task: &str) -> ChainRun<3> {
+    let text = format!(
+        "format = 1\nworld = \"chain\"\ncycles = 20000\n{rest}\n[[chains]]\narm = {{ urdf = {urdf} }}\n\
+         radius_m = 0.02\nrod_radius_m = 0.01\n[[chains.tasks]]\n{task}"
+    );
+    let source = Source::new("s.toml", &text, root());
+    Compiled::<3>::new(&source).expect("valid").start(&source, 1)
+}
+
+fn joints(run: &ChainRun<3>) -> Vec<f64> {
+    run.state().body(0).joints.clone().expect("an arm")
+}
+
+/// Advances a run to its end; `case` names it where a joint breaks a law.
+fn assert_joints_keep_their_laws(run: &mut ChainRun<3>, most: u64, case: &str) {
+    let arm = run.world().chains[0].arm.clone().expect("an arm");
+    let mut before = joints(run);
+    while run.cycle() < most && !run.is_over() {
+        run.advance(1);
+        let now = joints(run);
+        assert!(arm.serial.outside_limits(&now).is_empty(), "{case}: {now:?}");
+        for ((a, b), speed) in before.iter().zip(&now).zip(arm.follower.speeds()) {
+            let most = speed * run.world().dt_s * (1.0 + 1e-9);
+            assert!((b - a).abs() <= most, "{case}: {} in cycle {}", b - a, run.cycle());
+        }
+        let places = arm.places::<3>(&now);
+        assert_eq!(places, run.state().body(0).chain.points(), "{case}");
+        before = now;
+    }
+}
+
+fn assert_all_is_reached(run: &ChainRun<3>, case: &str) {
+    let metrics = run.world().metrics_of(run.state(), 0);
+    assert!(metrics.tally.given_up.is_empty(), "{case}: {:?}", metrics.tally.given_up);
+    assert_eq!(metrics.progress, 1.0, "{case}");
+}
+
+#[test]
+fn the_shipped_arm_visits_its_places_inside_the_limits_and_speeds_of_its_joints() {
+    let path = root().join("scenarios/chain/arm.toml");
+    let source = Source::read(&path, &[]).expect("a scenario");
+    let mut run = Compiled::<3>::new(&source).expect("valid").start(&source, 1);
+    assert_joints_keep_their_laws(&mut run, 3000, "arm.toml");
+    assert_all_is_reached(&run, "arm.toml");
+    let metrics = run.world().metrics_of(run.state(), 0);
+    assert_eq!(metrics.tally.penetrations, 0);
+    assert_eq!(metrics.joints.expect("told").len(), 7);
+}
+
+/// Returns places of the tool at joint values at random.
+fn reachable(path: &Path, draws: &mut Draws) -> (usize, Vec<[f64; 3]>) {
+    let model = Model::load(path).expect("a model");
+    let arm = SerialChain::new(&model, model.root, model.default_tip(), "tip").expect("an arm");
+    let mut target = || {
+        let mut value = |limits: Option<[f64; 2]>| {
+            let [lower, upper] = limits.unwrap_or([-3.0, 3.0]);
+            lower + draws.uniform() * (upper - lower)
+        };
+        let limits = arm.variables.iter().map(|v| v.limits.map(|l| [l.lower, l.upper]));
+        let values: Vec<f64> = limits.map(&mut value).collect();
+        arm.forward(&values).tip.origin_m
+    };
+    let targets = (0..4).map(|_| target()).collect();
+    (arm.skeleton().rods.len(), targets)
+}
+
+#[test]
+fn arms_of_others_reach_what_their_joints_reach() {
+    for model in ROBOT_MODELS {
+        let Some(path) = robot_model(model) else { return };
+        let mut draws = Streams::new(Seed(1)).draws(0, 0, Purpose(1));
+        let (tip, targets) = reachable(&path, &mut draws);
+        // Some of these places the joints reach only through the arm's own rods.
+        let open = "[chain]\ndimensions = 3\nself_collision = false";
+        let task = format!(
+            "kind = \"targets\"\nconnector = {tip}\ntargets_m = {targets:?}\nspeed_m_s = 0.4"
+        );
+        let mut run = arm(&format!("{:?}", path.display().to_string()), open, &task);
+        assert_joints_keep_their_laws(&mut run, 20_000, model);
+        assert_all_is_reached(&run, model);
+    }
+}
+
+#[test]
+fn a_script_leads_a_tool_exactly_and_is_told_what_its_joints_cannot_do() {
+    let there = [0.35, 0.1, 0.75];
+    let [x, y, z] = there;
+    let script = format!("kind = \"script\"\nconnector = 3\nscript = \"goto {x}, {y}, {z}\"\n");
+    let mut run = arm(&shipped(), "[chain]\ndimensions = 3", &script);
+    assert_joints_keep_their_laws(&mut run, 2000, "goto");
+    assert!(run.is_over());
+    assert!(distance(run.state().body(0).chain.points()[3], there) < 1e-8);
+    // Two meters away no joint gets it.
+    let script = "kind = \"script\"\nconnector = 3\nscript = \"goto 2, 0, 0.5\"\npatience_s = 1.0";
+    let mut run = arm(&shipped(), "[chain]\ndimensions = 3", script);
+    assert_joints_keep_their_laws(&mut run, 2000, "too far");
+    let metrics = run.world().metrics_of(run.state(), 0);
+    assert!(run.is_over() && metrics.tally.given_up.len() == 1, "{metrics:?}");
+}
+
+#[test]
+fn an_arm_gets_out_of_the_way_at_the_speeds_of_its_joints() {
+    let ball = "[chain]\ndimensions = 3\n[[obstacles]]\nat_m = [1.2, 0.05, 0.6]\nradius_m = 0.1\n\
+                patrol_m = [[1.2, 0.05, 0.6], [0.25, 0.05, 0.6]]\nspeed_m_s = 0.15";
+    let mut run = arm(&shipped(), ball, "kind = \"rest\"\nlasts_s = 20.0");
+    assert_joints_keep_their_laws(&mut run, 1000, "ball");
+    let tally = run.world().metrics_of(run.state(), 0).tally;
+    assert!(tally.escapes.moves > 0, "it gives way");
+    assert_eq!(tally.penetrations, 0);
+}

@@ -1,0 +1,121 @@
+//! Postures of an arm's joints, inside their limits, and the straight way between two.
+
+use super::{Errand, Postures};
+use crate::arms::arm::Arm;
+use crate::arms::ik::legal::Judge;
+use crate::arms::kinematics::{ArmGoal, Motion, Variable};
+use crate::rods::chain::Chain;
+use crate::rods::geometry::Point;
+use crate::rods::obstacle::Obstacles;
+use crate::rods::veto::Veto;
+use sidestep_kernel::InputError;
+use sidestep_kernel::stream::Draws;
+use std::f64::consts::PI;
+
+/// Distinct postures at a target that are looked for, and random ones that the search starts from.
+const SOLUTIONS: usize = 12;
+const RESTARTS: usize = 60;
+/// Most of those from which the second tree grows.
+const GOALS: usize = 4;
+
+/// The postures of one arm among obstacles: a value for each of its joints.
+pub(crate) struct JointSpace<'a, const D: usize> {
+    arm: &'a Arm,
+    present: &'a [f64],
+    judge: Judge<'a, D>,
+    k: usize,
+    /// Longest way of a connector between two postures that are checked, meters.
+    step_m: f64,
+}
+
+impl<'a, const D: usize> JointSpace<'a, D> {
+    /// Returns the postures that bring connector `k` to places. `chain` is the arm's chain at its `present` joint
+    /// values.
+    pub(crate) fn new(
+        (arm, present): (&'a Arm, &'a [f64]),
+        chain: &'a Chain<D>,
+        obstacles: &'a Obstacles<D>,
+        self_collision: bool,
+        k: usize,
+    ) -> Self {
+        let judge = Judge { chain, obstacles, self_collision };
+        Self { arm, present, judge, k, step_m: chain.step_m() }
+    }
+
+    /// Returns the objection to the places of an arm's connectors, if there is one.
+    pub(crate) fn objection(&self, points: &[Point<D>]) -> Option<Veto<D>> {
+        self.judge.objection(points, self.k)
+    }
+
+    /// Returns good postures that reach the target, those nearest to the present one first.
+    pub(super) fn goals(
+        &self,
+        errand: &Errand<D>,
+        draws: &mut Draws,
+    ) -> Result<Vec<Vec<f64>>, InputError> {
+        let (arm, goal) = self.arm.goal(errand.k, errand.target, errand.tolerance_m);
+        let seed = draws.next_u64();
+        let goal = ArmGoal { solutions: SOLUTIONS, restarts: RESTARTS, seed, ..goal };
+        let answer = arm.solve(&goal, self.present)?;
+        let others = answer.others.into_iter().map(|posture| posture.values);
+        let all = std::iter::once(answer.values).filter(|_| answer.reached).chain(others);
+        Ok(all.filter(|values| self.is_free(values)).take(GOALS).collect())
+    }
+}
+
+impl<const D: usize> Postures for JointSpace<'_, D> {
+    type Posture = Vec<f64>;
+
+    fn present(&self) -> Vec<f64> {
+        self.present.to_vec()
+    }
+
+    /// The way of half a turn of all joints at once.
+    fn length_m(&self) -> f64 {
+        PI * self.arm.follower.levers_m().iter().sum::<f64>()
+    }
+
+    /// A bound: the sum of the ways that each joint alone may move a connector. So a full turn, which brings each part
+    /// back to where it was, counts as the way that it is.
+    fn apart_m(&self, a: &Vec<f64>, b: &Vec<f64>) -> f64 {
+        let ways = a.iter().zip(b).zip(self.arm.follower.levers_m());
+        ways.map(|((a, b), lever_m)| (b - a).abs() * lever_m).sum()
+    }
+
+    fn spread2(&self, a: &Vec<f64>, b: &Vec<f64>) -> f64 {
+        let ways = a.iter().zip(b).zip(self.arm.follower.levers_m());
+        ways.map(|((a, b), lever_m)| (b - a) * (b - a) * lever_m * lever_m).sum()
+    }
+
+    fn at(&self, a: &Vec<f64>, b: &Vec<f64>, part: f64) -> Vec<f64> {
+        match part >= 1.0 {
+            true => b.clone(),
+            false => a.iter().zip(b).map(|(a, b)| a + part * (b - a)).collect(),
+        }
+    }
+
+    fn is_free(&self, posture: &Vec<f64>) -> bool {
+        self.objection(&self.arm.places(posture)).is_none()
+    }
+
+    fn is_way_free(&self, a: &Vec<f64>, b: &Vec<f64>) -> bool {
+        let n = (self.apart_m(a, b) / self.step_m).ceil().max(1.0) as usize;
+        (1..=n).all(|step| self.is_free(&self.at(a, b, step as f64 / n as f64)))
+    }
+
+    fn any(&self, draws: &mut Draws) -> Vec<f64> {
+        let any = |(variable, [lower, upper]): (&Variable, &[f64; 2])| {
+            // What turns without limits is everywhere after half a turn to either side; slides without limits go as
+            // far as the arm is long.
+            let far = match variable.motion {
+                Motion::Turn if lower.is_finite() => f64::INFINITY,
+                Motion::Turn => PI,
+                Motion::Slide => self.arm.skeleton.reach_m.max(1.0),
+            };
+            let (lower, upper) = (lower.max(-far), upper.min(far));
+            lower + draws.uniform() * (upper - lower)
+        };
+        let variables = self.arm.serial.variables.iter();
+        variables.zip(self.arm.follower.limits()).map(any).collect()
+    }
+}
