@@ -82,6 +82,14 @@ pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Fa
     if let Some(at) = &foxglove {
         viewers::tell(at, console);
     }
+    invite(&studio, args.no_open, console);
+    wait_for_end(&studio)?;
+    drop(studio);
+    Ok(ExitCode::Done)
+}
+
+/// Tells the address of the studio, who else can reach it, and opens it in a browser where that is safe.
+fn invite(studio: &Studio, no_open: bool, console: Console) {
     let url = studio.url();
     if studio.is_open_to_others() {
         console.warn(
@@ -98,11 +106,15 @@ pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Fa
         || format!("The studio is at {url}\nCtrl-C ends it.\n"),
     );
     // The arguments of a process are there for all users of a machine to read, so no browser is given the token.
-    match (args.no_open, studio.is_open_to_others()) {
+    match (no_open, studio.is_open_to_others()) {
         (true, _) => {}
         (false, true) => console.note("Open the address yourself: it has the token in it."),
         (false, false) => open(&url, console),
     }
+}
+
+/// Waits until the command is interrupted.
+fn wait_for_end(studio: &Studio) -> Result<(), Failure> {
     while !interrupt::requested() {
         if studio.has_ended() {
             let remedy = "please report it with the lines above";
@@ -110,8 +122,7 @@ pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Fa
         }
         std::thread::sleep(LOOK);
     }
-    drop(studio);
-    Ok(ExitCode::Done)
+    Ok(())
 }
 
 /// Opens a page in the user's browser, if there is one.

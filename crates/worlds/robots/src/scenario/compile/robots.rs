@@ -148,9 +148,7 @@ impl Compiler<'_> {
         body: &RobotBody,
     ) -> Result<Arc<dyn Behaviour>, InputError> {
         let Some(section) = section else {
-            let wander = Arc::new(Wander::default());
-            let is_waiting = self.has_no_contacts(body);
-            return Ok(if is_waiting { Arc::new(Patient { inner: wander }) } else { wander });
+            return Ok(self.patient(Arc::new(Wander::default()), body));
         };
         let s = section.get_ref();
         let error = |wrong: Wrong| self.source.error(section.span(), wrong.0, wrong.1);
@@ -186,8 +184,13 @@ impl Compiler<'_> {
             },
         };
         let waits = ["wander", "shuttle", "goto"].contains(&s.kind.get_ref().as_str());
-        let is_waiting = waits && !behaviour.asks() && self.has_no_contacts(body);
-        Ok(if is_waiting { Arc::new(Patient { inner: behaviour }) } else { behaviour })
+        Ok(if waits && !behaviour.asks() { self.patient(behaviour, body) } else { behaviour })
+    }
+
+    /// Returns a behavior that turns on contact, with another way to notice that it is blocked where
+    /// there may be no contact.
+    fn patient(&self, inner: Arc<dyn Behaviour>, body: &RobotBody) -> Arc<dyn Behaviour> {
+        if self.has_no_contacts(body) { Arc::new(Patient { inner }) } else { inner }
     }
 
     /// Returns whether a step that is blocked may do nothing, without a contact. Behaviors that turn
