@@ -193,7 +193,8 @@ impl Whole {
             add(&self.hotel(k).told);
             let (seat, now) = (&self.hosts[k].seats[0], self.tick);
             let left = |tick: u64| tick.saturating_sub(now);
-            add(&(seat.promised, seat.seen, seat.taken, seat.stood, left(seat.missed_at())));
+            add(&(seat.promised, seat.seen, seat.taken, seat.stood));
+            add(&(left(seat.missed_at()), left(seat.quiet_until)));
             add(&seat.unanswering);
             add(&seat.copy.as_ref().map(|copy| (copy.at, copy.state.to_vec())));
             match &seat.post {
