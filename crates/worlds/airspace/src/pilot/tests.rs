@@ -81,7 +81,7 @@ fn a_sight_holds_nothing_of_others_that_cannot_be_seen() {
     let sights = run.sights();
     assert_eq!(sights.len(), 5);
     let mut hidden = 0;
-    for own in 0..5 {
+    for (own, sight) in sights.iter().enumerate() {
         let mut snapshot = run.state().snapshot(now);
         for (id, airplane) in snapshot.airplanes.iter_mut().enumerate().filter(|(id, _)| *id != own)
         {
@@ -95,7 +95,7 @@ fn a_sight_holds_nothing_of_others_that_cannot_be_seen() {
             snapshot.resolving[id] = crate::baseline::mvp::Resolving::default();
         }
         let changed = crate::state::AirspaceState::restore(&world, &snapshot);
-        assert_eq!(world.sights(&changed, now)[own], sights[own], "airplane {own}");
+        assert_eq!(world.sights(&changed, now)[own], *sight, "airplane {own}");
     }
     assert!(hidden > 10, "{hidden}");
 }
