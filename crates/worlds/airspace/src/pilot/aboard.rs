@@ -136,20 +136,28 @@ impl Pilot {
         if let Some(talk) = self.turn.as_mut().and_then(Turn::talk) {
             talk.on_timer(tick, &mut self.out);
         }
+        // Others may still depend on it in a talk that has ended for it.
+        for talk in self.past.iter_mut().filter(|talk| tick < talk.frame().ends) {
+            talk.on_timer(tick, &mut self.out);
+        }
         self.settle(tick);
     }
 
     /// Returns the tick in which something is due, unless a packet comes before it.
     pub fn next_timer(&self) -> Option<u64> {
         let turn = self.turn.as_ref()?;
-        match &turn.stage {
+        let present = match &turn.stage {
             Stage::Deciding(talk) | Stage::Shielding(talk, _) => {
                 let ends = talk.frame().ends;
                 Some(talk.next_timer().map_or(ends, |due| due.min(ends)))
             }
             Stage::Decided => Some(turn.schedule.shield_from),
             Stage::Over => None,
-        }
+        };
+        let of_cycle = self.past.iter().filter(|talk| talk.frame().id.cycle == turn.sight.cycle);
+        let past =
+            of_cycle.filter_map(|talk| talk.next_timer().filter(|due| *due < talk.frame().ends));
+        present.into_iter().chain(past).min()
     }
 
     /// Returns the tick in which the talks of the present cycle end in any case.

@@ -147,8 +147,10 @@ const PATIENCE: Patience =
 fn cuts(group: usize) -> impl Strategy<Value = Vec<Cut>> {
     let sides = prop::collection::vec(any::<bool>(), group);
     let cut = (0u64..600, 1u64..2000, sides, any::<bool>()).prop_map(
-        |(from, long, sides, is_one_way)| {
-            Cut { while_ticks: (from, from + long), sides, is_one_way }
+        |(from, long, sides, is_one_way)| Cut {
+            while_ticks: (from, from + long),
+            sides,
+            is_one_way,
         },
     );
     prop::collection::vec(cut, 0..4)
@@ -158,8 +160,13 @@ fn faults(group: usize) -> impl Strategy<Value = Faults> {
     let crashes = prop::collection::vec((0..group, 0u64..800), 0..3);
     let rates = (0.0f64..0.5, 0.0f64..0.3, 0u64..12);
     (any::<u64>(), rates, cuts(group), crashes).prop_map(
-        |(seed, (loss, duplication, max_delay), cuts, crashes)| {
-            Faults { seed, loss, duplication, max_delay, cuts, crashes }
+        |(seed, (loss, duplication, max_delay), cuts, crashes)| Faults {
+            seed,
+            loss,
+            duplication,
+            max_delay,
+            cuts,
+            crashes,
         },
     )
 }

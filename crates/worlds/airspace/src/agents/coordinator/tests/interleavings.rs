@@ -265,7 +265,8 @@ fn search(faults: u8) -> (usize, usize) {
 /// Half a second of processor time. The numbers of states are those of a search that has left nothing
 /// out: a protocol that does less has fewer.
 #[test]
-fn in_all_interleavings_of_three_hosts_and_two_faults_one_coordinator_rules_and_all_come_to_an_end() {
+fn in_all_interleavings_of_three_hosts_and_two_faults_one_coordinator_rules_and_all_come_to_an_end()
+{
     let found: Vec<_> = (0..=2).map(search).collect();
     assert!(found.iter().all(|(_, ends)| *ends > 0));
     assert!(found.windows(2).all(|pair| pair[0].0 * 10 < pair[1].0), "{found:?}");
