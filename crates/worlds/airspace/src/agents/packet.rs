@@ -7,10 +7,9 @@
 //!
 //! Bytes from a network may be anything. [`open`] lets through only those that another airplane of
 //! the same scenario and build has sent in this form, for a talk; the message itself is checked by
-//! the agent that takes it ([`Unsound`]). The checksum finds what was damaged on the way, not
+//! the agent that takes it ([`Unsound`](super::Unsound)). The checksum finds what was damaged on the way, not
 //! what was forged: who may send at all is the business of the network below.
 
-use super::party::Unsound;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
 
@@ -236,12 +235,6 @@ impl Refusal {
             Self::Unreadable => "unreadable",
             Self::Unsound => "unsound",
         }
-    }
-}
-
-impl From<Unsound> for Refusal {
-    fn from(why: Unsound) -> Self {
-        if why == Unsound::Form { Self::Unreadable } else { Self::Unsound }
     }
 }
 

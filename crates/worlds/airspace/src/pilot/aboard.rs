@@ -82,7 +82,7 @@ impl Pilot {
     /// Starts the talks of a cycle. What was not over of an earlier one is given up.
     ///
     /// # Panics
-    /// When the sight is that of another airplane.
+    /// When the sight is that of another airplane, or one that [`Sight::check`] refuses.
     pub fn begin(&mut self, sight: Sight, tick: u64) {
         let schedule = Schedule::from(tick, self.world.network.as_ref());
         self.begin_by(sight, schedule);
@@ -281,7 +281,8 @@ impl Pilot {
             group: members.clone(),
             me: sight.me(),
             patience: patience(world.network.as_ref(), topic),
-            ticks: ends - begins,
+            // A clock that has jumped may leave no time for it.
+            ticks: ends.saturating_sub(begins),
             is_silent,
         };
         let (me, members, fingerprint) = (self.id, members.clone(), self.fingerprint);

@@ -80,6 +80,9 @@ fn a_sight_holds_nothing_of_others_that_cannot_be_seen() {
     let (world, now) = (run.world().clone(), run.cycle());
     let sights = run.sights();
     assert_eq!(sights.len(), 5);
+    assert!(sights.iter().all(|sight| sight.check(&world).is_ok()));
+    let lost = Sight { group: sights[0].group[1..].to_vec(), ..sights[0].clone() };
+    assert_eq!(lost.check(&world), Err(crate::agents::Unsound::Airplane), "it is not in its group");
     let mut hidden = 0;
     for (own, sight) in sights.iter().enumerate() {
         let mut snapshot = run.state().snapshot(now);
