@@ -23,7 +23,7 @@ pub(super) struct Copy {
     pub state: Arc<[u8]>,
 }
 
-/// What a host has to do with the coordinator.
+/// The part that a host has in the coordinator at a time.
 #[derive(Debug, Clone)]
 pub(super) enum Post<P> {
     /// It is elsewhere.

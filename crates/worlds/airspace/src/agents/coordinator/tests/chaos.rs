@@ -190,7 +190,7 @@ fn one_rules(group: usize, rounds: u8, faults: Faults) -> Result<(), TestCaseErr
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
-    /// Whatever is lost, late, doubled, cut or dead: no coordinator has a twin, at most one is accepted
+    /// Over losses, delays, copies, cuts and crashes no coordinator has a twin, at most one is accepted
     /// by a majority, and nobody waits for ever.
     #[test]
     fn whatever_the_network_does_one_coordinator_rules_at_any_tick(
@@ -204,7 +204,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(30_000))]
 
     #[test]
-    #[ignore = "a minute of processor time"]
+    #[ignore = "minutes of processor time"]
     fn on_30_000_networks_one_coordinator_rules_at_any_tick(
         (group, faults) in (2usize..12).prop_flat_map(|n| (Just(n), faults(n))), rounds in 1u8..8,
     ) {

@@ -30,7 +30,7 @@ struct Whole {
     accepted: BTreeMap<Epoch, [bool; GROUP]>,
 }
 
-/// What may happen next.
+/// A thing that may happen next.
 #[derive(Debug, Clone, Copy)]
 enum Happens {
     Arrives(usize),
@@ -273,7 +273,7 @@ fn in_all_interleavings_of_three_hosts_and_two_faults_one_coordinator_rules_and_
 }
 
 #[test]
-#[ignore = "a minute of processor time"]
+#[ignore = "minutes of processor time"]
 fn in_all_interleavings_of_three_hosts_and_three_faults_the_same_holds() {
     assert!(search(3).0 > 500_000);
 }
