@@ -77,8 +77,8 @@ impl Player {
     /// elsewhere, such as over a network, may be anything.
     pub fn is_of(&self, strategies: usize) -> bool {
         let Self { q, temperature, sums, counts, expected } = self;
-        let is_distribution = q.iter().all(|p| (0.0..=1.0).contains(p))
-            && (q.iter().sum::<f64>() - 1.0).abs() < 1e-6;
+        let is_distribution =
+            q.iter().all(|p| (0.0..=1.0).contains(p)) && (q.iter().sum::<f64>() - 1.0).abs() < 1e-6;
         let is_known = expected.is_empty() || expected.len() == strategies;
         let are_finite = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
         [q.len(), sums.len(), counts.len()] == [strategies; 3]

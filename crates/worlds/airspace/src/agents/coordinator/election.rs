@@ -33,7 +33,7 @@ impl<P: Passenger> Seat<P> {
     }
 
     /// Returns the number of ticks that a question and its answer take, with a copy if need be.
-    fn answer_ticks(&self) -> u64 {
+    pub(super) fn answer_ticks(&self) -> u64 {
         let bytes = self.copy.as_ref().map_or(0, |copy| copy.state.len());
         self.rules.patience.map_or(u64::MAX, |patience| patience.ticks_for(bytes))
     }
@@ -51,8 +51,7 @@ impl<P: Passenger> Seat<P> {
         if asks.epoch < newest {
             return self.send(from, &Message::Stale(newest), &[]);
         }
-        let known = self.seen.max(self.promised.start());
-        let is_news = !asks.was_lost || known > asks.seen;
+        let is_news = !asks.was_lost || self.seen > asks.seen;
         let has_voted = asks.epoch == self.promised;
         let is_alive = match self.post {
             Post::Aboard(_) | Post::Leaving { .. } => true,
@@ -61,11 +60,12 @@ impl<P: Passenger> Seat<P> {
         };
         if is_alive {
             let ago = if self.is_empty() { tick.saturating_sub(self.heard_at) } else { 0 };
-            return self.send(from, &Message::Alive(known, ago), &[]);
+            return self.send(from, &Message::Alive(self.seen, ago), &[]);
         }
+        // This is no sign of life: the epoch may never begin.
         self.promised = asks.epoch;
-        self.heard_at = tick;
         self.post = Post::Empty;
+        self.keep_quiet(tick);
         let newer = self.copy.clone().filter(|copy| asks.has.is_none_or(|has| copy.at > has));
         match newer {
             Some(Copy { at, state }) => {
@@ -125,8 +125,13 @@ impl<P: Passenger> Seat<P> {
         let due = tick + self.answer_ticks();
         let Post::Standing(standing) = &mut self.post else { return };
         let Some(left) = standing.tries_left.checked_sub(1) else {
-            let heard = standing.heard.iter().enumerate();
-            self.unanswering = Some(heard.filter(|(_, is)| !**is).map(|(k, _)| k).collect());
+            // Where a majority is in touch, it is not for want of it that it was not elected.
+            if is_majority(&standing.heard) {
+                self.quiet_until = tick.saturating_add(self.rules.miss_ticks);
+            } else {
+                let heard = standing.heard.iter().enumerate();
+                self.unanswering = Some(heard.filter(|(_, is)| !**is).map(|(k, _)| k).collect());
+            }
             self.post = Post::Empty;
             return;
         };

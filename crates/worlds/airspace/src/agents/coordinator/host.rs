@@ -74,7 +74,12 @@ impl<P: Passenger> Hosting<P> {
                 self.ship.cut_off(seat.number.into(), unanswering);
             }
         }
-        while (0..self.seats.len()).fold(false, |changed, k| self.run(k, tick) || changed) {}
+        let mut has_changed = true;
+        while std::mem::take(&mut has_changed) {
+            for k in 0..self.seats.len() {
+                has_changed |= self.run(k, tick);
+            }
+        }
     }
 
     /// Runs a coordinator if it is here. Returns whether anything has changed for the others here.

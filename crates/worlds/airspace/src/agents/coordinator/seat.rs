@@ -23,7 +23,7 @@ pub(super) struct Copy {
     pub state: Arc<[u8]>,
 }
 
-/// What a host has to do with the coordinator.
+/// The part that a host has in the coordinator at a time.
 #[derive(Debug, Clone)]
 pub(super) enum Post<P> {
     /// It is elsewhere.
@@ -77,6 +77,8 @@ pub(super) struct Seat<P> {
     pub stood: u32,
     /// Tick of the last sign of life.
     pub heard_at: u64,
+    /// Tick before which it does not stand for election, since another one does.
+    pub quiet_until: u64,
     pub copy: Option<Copy>,
     pub post: Post<P>,
     /// The hosts that did not answer when no majority could be found, if that has happened.
@@ -98,6 +100,7 @@ impl<P: Passenger> Seat<P> {
             taken: first.start(),
             stood: 0,
             heard_at: 0,
+            quiet_until: 0,
             copy: None,
             post: Post::Empty,
             unanswering: None,
@@ -180,7 +183,7 @@ impl<P: Passenger> Seat<P> {
                 self.on_vote(from, (epoch, copy), ship, tick)?;
             }
             Message::Ack(at) => self.on_ack(from, at, tick),
-            Message::Alive(at, ago) => self.on_alive(from, at, tick.saturating_sub(ago)),
+            Message::Alive(at, ago) => self.on_alive(from, (at, ago), tick),
             Message::Stale(epoch) => self.on_stale(epoch, ship, tick),
             Message::Elect(candidacy) => self.on_elect(from, candidacy, tick),
         }
@@ -226,8 +229,8 @@ impl<P: Passenger> Seat<P> {
         }
     }
 
-    /// Takes the news that it was alive at tick `heard_at`.
-    fn on_alive(&mut self, from: usize, at: Position, heard_at: u64) {
+    /// Takes the news that it was alive some ticks ago.
+    fn on_alive(&mut self, from: usize, (at, ago): (Position, u64), tick: u64) {
         if at.epoch < self.promised {
             return self.send(from, &Message::Stale(self.promised), &[]);
         }
@@ -239,13 +242,14 @@ impl<P: Passenger> Seat<P> {
             Post::Leaving { to, .. } => self.has_arrived(*to, from, at),
             Post::Standing(Standing { asks, lost, .. }) => match lost {
                 Some(lost) => self.has_arrived(*lost, from, at),
-                None => at >= asks.seen,
+                // What others have heard of it is of use as long as it is not missed all the same.
+                None => at >= asks.seen && ago < self.rules.miss_ticks,
             },
         };
         if is_over {
             self.post = Post::Empty;
         }
-        self.note(at, heard_at);
+        self.note(at, tick.saturating_sub(ago));
     }
 
     fn has_arrived(&self, to: usize, from: usize, at: Position) -> bool {
@@ -270,7 +274,7 @@ impl<P: Passenger> Seat<P> {
             Post::Standing(standing) if standing.asks.epoch > epoch => {
                 self.post = Post::Standing(standing);
             }
-            Post::Standing(_) => self.heard_at = tick,
+            Post::Standing(_) => self.keep_quiet(tick),
         }
     }
 
@@ -333,7 +337,8 @@ impl<P: Passenger> Seat<P> {
         let patience = self.rules.patience?;
         match &self.post {
             Post::Empty if watches && self.unanswering.is_none() => {
-                Some(self.missed_at() + self.rank * patience.ticks)
+                let missed_at = self.missed_at().max(self.quiet_until);
+                Some(missed_at.saturating_add(self.rank * patience.ticks))
             }
             Post::Empty => None,
             Post::Aboard(stay) => Some(stay.beat_at.min(stay.impatient_at)),
@@ -345,6 +350,12 @@ impl<P: Passenger> Seat<P> {
     /// Returns the tick in which it is missed, if there is no further sign of life.
     pub(super) fn missed_at(&self) -> u64 {
         self.heard_at.saturating_add(self.rules.miss_ticks)
+    }
+
+    /// Gives another host that stands for election time for some questions and answers.
+    pub(super) fn keep_quiet(&mut self, tick: u64) {
+        let answer_ticks = self.answer_ticks();
+        self.quiet_until = tick.saturating_add(answer_ticks.saturating_mul(3));
     }
 
     pub(super) fn send(&mut self, to: usize, message: &Message, state: &[u8]) {

@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 
 const THREE: &str = "[airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 2600.0\n";
 
-const KINDS: [&str; 10] = [
+const KINDS: [&str; 12] = [
     "deployment = \"team\"",
     "deployment = \"compact-team\"",
     "deployment = \"team\"\npreset = \"paper\"",
@@ -17,6 +17,8 @@ const KINDS: [&str; 10] = [
     "deployment = \"pim\"",
     "deployment = \"hierarchical-pim\"\npreset = \"paper\"",
     "deployment = \"pim\"\nnetwork = { loss = 0.2 }",
+    "deployment = \"pim\"\npreset = \"paper\"\nnetwork = { loss = 0.2 }",
+    "deployment = \"hierarchical-pim\"\nnetwork = { loss = 0.2 }",
     "deployment = \"team\"\nmethod = \"mvp\"",
     "deployment = \"team\"\nmethod = \"none\"\nnetwork = {}",
     "deployment = \"team\"\nnetwork = { loss = 0.2 }",

@@ -35,6 +35,8 @@ struct Hotel {
     rounds: u8,
     /// Whether the tourist that is here has had a rest: it stays until anything happens.
     is_rested: bool,
+    /// Whether tourists need no rest here.
+    is_restless: bool,
     /// The epoch of the one that has told it how it was.
     told: Option<Epoch>,
     is_cut_off: bool,
@@ -112,17 +114,13 @@ impl Passenger for Tourist {
     }
 
     fn go_on(&mut self, hotel: &mut Hotel, here: &Here<'_>) -> Step {
-        if !std::mem::replace(&mut hotel.is_rested, true) {
+        if !hotel.is_restless && !std::mem::replace(&mut hotel.is_rested, true) {
             return Step::Stay;
         }
         self.unreachable[hotel.me] = false;
-        let was = self.task;
-        let mut step = self.hop(hotel, here);
+        let step = self.hop(hotel, here);
         if matches!(self.task, Task::Tell(_)) {
             hotel.told.get_or_insert(here.epochs[0]);
-            if !matches!(was, Task::Tell(_)) && step == Step::Over {
-                step = Step::Over;
-            }
         }
         hotel.is_rested = false;
         step
@@ -141,8 +139,8 @@ impl Passenger for Tourist {
 /// Returns the hosts of a group.
 fn hosts(group: usize, rounds: u8, patience: Patience, miss_ticks: u64) -> Vec<Hosting<Tourist>> {
     let host = |me: usize| {
-        let is_rested = false;
-        let hotel = Hotel { me, group, rounds, is_rested, told: None, is_cut_off: false };
+        let (is_rested, is_restless, told, is_cut_off) = (false, false, None, false);
+        let hotel = Hotel { me, group, rounds, is_rested, is_restless, told, is_cut_off };
         let expected = vec![true; group];
         let rules = Rules { group, me, patience: Some(patience), expected, miss_ticks };
         Hosting::new(hotel, &[(0..group).collect()], rules)
