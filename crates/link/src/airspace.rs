@@ -198,7 +198,8 @@ impl Program for Aboard {
             (false, true) => "shield",
             (false, false) => "decide",
         };
-        Doing { word, round: 0, epoch: 0 }
+        let progress = self.pilot.progress().unwrap_or_default();
+        Doing { word, round: progress.round, epoch: progress.epoch.into() }
     }
 
     fn heard(&self) -> Vec<EntityId> {

@@ -3,7 +3,7 @@
 use super::link::Ended;
 use super::network::Traffic;
 use super::packet::{Packet, Refusal, Seal, TalkId};
-use super::party::{Concludes, Outgoing, Party};
+use super::party::{Concludes, Outgoing, Party, Progress};
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
@@ -44,6 +44,11 @@ impl<P: Party + ?Sized> Talk<P> {
     /// Its identity, members and times.
     pub fn frame(&self) -> &Frame {
         &self.frame
+    }
+
+    /// Returns how far the party has come.
+    pub fn progress(&self) -> Progress {
+        self.party.progress()
     }
 
     /// Returns the count of its packets so far.
