@@ -13,8 +13,8 @@ use crate::server::{Attendant, Broken, Look, Server, Tally, Terms};
 use crate::wire::Party;
 use crate::wire::zenoh::{WireError, ZenohWire, hold};
 use crate::words::{Clock, Logged, Topology, Welcome};
-use sidestep::kernel::ports::RecordError;
 use sidestep::kernel::EntityId;
+use sidestep::kernel::ports::RecordError;
 use sidestep_session::fleet::{FleetJob, FleetNow, NodeJob, NodeNow, Told};
 use sidestep_session::{Error, Journey, Keep, Watcher};
 use std::collections::BTreeMap;
@@ -136,7 +136,6 @@ impl Watcher for Watched {
     fn warn(&self, error: &Error) {
         tracing::warn!("{error}");
     }
-
 }
 
 /// Looks after nodes, and tells how the fleet is.
@@ -249,7 +248,8 @@ impl Attendant for Captain<'_> {
             self.board.show(|| metrics::of_fleet(&self.now, fleet));
             tell(&Told::Fleet(self.now.clone()));
         }
-        let gone = self.crew.look()?;
+        let member = |agent: EntityId| fleet.seats.get(&agent)?.member.clone();
+        let gone = self.crew.look(|agent| member(agent).map(|member| member.listens))?;
         if let Some((agent, reason)) = gone.first().filter(|_| !fleet.has_begun) {
             let (agent, reason) = (*agent, reason.clone());
             return Err(Broken::Gone { agent, cycle: fleet.cycle, reason });
