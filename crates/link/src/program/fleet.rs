@@ -9,7 +9,7 @@ use super::scenario::Scenario;
 use super::told::tell;
 use crate::airspace::Airspace;
 use crate::mail::Mail;
-use crate::server::{Attendant, Broken, Look, Server, Tally, Terms};
+use crate::server::{Attendant, Broken, Look, Server, Terms};
 use crate::wire::Party;
 use crate::wire::zenoh::{WireError, ZenohWire, hold};
 use crate::words::{Clock, Logged, Topology, Welcome};
@@ -62,10 +62,10 @@ pub(super) fn fly(job: &FleetJob, lifeline: &Lifeline) -> Result<(), Error> {
             Packets::begin(folder, &scenario.source.text, stage.journey().simulation().plan().seed)
         })
         .transpose()?;
-    let (flown, tally) = Server::new(mail, &mut stage, &mut captain, terms).run();
+    let (flown, _) = Server::new(mail, &mut stage, &mut captain, terms).run();
     captain.crew.end();
     let flown = flown.and_then(|()| captain.finish_packets());
-    finish(stage.into_journey(), &watcher, flown, captain.now(&tally))
+    finish(stage.into_journey(), &watcher, flown, captain.now)
 }
 
 /// Returns the endpoints at which the server listens, each with a port.
@@ -179,11 +179,6 @@ impl<'a> Captain<'a> {
         stored.map_err(|e| Broken::World(e.into()))
     }
 
-    /// Returns the fleet as it was when it was looked at last, with the counts at the end.
-    fn now(&self, tally: &Tally) -> FleetNow {
-        FleetNow { late_cycles: tally.late_cycles, ..self.now.clone() }
-    }
-
     fn look(&mut self, fleet: &Look<'_>) {
         let passed_s = self.reported.elapsed().as_secs_f64().max(1e-3);
         self.reported = Instant::now();
@@ -255,6 +250,10 @@ impl Attendant for Captain<'_> {
             return Err(Broken::Gone { agent, cycle: fleet.cycle, reason });
         }
         Ok(gone)
+    }
+
+    fn look_back(&mut self, fleet: &Look<'_>) {
+        self.look(fleet);
     }
 
     fn take_packets(&mut self, packets: Vec<(EntityId, Logged)>) {
