@@ -1,6 +1,6 @@
 //! Airplanes: the world at the server, and a pilot at each node.
 
-use crate::ports::{Absurd, Channel, Doing, Outgoing, Program, Sent, Sight, Stage};
+use crate::ports::{Absurd, Arrival, Channel, Doing, Outgoing, Program, Sent, Sight, Stage};
 use crate::words::{Begin, Fingerprint};
 use sidestep::kernel::ports::Envelope;
 use sidestep::kernel::{Cycle, Digest, EntityId, InputError};
@@ -198,7 +198,8 @@ impl Program for Aboard {
             (false, true) => "shield",
             (false, false) => "decide",
         };
-        Doing { word, round: 0, epoch: 0 }
+        let progress = self.pilot.progress().unwrap_or_default();
+        Doing { word, round: progress.round, epoch: progress.epoch.into() }
     }
 
     fn heard(&self) -> Vec<EntityId> {
@@ -227,11 +228,13 @@ impl Faults {
 }
 
 impl Channel for Faults {
-    fn arrivals(&mut self, sent: &Sent) -> Vec<u64> {
+    fn arrivals(&mut self, sent: &Sent) -> Vec<Arrival> {
         let &Sent { to, tick, sequence, bytes } = sent;
         let payload = vec![0; bytes];
         let sender = self.sender;
-        self.ether.arrivals(Envelope { cycle: tick, sender, sequence, receiver: to, payload })
+        let packet = Envelope { cycle: tick, sender, sequence, receiver: to, payload };
+        let arrivals = self.ether.arrivals(packet).into_iter();
+        arrivals.map(|(leaves, arrives)| Arrival { leaves, arrives }).collect()
     }
 
     fn tick_s(&self) -> f64 {

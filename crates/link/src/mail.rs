@@ -105,8 +105,16 @@ impl Mail {
 
     /// Sends a word that may be lost.
     pub fn note(&mut self, to: Party, word: Word) {
-        let received = self.others.get_mut(&to).map_or(0, |other| other.post.received());
-        self.fly(to, received, Body::Note(word));
+        let (received, life) = match self.others.get_mut(&to) {
+            Some(other) => (other.post.received(), Some(other.life)),
+            None => (0, None),
+        };
+        self.fly((to, life), received, Body::Note(word));
+    }
+
+    /// Sends a word that may be lost to one life of another party, whichever of them it exchanges letters with.
+    pub fn reply(&mut self, to: Party, life: Life, word: Word) {
+        self.fly((to, Some(life)), 0, Body::Note(word));
     }
 
     /// Sends a word that is repeated until it has come; lost if the other was not met.
@@ -117,12 +125,11 @@ impl Mail {
             return;
         };
         let number = other.post.send(word.clone(), now);
-        let received = other.post.received();
-        self.fly(to, received, Body::Letter(number, word));
+        let (received, life) = (other.post.received(), Some(other.life));
+        self.fly((to, life), received, Body::Letter(number, word));
     }
 
-    fn fly(&mut self, to: Party, received: u64, body: Body) {
-        let to_life = self.others.get(&to).map(|other| other.life);
+    fn fly(&mut self, (to, to_life): (Party, Option<Life>), received: u64, body: Body) {
         let frame = Frame { from: self.me, life: self.life, to_life, received, body }.encode();
         self.counts.frames += 1;
         self.counts.bytes += frame.len() as u64;
@@ -142,13 +149,13 @@ impl Mail {
         for to in due {
             let Some(other) = self.others.get_mut(&to) else { continue };
             let due = other.post.due(now);
-            let received = other.post.received();
+            let (received, life) = (other.post.received(), Some(other.life));
             self.counts.retries += due.again.len() as u64;
             for (number, word) in due.again {
-                self.fly(to, received, Body::Letter(number, word));
+                self.fly((to, life), received, Body::Letter(number, word));
             }
             if due.acknowledge {
-                self.fly(to, received, Body::Received);
+                self.fly((to, life), received, Body::Received);
             }
         }
     }

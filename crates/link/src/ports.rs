@@ -124,10 +124,19 @@ pub struct Sent {
     pub bytes: usize,
 }
 
+/// An arrival of a packet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Arrival {
+    /// The tick in which all of it is on its way: a large one takes its time on the link.
+    pub leaves: u64,
+    /// The tick in which it arrives.
+    pub arrives: u64,
+}
+
 /// The faults of packets from one agent to others, drawn from the scenario's seed.
 pub trait Channel: Send {
-    /// Returns the ticks in which a packet arrives: none if it is lost, two if it is doubled.
-    fn arrivals(&mut self, sent: &Sent) -> Vec<u64>;
+    /// Returns the arrivals of a packet: none if it is lost, two if it is doubled.
+    fn arrivals(&mut self, sent: &Sent) -> Vec<Arrival>;
 
     /// Duration of a tick, in seconds of the scenario.
     fn tick_s(&self) -> f64;

@@ -176,9 +176,9 @@ pub struct Ticked {
 pub struct Packet {
     /// The cycle of the talk.
     pub cycle: Cycle,
-    /// The tick in which it was sent.
-    pub sent: u64,
-    /// Its number among the sender's in that cycle.
+    /// The tick in which all of it was on its way.
+    pub left: u64,
+    /// Its number among the sender's, in the talk or, in real time, in the cycle.
     pub sequence: u32,
     /// The tick in which it arrives, where time is counted in ticks.
     pub arrives: u64,
@@ -287,7 +287,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn frame(payload: Vec<u8>) -> Frame {
-        let packet = Packet { cycle: 3, sent: 5, sequence: 7, arrives: 6, payload };
+        let packet = Packet { cycle: 3, left: 5, sequence: 7, arrives: 6, payload };
         let body = Body::Letter(9, Word::Packet(packet));
         let (life, to_life) = (Life(1), Some(Life(2)));
         Frame { from: Party::Node(4), life, to_life, received: 11, body }

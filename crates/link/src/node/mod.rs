@@ -123,6 +123,8 @@ impl Node {
         if let Some(turn) = &mut self.turn {
             turn.hand_over_log(&mut self.mail);
         }
+        self.note_status();
+        self.mail.letter(Party::Server, Word::Status(self.status.clone()));
         self.mail.letter(Party::Server, Word::Left);
         let until = Instant::now() + REPORT;
         while !self.mail.has_delivered_to(Party::Server) && Instant::now() < until {
@@ -224,6 +226,12 @@ impl Node {
             return;
         }
         self.report_at = now + REPORT;
+        self.note_status();
+        (self.looks)(self.agent, &self.status);
+        self.mail.note(Party::Server, Word::Status(self.status.clone()));
+    }
+
+    fn note_status(&mut self) {
         let doing = self.program.doing();
         let counts = self.mail.counts();
         let dropped = counts.dropped.iter().map(|(&reason, &count)| (reason.to_string(), count));
@@ -232,7 +240,5 @@ impl Node {
         self.status.heard = self.program.heard();
         self.status.retries = counts.retries;
         self.status.dropped = dropped.chain(self.program.dropped()).collect();
-        (self.looks)(self.agent, &self.status);
-        self.mail.note(Party::Server, Word::Status(self.status.clone()));
     }
 }

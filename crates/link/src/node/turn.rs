@@ -1,7 +1,7 @@
 //! One cycle of an agent at its node: packets out and in, until its control is there.
 
 use crate::mail::Mail;
-use crate::ports::{Channel, Outgoing, Program, Sent};
+use crate::ports::{Arrival, Channel, Outgoing, Program, Sent};
 use crate::wire::Party;
 use crate::words::{Begin, Clock, Control, Logged, Packet, Tick, Ticked, Word};
 use sidestep::kernel::{Cycle, EntityId};
@@ -200,7 +200,7 @@ impl Turn {
         let due = std::mem::replace(&mut self.arrived, later.unwrap_or_default());
         let mut due: Vec<(EntityId, Packet)> = due.into_values().flatten().collect();
         // As in one process, whatever the order in which they came.
-        due.sort_by_key(|(from, packet)| (packet.sent, *from, packet.sequence));
+        due.sort_by_key(|(from, packet)| (packet.left, *from, packet.sequence));
         self.taken += due.len() as u64;
         for (from, packet) in due {
             ends.program.on_packet(from, &packet.payload, self.tick);
@@ -230,22 +230,27 @@ impl Turn {
             let arrivals = match &mut ends.channel {
                 _ if self.begin.beyond.binary_search(&to).is_ok() => Vec::new(),
                 Some(channel) => channel.arrivals(&Sent { to, tick, sequence, bytes }),
-                None => vec![tick + 1],
+                None => vec![Arrival { leaves: tick, arrives: tick + 1 }],
             };
             self.note(to, (tick, sequence, bytes), &arrivals);
-            for arrives in arrivals {
+            for Arrival { leaves, arrives } in arrivals {
                 let (cycle, payload) = (self.begin.cycle, packet.payload.clone());
-                let arrives = self.tick + (arrives - tick);
-                let packet = Packet { cycle, sent: self.tick, sequence, arrives, payload };
+                let [left, arrives] = [leaves, arrives].map(|at| self.tick + (at - tick));
                 sent.push((to, arrives));
+                let packet = Packet { cycle, left, sequence, arrives, payload };
                 self.part(to, packet, ends.mail);
             }
         }
     }
 
-    fn note(&mut self, to: EntityId, (tick, sequence, bytes): (u64, u32, usize), arrivals: &[u64]) {
+    fn note(
+        &mut self,
+        to: EntityId,
+        (tick, sequence, bytes): (u64, u32, usize),
+        arrivals: &[Arrival],
+    ) {
         let Some(log) = &mut self.log else { return };
-        let first = arrivals.iter().min();
+        let first = arrivals.iter().map(|one| one.arrives).min();
         log.push(Logged {
             cycle: self.begin.cycle,
             sent: self.tick,
@@ -265,7 +270,7 @@ impl Turn {
             return;
         };
         // A tick is what the real network takes.
-        let delay = (packet.arrives - packet.sent).saturating_sub(1);
+        let delay = packet.arrives.saturating_sub(self.tick + 1);
         if delay == 0 {
             mail.note(Party::Node(to), Word::Packet(packet));
             return;

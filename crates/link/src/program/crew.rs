@@ -108,11 +108,15 @@ impl Crew {
         Ok(crew)
     }
 
-    /// Looks after the processes. Returns the nodes that have ended since the last call, with the reasons.
+    /// Looks after the processes. Returns the nodes that have ended since the last call, with the reasons. One that is
+    /// started again is reached where it was before, as `reached` says: there the others look for it.
     ///
     /// # Errors
     /// When one cannot be started again.
-    pub(super) fn look(&mut self) -> Result<Vec<(EntityId, String)>, Error> {
+    pub(super) fn look(
+        &mut self,
+        reached: impl Fn(EntityId) -> Option<Vec<String>>,
+    ) -> Result<Vec<(EntityId, String)>, Error> {
         let mut gone = Vec::new();
         for (&agent, mate) in &mut self.mates {
             if let Some(reason) = mate.ended() {
@@ -120,6 +124,7 @@ impl Crew {
                 mate.again_at = self.restarts.then(|| Instant::now() + mate.wait);
             }
             if mate.again_at.is_some_and(|at| at <= Instant::now()) {
+                mate.job.listen = reached(agent).unwrap_or_else(|| mate.job.listen.clone());
                 mate.start()?;
             }
         }

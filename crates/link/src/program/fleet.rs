@@ -9,12 +9,12 @@ use super::scenario::Scenario;
 use super::told::tell;
 use crate::airspace::Airspace;
 use crate::mail::Mail;
-use crate::server::{Attendant, Broken, Look, Server, Tally, Terms};
+use crate::server::{Attendant, Broken, Look, Server, Terms};
 use crate::wire::Party;
 use crate::wire::zenoh::{WireError, ZenohWire, hold};
 use crate::words::{Clock, Logged, Topology, Welcome};
-use sidestep::kernel::ports::RecordError;
 use sidestep::kernel::EntityId;
+use sidestep::kernel::ports::RecordError;
 use sidestep_session::fleet::{FleetJob, FleetNow, NodeJob, NodeNow, Told};
 use sidestep_session::{Error, Journey, Keep, Watcher};
 use std::collections::BTreeMap;
@@ -62,10 +62,10 @@ pub(super) fn fly(job: &FleetJob, lifeline: &Lifeline) -> Result<(), Error> {
             Packets::begin(folder, &scenario.source.text, stage.journey().simulation().plan().seed)
         })
         .transpose()?;
-    let (flown, tally) = Server::new(mail, &mut stage, &mut captain, terms).run();
+    let (flown, _) = Server::new(mail, &mut stage, &mut captain, terms).run();
     captain.crew.end();
     let flown = flown.and_then(|()| captain.finish_packets());
-    finish(stage.into_journey(), &watcher, flown, captain.now(&tally))
+    finish(stage.into_journey(), &watcher, flown, captain.now)
 }
 
 /// Returns the endpoints at which the server listens, each with a port.
@@ -136,7 +136,6 @@ impl Watcher for Watched {
     fn warn(&self, error: &Error) {
         tracing::warn!("{error}");
     }
-
 }
 
 /// Looks after nodes, and tells how the fleet is.
@@ -178,11 +177,6 @@ impl<'a> Captain<'a> {
         let finished = self.packets.take().map_or(Ok(()), Packets::finish);
         let stored = self.unwritten.take().map_or(finished, Err);
         stored.map_err(|e| Broken::World(e.into()))
-    }
-
-    /// Returns the fleet as it was when it was looked at last, with the counts at the end.
-    fn now(&self, tally: &Tally) -> FleetNow {
-        FleetNow { late_cycles: tally.late_cycles, ..self.now.clone() }
     }
 
     fn look(&mut self, fleet: &Look<'_>) {
@@ -249,12 +243,17 @@ impl Attendant for Captain<'_> {
             self.board.show(|| metrics::of_fleet(&self.now, fleet));
             tell(&Told::Fleet(self.now.clone()));
         }
-        let gone = self.crew.look()?;
+        let member = |agent: EntityId| fleet.seats.get(&agent)?.member.clone();
+        let gone = self.crew.look(|agent| member(agent).map(|member| member.listens))?;
         if let Some((agent, reason)) = gone.first().filter(|_| !fleet.has_begun) {
             let (agent, reason) = (*agent, reason.clone());
             return Err(Broken::Gone { agent, cycle: fleet.cycle, reason });
         }
         Ok(gone)
+    }
+
+    fn look_back(&mut self, fleet: &Look<'_>) {
+        self.look(fleet);
     }
 
     fn take_packets(&mut self, packets: Vec<(EntityId, Logged)>) {

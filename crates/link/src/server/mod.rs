@@ -92,6 +92,9 @@ pub trait Attendant {
     /// Takes packets that nodes have sent, where all are recorded: those of the cycles before the present one, each
     /// with its sender.
     fn take_packets(&mut self, _: Vec<(EntityId, Logged)>) {}
+
+    /// Looks at the fleet when all nodes have said what they had to say.
+    fn look_back(&mut self, _: &Look<'_>) {}
 }
 
 /// Counts of a server.
@@ -190,6 +193,9 @@ impl<'a> Server<'a> {
             }
         }
         self.attendant.take_packets(std::mem::take(&mut self.packets));
+        let Self { mail, seats, tally, has_begun, stage, .. } = self;
+        let cycle = stage.cycle();
+        self.attendant.look_back(&Look { seats, tally, mail, cycle, has_begun: *has_begun });
     }
 
     /// Agents whose nodes are there, rising.

@@ -30,13 +30,14 @@ impl Server<'_> {
                 "a node is refused"
             );
             *self.tally.refused.entry(reason).or_default() += 1;
-            self.mail.note(Party::Node(agent), Word::Refused(refusal));
+            self.mail.reply(Party::Node(agent), life, Word::Refused(refusal));
             return;
         }
         let member = Member { agent, life, listens: join.listens };
         let is_known = self.seats[&agent].life() == Some(life);
         self.mail.meet(Party::Node(agent), life);
-        self.mail.note(Party::Node(agent), Word::Welcome(self.terms.welcome.clone()));
+        let welcome = Word::Welcome(self.terms.welcome.clone());
+        self.mail.reply(Party::Node(agent), life, welcome);
         if is_known {
             return;
         }

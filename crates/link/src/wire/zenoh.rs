@@ -84,6 +84,8 @@ impl Settings<'_> {
             ),
             ("transport/link/tx/lease", LEASE_MS.to_string()),
             ("transport/link/tx/keep_alive", "4".into()),
+            // One queue for each link instead of eight, each of which has buffers of 128 kB.
+            ("transport/unicast/qos/enabled", "false".into()),
             ("transport/unicast/open_timeout", OPENED_WITHIN_MS.to_string()),
             ("transport/unicast/accept_timeout", OPENED_WITHIN_MS.to_string()),
         ];

@@ -54,7 +54,7 @@ fn two_variants_with_three_seeds_come_to_one_table_however_they_are_run() {
 fn the_status_counts_each_run_once_and_tells_those_that_failed() {
     let place = Place::new();
     let sweep = sweep(&place);
-    let folder = planned(WORLDS, &sweep, &place.path("s"), &Unwatched).expect("planned");
+    let folder = planned(WORLDS, &sweep, &place.path("s"), 2, &Unwatched).expect("planned");
     let shard: Shard = "1/2".parse().expect("a share");
     share(WORLDS, &folder, shard, 1, &Unwatched).expect("run");
     // A run of that share again, one of another build of the shares, and one that failed.

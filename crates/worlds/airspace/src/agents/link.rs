@@ -13,7 +13,7 @@
 use super::network::Patience;
 use super::packet::{Draft, HEADER_BYTES};
 pub(crate) use super::party::Ended;
-use super::party::{Concludes, Outgoing, Party, Unsound};
+use super::party::{Concludes, Outgoing, Party, Progress, Unsound};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
@@ -43,6 +43,11 @@ pub trait Agent {
     /// Takes a message of agent `from`, and returns its own messages in response. Messages come in
     /// any order, each once.
     fn on_message(&mut self, from: usize, message: Self::Message) -> Vec<Self::Message>;
+
+    /// Returns the number of rounds made.
+    fn round(&self) -> u32 {
+        0
+    }
 
     /// Returns the places of those whose messages it needs in order to go on.
     fn awaits(&self) -> Vec<usize>;
@@ -235,6 +240,10 @@ impl<A: Agent> Endpoint<A> {
 }
 
 impl<A: Agent + Send> Party for Endpoint<A> {
+    fn progress(&self) -> Progress {
+        Progress { round: self.agent.round(), ..Progress::default() }
+    }
+
     fn start(&mut self, tick: u64) {
         (self.began, self.quiet_since) = (tick, tick);
         let first = self.agent.start();

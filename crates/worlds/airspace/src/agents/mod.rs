@@ -34,7 +34,7 @@ mod talk;
 use contact::Beacon;
 pub use link::{Agent, Endpoint, Most, Radio};
 pub use own_ship::{Briefing, Filed, OwnShip};
-pub use party::{Concludes, Ended, Outgoing, Party, Unsound};
+pub use party::{Concludes, Ended, Outgoing, Party, Progress, Unsound};
 use serde::{Deserialize, Serialize};
 pub use talk::{Frame, Talk};
 

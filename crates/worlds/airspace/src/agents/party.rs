@@ -33,6 +33,20 @@ pub trait Party: Send {
 
     /// Returns the largest number of bytes that a message to it may have.
     fn most_bytes(&self) -> usize;
+
+    /// Returns how far it has come, for people.
+    fn progress(&self) -> Progress {
+        Progress::default()
+    }
+}
+
+/// How far a party to a talk has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Progress {
+    /// Number of rounds made; 0 in a talk without rounds.
+    pub round: u32,
+    /// Number of the newest epoch that it has accepted; 0 where no coordinator migrates, or none was lost.
+    pub epoch: u32,
 }
 
 /// A party that has an outcome.

@@ -212,6 +212,10 @@ impl link::Agent for Agent {
     type Message = Message;
     type Outcome = Conclusion;
 
+    fn round(&self) -> u32 {
+        self.round
+    }
+
     fn start(&mut self) -> Vec<Message> {
         let mut said = vec![self.predictions()];
         said.extend(self.go_on());

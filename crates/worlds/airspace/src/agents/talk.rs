@@ -2,7 +2,7 @@
 
 use super::network::Traffic;
 use super::packet::{Packet, Refusal, Seal, TalkId};
-use super::party::{Concludes, Ended, Outgoing, Party};
+use super::party::{Concludes, Ended, Outgoing, Party, Progress};
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
@@ -43,6 +43,11 @@ impl<P: Party + ?Sized> Talk<P> {
     /// Its identity, members and times.
     pub fn frame(&self) -> &Frame {
         &self.frame
+    }
+
+    /// Returns how far the party has come.
+    pub fn progress(&self) -> Progress {
+        self.party.progress()
     }
 
     /// Returns the count of its packets so far.

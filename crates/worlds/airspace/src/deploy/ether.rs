@@ -33,9 +33,10 @@ impl Ether {
         (self.now, self.free_at) = (now, BTreeMap::new());
     }
 
-    /// Returns the ticks in which a packet arrives at its receiver: none if it is lost, two if it is doubled. Its
-    /// `cycle` is the tick in which it is sent. Distances do not matter here.
-    pub fn arrivals(&mut self, packet: Envelope) -> Vec<u64> {
+    /// Returns the arrivals of a packet at its receiver: none if it is lost, two if it is doubled. Of each the tick in
+    /// which all of it is on its way, and the tick in which it arrives. Its `cycle` is the tick in which it is sent.
+    /// Distances do not matter here.
+    pub fn arrivals(&mut self, packet: Envelope) -> Vec<(u64, u64)> {
         let world = &*self.world;
         let faults = world.network.as_ref().map(|network| network.faults()).unwrap_or_default();
         let memory = MemoryTransport::new(world.streams, purpose::NETWORK, faults);
@@ -46,7 +47,7 @@ impl Ether {
         network.send(packet);
         let mut arrivals = Vec::new();
         while let Some(at) = network.next_arrival() {
-            arrivals.extend(network.receive(receiver, at).iter().map(|_| at));
+            arrivals.extend(network.receive(receiver, at).iter().map(|copy| (copy.cycle, at)));
         }
         self.free_at = std::mem::take(&mut network.free_at);
         arrivals

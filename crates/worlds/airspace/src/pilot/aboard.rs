@@ -11,7 +11,7 @@ use super::talks::{Speaker, optimizes, proposes, tells};
 use crate::agents::contact::Contacts;
 use crate::agents::network::Traffic;
 use crate::agents::packet::{Packet, Refusal, Refused, TalkId, Topic, digest, open};
-use crate::agents::{Frame, Party, Radio, Talk};
+use crate::agents::{Frame, Party, Progress, Radio, Talk};
 use crate::avoid::Beset;
 use crate::decide::{Considered, Manner};
 use crate::flight::Known;
@@ -204,6 +204,14 @@ impl Pilot {
     pub(crate) fn into_outcome(mut self) -> Option<(Control, Considered)> {
         let control = self.control()?;
         Some((control, self.turn.take()?.considered))
+    }
+
+    /// Returns how far it has come in the talk that it is in, if it is in one.
+    pub fn progress(&self) -> Option<Progress> {
+        match &self.turn.as_ref()?.stage {
+            Stage::Deciding(talk) | Stage::Shielding(talk, _) => Some(talk.progress()),
+            Stage::Decided | Stage::Over => None,
+        }
     }
 
     /// Returns its knowledge of others.

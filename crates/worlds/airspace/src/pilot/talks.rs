@@ -7,8 +7,8 @@ use crate::agents::coordinator::Host;
 use crate::agents::exchange::{self, Agreed};
 use crate::agents::intent::{self, Intent};
 use crate::agents::{
-    Agent, Concludes, Conclusion, Ended, Endpoint, Outgoing, Party, Radio, Unsound, informed,
-    sampling,
+    Agent, Concludes, Conclusion, Ended, Endpoint, Outgoing, Party, Progress, Radio, Unsound,
+    informed, sampling,
 };
 use crate::baseline::mvp::Resolving;
 use crate::deploy::Deployment;
@@ -53,6 +53,10 @@ pub(super) type Speaker = dyn Concludes<Outcome = Came>;
 struct Any<P>(P);
 
 impl<P: Party> Party for Any<P> {
+    fn progress(&self) -> Progress {
+        self.0.progress()
+    }
+
     fn start(&mut self, tick: u64) {
         self.0.start(tick);
     }

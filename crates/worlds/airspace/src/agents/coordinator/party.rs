@@ -7,7 +7,7 @@ use super::seat::Sent;
 use super::state::{Coordinator, block};
 use crate::agents::link::{Ended, Radio};
 use crate::agents::packet::HEADER_BYTES;
-use crate::agents::party::{Concludes, Outgoing, Party, Unsound};
+use crate::agents::party::{Concludes, Outgoing, Party, Progress, Unsound};
 use crate::agents::{Briefing, Conclusion, OwnShip};
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
@@ -58,6 +58,11 @@ fn state_bytes(briefing: &Briefing) -> usize {
 }
 
 impl Party for Host {
+    fn progress(&self) -> Progress {
+        let epochs = self.hosting.seats.iter().map(|seat| seat.promised.number);
+        Progress { epoch: epochs.max().unwrap_or(0), ..Progress::default() }
+    }
+
     fn start(&mut self, tick: u64) {
         if self.is_silent {
             let me = self.hosting.rules.me;

@@ -25,6 +25,7 @@ fn over_memory(text: &str) -> crate::support::Came {
         wire: &|me| Box::new(exchange.wire(me)),
         listens: &|_| Vec::new(),
         attendant: &mut Nobody,
+        liar: None,
     };
     let (came, flown, tally) = in_threads(text, way);
     flown.expect("flown to the end");
@@ -63,16 +64,13 @@ fn sockets_come_out_as_one_process_does_in_a_mesh_and_in_a_star() {
         [(Topology::Mesh, ""), (Topology::Star, ""), (Topology::Mesh, BAD_NETWORK)]
     {
         let text = superconflict(4, "compact-team", 12, more);
-        let free = |_| hold("tcp/127.0.0.1:0").expect("a free port");
-        let server = free(0).endpoint;
-        let ports: Vec<String> = match topology {
-            Topology::Mesh => {
-                // All are held at once, so that they differ.
-                let held: Vec<_> = (0..4).map(free).collect();
-                held.into_iter().map(|held| held.endpoint).collect()
-            }
-            Topology::Star => Vec::new(),
-        };
+        let count = if topology == Topology::Mesh { 5 } else { 1 };
+        // All are held at once, so that they differ.
+        let held: Vec<_> =
+            (0..count).map(|_| hold("tcp/127.0.0.1:0").expect("a free port")).collect();
+        let mut ports: Vec<String> = held.iter().map(|held| held.endpoint.clone()).collect();
+        drop(held);
+        let server = ports.remove(0);
         let listens = |agent: EntityId| ports.get(agent as usize).cloned().into_iter().collect();
         let wire = |me: Party| -> Box<dyn Wire> {
             let at = std::slice::from_ref(&server);
@@ -84,10 +82,38 @@ fn sockets_come_out_as_one_process_does_in_a_mesh_and_in_a_star() {
             Box::new(wire.listening(held.into_iter().collect()))
         };
         let (clock, lease) = (Clock::Lockstep, LONG);
-        let way =
-            Way { clock, topology, lease, wire: &wire, listens: &listens, attendant: &mut Nobody };
+        let way = Way {
+            clock,
+            topology,
+            lease,
+            wire: &wire,
+            listens: &listens,
+            attendant: &mut Nobody,
+            liar: None,
+        };
         let (came, flown, _) = in_threads(&text, way);
         flown.expect("flown to the end");
         assert_eq!(came, alone(&text), "{topology:?} {more}");
     }
+}
+
+/// What cannot be flown is refused and counted, and the airplane stays on its orbit; so do those of its group where
+/// the network is reliable, as plans are safe only if all fly them.
+#[test]
+fn a_node_that_says_nonsense_is_counted_and_harms_nobody() {
+    let exchange = Exchange::default();
+    let text = superconflict(3, "compact-team", 8, "");
+    let way = Way {
+        clock: Clock::Lockstep,
+        topology: Topology::Star,
+        lease: LONG,
+        wire: &|me| Box::new(exchange.wire(me)),
+        listens: &|_| Vec::new(),
+        attendant: &mut Nobody,
+        liar: Some(1),
+    };
+    let (came, flown, tally) = in_threads(&text, way);
+    flown.expect("flown to the end");
+    assert_eq!(tally.absurd_controls, 8);
+    assert_eq!(came.metrics["losses_of_separation"], 0);
 }

@@ -72,7 +72,17 @@ impl Program {
 
     /// Returns the next line for which something holds.
     pub(crate) fn until<T>(&self, what: &str, wanted: impl Fn(Told) -> Option<T>) -> T {
-        let until = Instant::now() + LONG;
+        self.until_within(what, LONG, wanted)
+    }
+
+    /// Returns the same, where it takes longer.
+    pub(crate) fn until_within<T>(
+        &self,
+        what: &str,
+        within: Duration,
+        wanted: impl Fn(Told) -> Option<T>,
+    ) -> T {
+        let until = Instant::now() + within;
         loop {
             let told = self.told.recv_timeout(until.saturating_duration_since(Instant::now()));
             let told = told.unwrap_or_else(|e| panic!("waited for {what}: {e}"));
@@ -155,9 +165,30 @@ fn processes_come_out_as_one_process_does_and_leave_an_ordinary_folder() {
     assert_eq!(summary["digest"], one.digest);
     assert_eq!(untimed(summary["metrics"].clone()), one.metrics);
     let packets: u64 = fleet.nodes.iter().map(|node| node.packets).sum();
-    assert!(packets > 0 && fleet.nodes.iter().all(|node| node.late == 0), "{fleet:?}");
+    assert_eq!(summary["metrics"]["messages"], packets, "nodes count what the run does");
+    assert!(fleet.nodes.iter().all(|node| node.late == 0), "{fleet:?}");
     let recorded = sidestep_session::stored_summary(&out).expect("an ordinary folder");
     assert_eq!(recorded.expect("a summary")["digest"], one.digest);
+}
+
+/// All deployments, with and without faults.
+#[test]
+#[ignore = "minutes of processor time: eight whole flights of ten airplanes"]
+fn a_whole_super_conflict_of_ten_comes_out_as_in_one_process_in_every_deployment() {
+    for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {
+        for network in ["", "network = { loss = 0.1, max_delay_s = 0.003 }"] {
+            let text = wide(&superconflict(10, deployment, 1_000, network), 4_000);
+            let folder = folder(&text);
+            let job = job(folder.path(), Topology::Mesh, Clock::Lockstep);
+            let program = Program::start(&Job::Fleet(job));
+            let digest = program.until_within("the end", 60 * LONG, |told| match told {
+                Told::Ended { summary, .. } => Some(summary["digest"].clone()),
+                Told::Failed(failed) => panic!("{failed:?}"),
+                _ => None,
+            });
+            assert_eq!(digest, alone(&text).digest, "{deployment} {network}");
+        }
+    }
 }
 
 #[test]

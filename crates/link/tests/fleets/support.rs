@@ -1,13 +1,13 @@
 //! Fleets to test.
 
 use serde_json::Value;
-use sidestep::kernel::EntityId;
+use sidestep::kernel::{Cycle, EntityId};
 use sidestep::scenario::{Compiled, Source};
 use sidestep::worlds::WORLDS;
 use sidestep_link::airspace::{Aboard, Airspace, Faults, fingerprint, world_of};
 use sidestep_link::mail::Mail;
 use sidestep_link::node::{Asked, Node, NodeError, join};
-use sidestep_link::ports::{Channel, Program};
+use sidestep_link::ports::{Channel, Doing, Outgoing, Program};
 use sidestep_link::server::{Attendant, Broken, Look, Server, Tally, Terms};
 use sidestep_link::wire::{Party, Wire};
 use sidestep_link::words::{Clock, Join, Status, Topology, Welcome};
@@ -86,6 +86,53 @@ pub(crate) struct Way<'a> {
     /// Endpoints at which a node is reached.
     pub(crate) listens: &'a dyn Fn(EntityId) -> Vec<String>,
     pub(crate) attendant: &'a mut dyn Attendant,
+    /// The agent whose node says nonsense instead of its control.
+    pub(crate) liar: Option<EntityId>,
+}
+
+/// A pilot aboard a node that says nonsense instead of its control.
+struct Liar(Aboard);
+
+impl Program for Liar {
+    fn begin(&mut self, cycle: Cycle, sight: &[u8]) -> Result<u64, String> {
+        self.0.begin(cycle, sight)
+    }
+
+    fn on_packet(&mut self, from: EntityId, payload: &[u8], tick: u64) {
+        self.0.on_packet(from, payload, tick);
+    }
+
+    fn on_timer(&mut self, tick: u64) {
+        self.0.on_timer(tick);
+    }
+
+    fn next_timer(&self) -> Option<u64> {
+        self.0.next_timer()
+    }
+
+    fn take_packets(&mut self) -> Vec<Outgoing> {
+        self.0.take_packets()
+    }
+
+    fn is_done(&self) -> bool {
+        self.0.is_done()
+    }
+
+    fn control(&self) -> Option<Vec<u8>> {
+        self.0.control().map(|control| control[..control.len() / 2].to_vec())
+    }
+
+    fn doing(&self) -> Doing {
+        self.0.doing()
+    }
+
+    fn heard(&self) -> Vec<EntityId> {
+        self.0.heard()
+    }
+
+    fn dropped(&self) -> Vec<(String, u64)> {
+        self.0.dropped()
+    }
 }
 
 /// Flies a scenario with a thread for each airplane.
@@ -115,8 +162,8 @@ pub(crate) fn in_threads(text: &str, way: Way<'_>) -> (Came, Result<(), Broken>,
             let mail = Mail::new(Party::Node(agent), (way.wire)(Party::Node(agent)));
             let (listens, scenario) = ((way.listens)(agent), scenario.clone());
             let join = Join { agent, scenario, build: "test".into(), listens, process: 0 };
-            let (world, lease) = (world.clone(), way.lease);
-            spawn(move || node(mail, join, world, lease))
+            let (world, lease, is_liar) = (world.clone(), way.lease, way.liar == Some(agent));
+            spawn(move || node(mail, join, world, (lease, is_liar)))
         })
         .collect();
     let (flown, tally) = Server::new(mail, &mut stage, way.attendant, terms).run();
@@ -131,11 +178,12 @@ fn node(
     mut mail: Mail,
     question: Join,
     world: std::sync::Arc<sidestep::worlds::airspace::AirspaceWorld>,
-    lease: Duration,
+    (lease, is_liar): (Duration, bool),
 ) -> Result<Status, NodeError> {
     let agent = question.agent;
     let welcome = join(&mut mail, &Asked { join: question, patience: LONG })?;
-    let program: Box<dyn Program> = Box::new(Aboard::new(world.clone(), agent, "test"));
+    let aboard = Aboard::new(world.clone(), agent, "test");
+    let program: Box<dyn Program> = if is_liar { Box::new(Liar(aboard)) } else { Box::new(aboard) };
     let channel = Faults::new(world, agent).map(|faults| Box::new(faults) as Box<dyn Channel>);
     Node::new(agent, mail, (program, channel), &welcome, lease).run()
 }
