@@ -56,13 +56,13 @@ pub enum OrderError {
         /// The values that there may be.
         expected: String,
     },
-    /// What agents do was handed over to a run whose agents decide in it.
+    /// Controls were handed over to a run whose agents decide in it.
     #[error("in this run nobody decides outside: {cause}")]
     NobodyOutside {
         /// The reason, and what would help.
         cause: String,
     },
-    /// What an agent does cannot be done.
+    /// The control of an agent is refused.
     #[error("the control of {who} is refused: {cause}")]
     Control {
         /// The agent.

@@ -1,7 +1,7 @@
 //! Promise D1, D2: a run that was flown by pilots outside of it is computed again from its folder, also where some
 //! of their controls are missing.
 
-use sidestep::kernel::{EntityId, Simulation};
+use sidestep::kernel::EntityId;
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
 use sidestep::worlds::airspace::AirspaceRun;

@@ -63,7 +63,7 @@ impl Effort {
     }
 }
 
-/// What an airplane considers in a cycle.
+/// Everything that an airplane considers in a cycle.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Considered {
     /// Its actions in the order in which it wants them; none by methods that give a heading.

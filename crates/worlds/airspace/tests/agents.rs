@@ -10,7 +10,7 @@ use sidestep_scenario::Source;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-/// What a pilot in a thread is told.
+/// A message to a pilot in a thread.
 enum Told {
     /// The sight of a cycle.
     Begin(Box<Sight>),

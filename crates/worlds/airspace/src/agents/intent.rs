@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
-/// What nobody can see of an airplane.
+/// The part of an airplane that nobody can see.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Intent {
     /// Number of way-points done with.
@@ -27,7 +27,7 @@ pub struct Intent {
 pub struct Start {
     /// Place of its airplane in the group.
     pub me: usize,
-    /// What it tells.
+    /// Its own message.
     pub own: Intent,
     /// The flights of the group as filed.
     pub filed: Arc<[Filed]>,
@@ -57,7 +57,7 @@ impl Agent {
 
 impl link::Agent for Agent {
     type Message = Intent;
-    /// What the members have told, by place.
+    /// Messages of the members, by place.
     type Outcome = Vec<Option<Intent>>;
 
     fn start(&mut self) -> Vec<Intent> {

@@ -21,7 +21,7 @@ pub struct Briefing {
     pub ids: Arc<[EntityId]>,
     /// The flights of the group as filed, in the order of the ids.
     pub filed: Vec<Filed>,
-    /// Where all see the airplanes of the group, in the order of the ids.
+    /// Poses at which all see the airplanes of the group, in the order of the ids.
     pub poses: Vec<Pose>,
     /// The air that all fly through.
     pub air: Air,

@@ -112,7 +112,7 @@ impl Draft {
     }
 }
 
-/// What a packet says about its message.
+/// The statements of a packet about its message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Seal {
     /// Digest of scenario and build: airplanes of others are not understood.

@@ -40,7 +40,7 @@ pub trait Party: Send {
     }
 }
 
-/// How far a party to a talk has come.
+/// The progress of a party to a talk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Progress {
     /// Number of rounds made; 0 in a talk without rounds.

@@ -1,4 +1,4 @@
-//! What an airplane does in a cycle, and what came of its talks.
+//! Controls: the motion of an airplane in a cycle, and the outcome of its talks.
 
 use crate::agents::Decided;
 use crate::agents::contact::Contacts;
@@ -9,14 +9,14 @@ use crate::shield::{Decision, Side, Way};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
 
-/// What an airplane does in a cycle, and everything else that its run keeps of the decision: one message.
+/// The motion of an airplane in a cycle, and everything else that its run keeps of the decision: one message.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Control {
     /// The airplane.
     pub id: EntityId,
     /// The cycle in which it flies so.
     pub cycle: Cycle,
-    /// What it flies.
+    /// Its course.
     pub course: Course,
     /// Outcome of the optimization; none where there was nothing to optimize.
     pub optimized: Option<Optimized>,
@@ -26,7 +26,7 @@ pub struct Control {
     pub shielding: Traffic,
     /// Others that it no longer hears, deadlines missed, and the like.
     pub events: Vec<Event>,
-    /// What it remembers.
+    /// Its memory.
     pub memory: Memory,
 }
 
@@ -57,7 +57,7 @@ pub struct Optimized {
     pub converged: bool,
 }
 
-/// What an airplane remembers from one cycle to the next.
+/// The memory of an airplane from one cycle to the next.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Memory {
     /// Its knowledge of others; empty where the network is reliable.

@@ -1,4 +1,4 @@
-//! What an airplane perceives at the start of a cycle.
+//! Sights: all that an airplane perceives at the start of a cycle.
 
 use crate::Turn;
 use crate::agents::Unsound;

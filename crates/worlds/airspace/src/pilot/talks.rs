@@ -18,7 +18,7 @@ use sidestep_collectives::Estimator;
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
-/// What comes of a talk.
+/// The outcome of a talk.
 pub(super) enum Came {
     /// Of an optimization.
     Decided(Conclusion),

@@ -67,7 +67,7 @@ pub struct Snapshot {
     pub held: Vec<Pose>,
     /// The wish that was ordered of each airplane; empty unless airplanes are decided from outside.
     pub wishes: Vec<Option<Wish>>,
-    /// What airplanes do in the cycle that comes next, if that was handed over by those who decide outside.
+    /// Controls of airplanes for the cycle that comes next, if that was handed over by those who decide outside.
     pub handed: Option<Vec<Control>>,
 }
 

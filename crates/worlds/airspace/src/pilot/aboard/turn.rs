@@ -21,7 +21,7 @@ pub(super) struct Turn {
     pub(super) members: Arc<[EntityId]>,
     pub(super) stage: Stage,
     pub(super) considered: Considered,
-    /// What it does, as far as that is decided.
+    /// Its control, as far as that is decided.
     pub(super) control: Control,
 }
 
