@@ -1,4 +1,4 @@
-//! What a fleet needs of a world, and a node of its agent: both as bytes, so that any world can be flown.
+//! Ports of a fleet to its world, and of a node to its agent: both as bytes, so that any world can be flown.
 
 use crate::words::Begin;
 use sidestep::kernel::{Cycle, EntityId};
@@ -31,7 +31,7 @@ pub trait Stage {
     ) -> Result<Vec<Absurd>, sidestep_session::Error>;
 }
 
-/// What an agent perceives at the start of a cycle.
+/// All that an agent perceives at the start of a cycle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sight {
     /// The agent.

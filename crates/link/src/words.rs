@@ -3,7 +3,7 @@
 //! A frame is postcard after a magic number and the version of this format. Whatever cannot be read is
 //! counted and dropped, so that no frame can do harm.
 
-use crate::wire::Party;
+use crate::party::Party;
 use serde::{Deserialize, Serialize};
 use sidestep::kernel::{Cycle, EntityId};
 pub use sidestep_session::fleet::{Clock, Topology};
@@ -104,7 +104,7 @@ pub type Fingerprint = String;
 /// The server's answer to a node that may join.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Welcome {
-    /// How time passes.
+    /// The clock by which time passes.
     pub clock: Clock,
     /// The way from node to node.
     pub topology: Topology,

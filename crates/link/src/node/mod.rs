@@ -43,6 +43,9 @@ pub enum NodeError {
     Percept(String),
 }
 
+/// A listener to the status of a node, told as often as the server is.
+type Looks = Box<dyn FnMut(EntityId, &Status)>;
+
 /// A node that has joined a fleet.
 pub struct Node {
     agent: EntityId,
@@ -59,8 +62,7 @@ pub struct Node {
     early: Vec<(EntityId, Packet)>,
     status: Status,
     report_at: Instant,
-    /// Told how the node is, as often as the server.
-    looks: Box<dyn FnMut(EntityId, &Status)>,
+    looks: Looks,
 }
 
 impl Node {
@@ -103,11 +105,11 @@ impl Node {
     pub fn run(mut self) -> Result<Status, NodeError> {
         loop {
             let wait = self.turn.as_ref().and_then(|turn| turn.wait(self.program.as_ref()));
-            if let Some(heard) = self.mail.receive(wait.unwrap_or(LOOK).min(LOOK)) {
-                if self.hear(heard)? {
-                    self.leave();
-                    return Ok(self.status);
-                }
+            if let Some(heard) = self.mail.receive(wait.unwrap_or(LOOK).min(LOOK))
+                && self.hear(heard)?
+            {
+                self.leave();
+                return Ok(self.status);
             }
             self.go_on();
             self.report();
@@ -193,12 +195,12 @@ impl Node {
         match &mut self.turn {
             Some(turn) if packet.cycle == turn.cycle() => turn.on_packet(from, packet),
             // Another node may have heard of the cycle before this one.
-            turn if turn.as_ref().is_none_or(|turn| packet.cycle > turn.cycle()) => {
-                if self.early.len() < MOST_EARLY {
-                    self.early.push((from, packet));
-                }
+            turn if turn.as_ref().is_none_or(|turn| packet.cycle > turn.cycle())
+                && self.early.len() < MOST_EARLY =>
+            {
+                self.early.push((from, packet));
             }
-            // Of a talk that is over.
+            // Of a talk that is over, or one more than there is room for.
             _ => {}
         }
     }

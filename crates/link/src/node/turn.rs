@@ -50,7 +50,7 @@ pub(super) struct Turn {
     is_closed: bool,
     has_told: bool,
     sent: Sums,
-    /// What it has sent, where all is recorded.
+    /// Packets that it has sent, where all are recorded.
     log: Option<Vec<Logged>>,
 }
 

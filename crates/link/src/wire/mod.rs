@@ -6,30 +6,11 @@ pub mod board;
 pub mod memory;
 pub mod zenoh;
 
+pub use crate::party::Party;
 use crate::words::Member;
-use serde::{Deserialize, Serialize};
 use sidestep::kernel::EntityId;
-use std::fmt;
 use std::time::Duration;
 pub use zenoh::WireError;
-
-/// A party of a fleet.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum Party {
-    /// The server of the world.
-    Server,
-    /// The node of an agent.
-    Node(EntityId),
-}
-
-impl fmt::Display for Party {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Server => write!(f, "server"),
-            Self::Node(id) => write!(f, "{id}"),
-        }
-    }
-}
 
 /// Carries frames between parties. A frame may be lost, and nobody is told.
 pub trait Wire: Send {

@@ -76,7 +76,7 @@ impl Attendant for Nobody {
     }
 }
 
-/// How a fleet is flown in a test.
+/// The manner in which a fleet is flown in a test.
 pub(crate) struct Way<'a> {
     pub(crate) clock: Clock,
     pub(crate) topology: Topology,

@@ -97,7 +97,7 @@ fn sockets_come_out_as_one_process_does_in_a_mesh_and_in_a_star() {
     }
 }
 
-/// What cannot be flown is refused and counted, and the airplane stays on its orbit; so do those of its group where
+/// A control that cannot be flown is refused and counted, and the airplane stays on its orbit; so do those of its group where
 /// the network is reliable, as plans are safe only if all fly them.
 #[test]
 fn a_node_that_says_nonsense_is_counted_and_harms_nobody() {
