@@ -105,7 +105,9 @@ impl Node {
     pub fn run(mut self) -> Result<Status, NodeError> {
         loop {
             let wait = self.turn.as_ref().and_then(|turn| turn.wait(self.program.as_ref()));
-            if let Some(heard) = self.mail.receive(wait.unwrap_or(LOOK).min(LOOK))
+            let heard = self.mail.receive(wait.unwrap_or(LOOK).min(LOOK));
+            let is_quiet = heard.is_none();
+            if let Some(heard) = heard
                 && self.hear(heard)?
             {
                 self.leave();
@@ -114,7 +116,8 @@ impl Node {
             self.go_on();
             self.report();
             let silent = self.mail.silent_for(Party::Server);
-            if silent.is_some_and(|silent| silent > self.lease) {
+            // What has come while this process stood still is heard first.
+            if is_quiet && silent.is_some_and(|silent| silent > self.lease) {
                 return Err(NodeError::Silence(self.lease.as_secs()));
             }
         }

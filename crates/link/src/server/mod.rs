@@ -208,13 +208,17 @@ impl<'a> Server<'a> {
     /// # Errors
     /// When the fleet is to end.
     fn hear(&mut self, within: Duration) -> Result<(), Broken> {
-        let now = Instant::now();
-        if now >= self.look_at {
-            self.look_at = now + LOOK;
-            self.look_around(now)?;
-        }
         if let Some(heard) = self.mail.receive(within.min(LOOK)) {
             self.take(heard);
+        }
+        let now = Instant::now();
+        if now >= self.look_at {
+            // What has come while this process stood still is heard before anybody is missed.
+            while let Some(heard) = self.mail.receive(Duration::ZERO) {
+                self.take(heard);
+            }
+            self.look_at = now + LOOK;
+            self.look_around(now)?;
         }
         Ok(())
     }

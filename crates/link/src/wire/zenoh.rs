@@ -15,7 +15,8 @@ use std::net::{TcpListener, ToSocketAddrs};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
-use zenoh::pubsub::{Publisher, Subscriber};
+use zenoh::key_expr::KeyExpr;
+use zenoh::pubsub::Subscriber;
 use zenoh::qos::CongestionControl;
 use zenoh::{Config, Session, Wait};
 
@@ -133,7 +134,7 @@ pub struct ZenohWire {
 
 /// A session, and who is sent to over it.
 struct Line {
-    publishers: BTreeMap<Party, Publisher<'static>>,
+    keys: BTreeMap<Party, KeyExpr<'static>>,
     _heard: Subscriber<()>,
     session: Session,
 }
@@ -158,20 +159,17 @@ impl Line {
         };
         let heard = session.declare_subscriber(key(me)).callback(took).wait();
         let heard = heard.map_err(|e| e.to_string())?;
-        Ok(Self { publishers: BTreeMap::new(), _heard: heard, session })
+        Ok(Self { keys: BTreeMap::new(), _heard: heard, session })
     }
 
     fn send(&mut self, to: Party, frame: &[u8]) {
-        if !self.publishers.contains_key(&to) {
-            let publisher = self.session.declare_publisher(key(to));
-            let publisher =
-                publisher.congestion_control(CongestionControl::Drop).express(true).wait();
-            // A key of letters and digits is always one; a closed session sends nothing.
-            let Ok(publisher) = publisher else { return };
-            self.publishers.insert(to, publisher);
-        }
+        let key = self.keys.entry(to).or_insert_with(|| {
+            KeyExpr::try_from(key(to)).expect("a path of letters and digits is a key")
+        });
+        // Not by a publisher: the first thing that one does in a client is to wait for the other end.
+        let put = self.session.put(&*key, frame);
         // Lost where it cannot be sent, as on the way.
-        let _ = self.publishers[&to].put(frame).wait();
+        let _ = put.congestion_control(CongestionControl::Drop).express(true).wait();
     }
 }
 

@@ -4,6 +4,7 @@ use crate::processes::{Program, folder, job};
 use crate::support::{alone, superconflict, wide};
 use sidestep_session::fleet::{Clock, FleetJob, Job, NodeJob, Told, Topology};
 use std::process::Command;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Two namespaces, each with an address.
 struct Machines {
@@ -19,7 +20,9 @@ fn ip(words: &[&str]) -> bool {
 impl Machines {
     /// Makes them; `None` where this user may not, with a printed reason.
     fn new() -> Option<Self> {
-        let names = ["a", "b"].map(|side| format!("sk{}{side}", std::process::id()));
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        let names = ["a", "b"].map(|side| format!("sk{}{side}{count}", std::process::id()));
         let made = Self { names };
         let [a, b] = made.names.each_ref().map(String::as_str);
         let is_made = ip(&["netns", "add", a])
