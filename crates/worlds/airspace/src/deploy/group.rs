@@ -1,6 +1,5 @@
 //! The pilots of a group, on a network in memory.
 
-use super::Deployment;
 use super::drive::drive;
 use super::faulty::Faulty;
 use crate::Turn;
