@@ -54,7 +54,8 @@ fn recorded(folder: &Path, until: u64) -> String {
         let now = journey.cycle();
         let run = airspace(&mut journey);
         let controls = decided(&mut pilots, run.sights());
-        let come = controls.into_iter().filter(|control| (now + u64::from(control.id)) % 6 != 0);
+        let come =
+            controls.into_iter().filter(|control| !(now + u64::from(control.id)).is_multiple_of(6));
         run.control(come.collect()).expect("what pilots decide");
         journey.advance_to(now + 1, &Unwatched).expect("there is room");
     }

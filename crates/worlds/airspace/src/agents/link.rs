@@ -12,6 +12,7 @@
 
 use super::network::Patience;
 use super::packet::{Draft, HEADER_BYTES};
+pub(crate) use super::party::Ended;
 use super::party::{Concludes, Outgoing, Party, Progress, Unsound};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -159,17 +160,6 @@ impl Other {
 /// Returns a message in the form in which it travels.
 pub(crate) fn bytes_of<M: Serialize>(message: &M) -> Vec<u8> {
     postcard::to_stdvec(message).expect("messages are plain data")
-}
-
-/// The end of a talk for one agent.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Ended<O> {
-    /// Its outcome, if it has one.
-    pub outcome: Option<O>,
-    /// The others, by place, that it has not heard in spite of asking.
-    pub unheard: Vec<usize>,
-    /// Whether time was up before it was done.
-    pub late: bool,
 }
 
 impl<A: Agent> Endpoint<A> {

@@ -32,9 +32,9 @@ pub mod sampling;
 mod talk;
 
 use contact::Beacon;
-pub use link::{Agent, Ended, Endpoint, Most, Radio};
+pub use link::{Agent, Endpoint, Most, Radio};
 pub use own_ship::{Briefing, Filed, OwnShip};
-pub use party::{Concludes, Outgoing, Party, Progress, Unsound};
+pub use party::{Concludes, Ended, Outgoing, Party, Progress, Unsound};
 use serde::{Deserialize, Serialize};
 pub use talk::{Frame, Talk};
 

@@ -7,10 +7,9 @@
 //!
 //! Bytes from a network may be anything. [`open`] lets through only those that another airplane of
 //! the same scenario and build has sent in this form, for a talk; the message itself is checked by
-//! the agent that takes it ([`Unsound`]). The checksum finds what was damaged on the way, not
+//! the agent that takes it ([`Unsound`](super::Unsound)). The checksum finds what was damaged on the way, not
 //! what was forged: who may send at all is the business of the network below.
 
-use super::party::Unsound;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
 
@@ -239,12 +238,6 @@ impl Refusal {
     }
 }
 
-impl From<Unsound> for Refusal {
-    fn from(why: Unsound) -> Self {
-        if why == Unsound::Form { Self::Unreadable } else { Self::Unsound }
-    }
-}
-
 /// Packets that were dropped, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Refused([u64; Refusal::ALL.len()]);
@@ -267,33 +260,63 @@ impl Refused {
 
 /// Returns a digest of two pieces of bytes, one after the other: fast, and no defense against forgery.
 pub(crate) fn digest(pieces: [&[u8]; 2]) -> u64 {
-    pieces.into_iter().fold(FACTOR, |sum, piece| mix(sum ^ digest_of(piece), piece.len() as u64))
+    let add = |sum: u64, piece: &[u8]| mix(sum ^ digest_of(piece), FACTOR ^ piece.len() as u64);
+    pieces.into_iter().fold(FACTOR, add)
 }
 
 const FACTOR: u64 = 0x9E37_79B9_7F4A_7C15;
+const OTHER_FACTOR: u64 = 0xC2B2_AE3D_27D4_EB4F;
 
-fn mix(sum: u64, word: u64) -> u64 {
-    let mixed = (sum ^ word).wrapping_mul(FACTOR);
-    mixed ^ (mixed >> 29)
+/// Returns both halves of a product as one.
+fn mix(a: u64, b: u64) -> u64 {
+    let product = u128::from(a) * u128::from(b);
+    product as u64 ^ (product >> 64) as u64
 }
 
-/// Returns a digest of some bytes. Four sums go side by side, because each word has to wait for the one before it.
+/// Returns a digest of some bytes. Four sums go side by side, because each product has to wait for the one before
+/// it.
 fn digest_of(bytes: &[u8]) -> u64 {
     const LANES: usize = 4;
-    let word = |bytes: &[u8; 8]| u64::from_le_bytes(*bytes);
-    let (words, rest) = bytes.as_chunks::<8>();
-    let (blocks, words) = words.as_chunks::<LANES>();
-    let mut sums = [1, 2, 3, 4].map(|lane: u64| lane.wrapping_mul(FACTOR));
+    let both = |sum: u64, bytes: &[u8; 16]| {
+        let (words, _) = bytes.as_chunks::<8>();
+        let [a, b] = [words[0], words[1]].map(u64::from_le_bytes);
+        mix(sum ^ a ^ FACTOR, b ^ OTHER_FACTOR)
+    };
+    let (pairs, rest) = bytes.as_chunks::<16>();
+    let (blocks, pairs) = pairs.as_chunks::<LANES>();
+    let mut sums: [u64; LANES] = [1, 2, 3, 4];
     for block in blocks {
-        sums = std::array::from_fn(|lane| mix(sums[lane], word(&block[lane])));
+        sums = std::array::from_fn(|lane| both(sums[lane], &block[lane]));
     }
-    let mut last = [0; 8];
+    let sum = sums.into_iter().fold(0, |sum, lane| mix(sum ^ FACTOR, lane ^ OTHER_FACTOR));
+    let mut last = [0; 16];
     last[..rest.len()].copy_from_slice(rest);
-    let sum = sums.into_iter().fold(0, mix);
-    mix(words.iter().fold(sum, |sum, bytes| mix(sum, word(bytes))), word(&last))
+    both(pairs.iter().fold(sum, both), &last)
 }
 
 /// Returns the digest of a scenario's text and seed.
 pub(crate) fn fingerprint(text: &str, seed: u64) -> u64 {
     digest([text.as_bytes(), &seed.to_le_bytes()])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whichever bit of a packet is turned, wherever it ends: the checksum finds it.
+    #[test]
+    fn a_packet_of_which_a_bit_was_turned_is_damaged() {
+        let talk = TalkId::new(7, Topic::Shield, &[1, 4, 9]);
+        let seal = Seal { fingerprint: 0x0123_4567_89AB_CDEF, talk, sender: 4, sequence: 3 };
+        for length in [0, 1, 7, 16, 63, 64, 65, 200] {
+            let message: Vec<u8> = (0..length).map(|k| (k * k) as u8).collect();
+            let packet = Draft::of_bytes(&message).sealed(&seal);
+            assert_eq!(open(&packet, seal.fingerprint), Ok((seal, &message[..])));
+            for bit in 0..8 * packet.len() {
+                let mut turned = packet.clone();
+                turned[bit / 8] ^= 1 << (bit % 8);
+                assert!(open(&turned, seal.fingerprint).is_err(), "bit {bit} of {length} bytes");
+            }
+        }
+    }
 }

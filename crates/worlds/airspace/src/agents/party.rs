@@ -1,8 +1,7 @@
 //! Parties to a talk: programs aboard that take messages and give messages, without a clock, a network, or
 //! the packets around what they say.
 
-use super::link::Ended;
-use super::packet::Draft;
+use super::packet::{Draft, Refusal};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
 
@@ -59,6 +58,17 @@ pub trait Concludes: Party {
     fn end(&mut self) -> Ended<Self::Outcome>;
 }
 
+/// The end of a talk for one agent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ended<O> {
+    /// Its outcome, if it has one.
+    pub outcome: Option<O>,
+    /// The others, by place, that it has not heard in spite of asking.
+    pub unheard: Vec<usize>,
+    /// Whether time was up before it was done.
+    pub late: bool,
+}
+
 /// A message on its way out.
 #[derive(Debug, Clone)]
 pub struct Outgoing {
@@ -101,5 +111,11 @@ impl Unsound {
     /// Returns `Ok` if something holds, or else this reason.
     pub(crate) fn unless(self, holds: bool) -> Result<(), Self> {
         if holds { Ok(()) } else { Err(self) }
+    }
+}
+
+impl From<Unsound> for Refusal {
+    fn from(why: Unsound) -> Self {
+        if why == Unsound::Form { Self::Unreadable } else { Self::Unsound }
     }
 }

@@ -1,9 +1,8 @@
 //! One talk, as one airplane takes part in it: a party, and the packets around what it says and hears.
 
-use super::link::Ended;
 use super::network::Traffic;
 use super::packet::{Packet, Refusal, Seal, TalkId};
-use super::party::{Concludes, Outgoing, Party, Progress};
+use super::party::{Concludes, Ended, Outgoing, Party, Progress};
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
 

@@ -1,25 +1,25 @@
 //! The pilot, as a state machine.
 
-use super::briefing::unheard;
-use super::control::{Control, Course, Memory, Optimized};
+mod conclude;
+mod turn;
+
+use super::control::{Control, Memory};
 use super::early::Early;
 use super::schedule::{Schedule, patience};
 use super::sight::Sight;
-use super::talks::{Came, Speaker, optimizes, proposes, tells};
-use crate::agents::contact::{Contacts, note};
-use crate::agents::exchange::Agreed;
-use crate::agents::intent::Intent;
+use super::talks::{Speaker, optimizes, proposes, tells};
+use crate::agents::contact::Contacts;
 use crate::agents::network::Traffic;
 use crate::agents::packet::{Packet, Refusal, Refused, TalkId, Topic, digest, open};
-use crate::agents::{Conclusion, Ended, Frame, Party, Progress, Radio, Talk};
+use crate::agents::{Frame, Party, Progress, Radio, Talk};
 use crate::avoid::Beset;
-use crate::decide::{Considered, Manner, alone, as_decided, by_velocity};
-use crate::events::{Event, EventKind};
+use crate::decide::{Considered, Manner};
 use crate::flight::Known;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::EntityId;
 use std::collections::VecDeque;
 use std::sync::Arc;
+use turn::{Stage, Stands, Turn};
 
 /// Number of ended talks of which questions are answered: those of two cycles.
 const PAST_TALKS: usize = 4;
@@ -37,29 +37,6 @@ pub struct Pilot {
     early: Early,
     out: Vec<Packet>,
     refused: Refused,
-}
-
-/// A cycle of one airplane.
-struct Turn {
-    sight: Sight,
-    schedule: Schedule,
-    members: Arc<[EntityId]>,
-    stage: Stage,
-    considered: Considered,
-    /// What it does, as far as that is decided.
-    control: Control,
-}
-
-/// The part of a cycle that an airplane is in.
-enum Stage {
-    /// In a talk about what each wants.
-    Deciding(Talk<Speaker>),
-    /// It knows what it wants, and waits until the shield's exchange starts.
-    Decided,
-    /// In the shield's exchange; the places of the ways that it has proposed, among all that it considers.
-    Shielding(Talk<Speaker>, Vec<usize>),
-    /// The control is there.
-    Over,
 }
 
 impl Pilot {
@@ -105,7 +82,7 @@ impl Pilot {
     /// Starts the talks of a cycle. What was not over of an earlier one is given up.
     ///
     /// # Panics
-    /// When the sight is that of another airplane.
+    /// When the sight is that of another airplane, or one that [`Sight::check`] refuses.
     pub fn begin(&mut self, sight: Sight, tick: u64) {
         let schedule = Schedule::from(tick, self.world.network.as_ref());
         self.begin_by(sight, schedule);
@@ -304,7 +281,8 @@ impl Pilot {
             group: members.clone(),
             me: sight.me(),
             patience: patience(world.network.as_ref(), topic),
-            ticks: ends - begins,
+            // A clock that has jumped may leave no time for it.
+            ticks: ends.saturating_sub(begins),
             is_silent,
         };
         let (me, members, fingerprint) = (self.id, members.clone(), self.fingerprint);
@@ -349,186 +327,6 @@ impl Pilot {
             self.past.pop_front();
         }
         self.past.push_back(talk.past());
-    }
-
-    /// Decides without a talk.
-    fn decide_alone(&mut self, manner: Manner, members: usize) {
-        let Some(turn) = &mut self.turn else { return };
-        let own = &turn.sight.own;
-        if manner == Manner::TooMany && turn.members.first() == Some(&self.id) {
-            let event = Event::of(turn.sight.cycle, EventKind::GroupTooLarge, self.id);
-            turn.control.events.push(event.with(members as f64));
-        }
-        let considered = alone(&self.world, own.known(), own.wish.as_ref());
-        self.is_decided(considered);
-    }
-
-    /// Notes what it wants; without the shield it flies that.
-    fn is_decided(&mut self, considered: Considered) {
-        let Some(turn) = &mut self.turn else { return };
-        turn.considered = considered;
-        turn.stage = Stage::Decided;
-        if !self.world.shield {
-            let way = turn.considered.ways.first().cloned().unwrap_or_default();
-            let side = turn.sight.own.fallback;
-            turn.control.course = Course::Way { wish: 0, way, side };
-            self.is_over();
-        }
-    }
-
-    fn is_over(&mut self) {
-        if let Some(turn) = &mut self.turn {
-            turn.stage = Stage::Over;
-            turn.control.memory = self.memory.clone();
-        }
-    }
-
-    /// Ends the talk that it is in, and draws the conclusion from it.
-    fn conclude(&mut self, ended: Ended<Came>) {
-        let Some(turn) = &mut self.turn else { return };
-        if self.world.network.is_some() {
-            turn.note_end(&self.world, &ended, &self.memory.contacts);
-        }
-        match std::mem::replace(&mut turn.stage, Stage::Decided) {
-            Stage::Deciding(talk) => {
-                self.keep_past(talk);
-                match ended.outcome {
-                    Some(Came::Told(told)) => self.react(&told),
-                    Some(Came::Decided(conclusion)) => self.is_optimized(Some(conclusion)),
-                    _ => self.is_optimized(None),
-                }
-            }
-            Stage::Shielding(talk, allowed) => {
-                self.keep_past(talk);
-                self.is_shielded(ended.outcome, &allowed);
-            }
-            Stage::Decided | Stage::Over => {}
-        }
-    }
-
-    /// Notes what has come of the shield's exchange, in which it has proposed the ways that were `allowed`.
-    fn is_shielded(&mut self, came: Option<Came>, allowed: &[usize]) {
-        let Some(turn) = &mut self.turn else { return };
-        self.memory.contacts = match came {
-            Some(Came::Agreed(Agreed { decision, held_back, contacts })) => {
-                if held_back {
-                    let event = Event::of(turn.sight.cycle, EventKind::HeldBack, self.id);
-                    turn.control.events.push(event);
-                }
-                turn.control.course = turn.considered.course(decision, allowed);
-                contacts
-            }
-            // Without an agreement it no longer knows where any other airplane is.
-            _ => Contacts::new(),
-        };
-        self.is_over();
-    }
-
-    /// Notes the outcome of an optimization; none if time was up before there was any.
-    fn is_optimized(&mut self, conclusion: Option<Conclusion>) {
-        let Some(turn) = &mut self.turn else { return };
-        let (decided, beacons) =
-            conclusion.map_or_else(Default::default, |came| (came.decided, came.beacons));
-        turn.control.optimized = Some(Optimized::of(decided.as_ref()));
-        if self.world.network.is_some() {
-            for (beacon, &id) in beacons.into_iter().zip(&*turn.members) {
-                if let Some(beacon) = beacon {
-                    note(&mut self.memory.contacts, id, beacon, turn.sight.cycle);
-                }
-            }
-        }
-        let considered = as_decided(&self.world, turn.sight.own.known(), decided);
-        self.is_decided(considered);
-    }
-
-    /// Finds the headings of all from what they have told; who has told nothing is taken to fly straight on.
-    fn react(&mut self, told: &[Option<Intent>]) {
-        let Some(turn) = &self.turn else { return };
-        let (mut group, mut memory, mut me) = (Vec::new(), Vec::new(), 0);
-        let mut intruders = turn.sight.intruders.clone();
-        for (one, intent) in turn.sight.group.iter().zip(told) {
-            let Some(intent) = intent else {
-                intruders.push(unheard(&self.world, one));
-                continue;
-            };
-            if one.id == self.id {
-                me = group.len();
-            }
-            let &Intent { next, orders, altitude_m, .. } = intent;
-            let next = next as usize;
-            group.push(Known { slot: one.id, pose: one.pose, next, orders, altitude_m });
-            memory.push(intent.resolving.clone());
-        }
-        let mut all = by_velocity(&self.world, &group, &intruders, &mut memory);
-        if self.world.is_resolving() {
-            self.memory.resolving = memory.swap_remove(me);
-        }
-        self.is_decided(all.swap_remove(me));
-    }
-}
-
-/// The place of a talk beside those of a cycle.
-enum Stands {
-    /// It comes later.
-    Before,
-    /// It comes so much later that nobody can be there.
-    FarBefore,
-    /// It is of the same cycle and subject, and of other members.
-    Beside,
-    /// It is over.
-    Beyond,
-}
-
-impl Turn {
-    /// Returns the talk that it is in.
-    fn talk(&mut self) -> Option<&mut Talk<Speaker>> {
-        match &mut self.stage {
-            Stage::Deciding(talk) | Stage::Shielding(talk, _) => Some(talk),
-            Stage::Decided | Stage::Over => None,
-        }
-    }
-
-    /// Returns where a talk stands that is none of those that it has been in.
-    fn stands_at(&self, talk: &TalkId) -> Stands {
-        let topic = match self.stage {
-            Stage::Deciding(_) | Stage::Decided => Topic::Decision,
-            Stage::Shielding(..) | Stage::Over => Topic::Shield,
-        };
-        let here = TalkId { topic, ..TalkId::new(self.sight.cycle, topic, &self.members) };
-        // Nobody begins a cycle before all have ended the one before it.
-        let last = self.sight.cycle.saturating_add(1);
-        match () {
-            () if talk.cycle > last => Stands::FarBefore,
-            () if here.is_before(talk) => Stands::Before,
-            () if (talk.cycle, talk.topic) == (here.cycle, here.topic) => Stands::Beside,
-            () => Stands::Beyond,
-        }
-    }
-
-    /// Notes the packets of the talk that it is in, and the time that it took.
-    fn note_traffic(&mut self, ticks: u64) {
-        let (traffic, noted) = match &self.stage {
-            Stage::Deciding(talk) => (talk.traffic(), &mut self.control.deciding),
-            Stage::Shielding(talk, _) => (talk.traffic(), &mut self.control.shielding),
-            Stage::Decided | Stage::Over => return,
-        };
-        *noted = Traffic { ticks, ..traffic };
-    }
-
-    /// Notes how a talk has ended, and which others it no longer hears.
-    fn note_end(&mut self, world: &AirspaceWorld, end: &Ended<Came>, contacts: &Contacts) {
-        let (id, now) = (self.sight.own.id, self.sight.cycle);
-        let heard_in = |other: &EntityId| match contacts.get(other) {
-            Some(contact) => contact.heard_in,
-            None => world.appears_in(*other as usize),
-        };
-        let unheard = end.unheard.iter().map(|&place| self.members[place]);
-        let lost = unheard.filter(|other| heard_in(other) + 1 >= now);
-        let events = &mut self.control.events;
-        events.extend(lost.map(|other| Event::of_pair(now, EventKind::Unheard, id, other)));
-        if end.late {
-            events.push(Event::of(now, EventKind::Deadline, id));
-        }
     }
 }
 

@@ -163,7 +163,9 @@ impl AirspaceWorld {
             return Err(format!("its way has {found} turn rates; give {steps}, one for each step"));
         }
         let most_rad_s = self.stage(own.id, own.orders).model.omega_max_rad_s;
-        if let Some(omega) = omegas_rad_s.iter().find(|omega| !(omega.abs() <= most_rad_s)) {
+        // Nothing compares with what is no number.
+        let is_within = |omega: &&f64| omega.abs() <= most_rad_s;
+        if let Some(omega) = omegas_rad_s.iter().find(|omega| !is_within(omega)) {
             return Err(format!(
                 "a turn rate of {omega} rad/s; give {} to {most_rad_s}",
                 -most_rad_s

@@ -1,6 +1,7 @@
 //! What an airplane perceives at the start of a cycle.
 
 use crate::Turn;
+use crate::agents::Unsound;
 use crate::flight::{Known, Levels, Pose, Stage, distance_m};
 use crate::intruder::Intruder;
 use crate::perceive::seen;
@@ -179,6 +180,24 @@ impl Sight {
             intruders: intruders.to_vec(),
         };
         flown.iter().map(one).collect()
+    }
+
+    /// Checks a sight that came off a network: that it is about airplanes of the world, its own among them.
+    ///
+    /// # Errors
+    /// When it is not.
+    pub fn check(&self, world: &AirspaceWorld) -> Result<(), Unsound> {
+        let n = world.airplanes.len();
+        let Own { id, orders, ref named, .. } = self.own;
+        let others = self.intruders.iter().map(|one| one.slot).chain(named.iter().copied());
+        let are_known = self.members().into_iter().chain(others).all(|id| (id as usize) < n);
+        let rises = self.group.windows(2).all(|pair| pair[0].id < pair[1].id);
+        let is_among = self.group.iter().any(|one| one.id == id);
+        Unsound::Airplane.unless(are_known && rises && is_among)?;
+        Unsound::Plan.unless(orders as usize <= world.airplanes[id as usize].orders.len())?;
+        let seen =
+            self.group.iter().flat_map(|one| [one.pose.at[0], one.pose.at[1], one.altitude_m]);
+        Unsound::Number.unless(seen.into_iter().all(f64::is_finite))
     }
 
     /// Returns the ids of those who decide together, rising.

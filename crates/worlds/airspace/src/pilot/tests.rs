@@ -80,8 +80,11 @@ fn a_sight_holds_nothing_of_others_that_cannot_be_seen() {
     let (world, now) = (run.world().clone(), run.cycle());
     let sights = run.sights();
     assert_eq!(sights.len(), 5);
+    assert!(sights.iter().all(|sight| sight.check(&world).is_ok()));
+    let lost = Sight { group: sights[0].group[1..].to_vec(), ..sights[0].clone() };
+    assert_eq!(lost.check(&world), Err(crate::agents::Unsound::Airplane), "it is not in its group");
     let mut hidden = 0;
-    for own in 0..5 {
+    for (own, sight) in sights.iter().enumerate() {
         let mut snapshot = run.state().snapshot(now);
         for (id, airplane) in snapshot.airplanes.iter_mut().enumerate().filter(|(id, _)| *id != own)
         {
@@ -95,7 +98,7 @@ fn a_sight_holds_nothing_of_others_that_cannot_be_seen() {
             snapshot.resolving[id] = crate::baseline::mvp::Resolving::default();
         }
         let changed = crate::state::AirspaceState::restore(&world, &snapshot);
-        assert_eq!(world.sights(&changed, now)[own], sights[own], "airplane {own}");
+        assert_eq!(world.sights(&changed, now)[own], *sight, "airplane {own}");
     }
     assert!(hidden > 10, "{hidden}");
 }

@@ -82,7 +82,7 @@ fn what_was_ordered_from_outside_is_in_the_sight() {
     use crate::wish::Wish;
     use sidestep_kernel::control::Orders;
     let order = |run: &mut AirspaceRun| {
-        let turn = if run.cycle() % 2 == 0 { 0.03 } else { -0.02 };
+        let turn = if run.cycle().is_multiple_of(2) { 0.03 } else { -0.02 };
         let orders = Orders { order: Wish::TURN_RATE, agents: &[0, 2], values: &[turn, -turn] };
         run.order(&orders).expect("right");
     };
@@ -112,7 +112,7 @@ fn everybody_filters_as_one_process_does_to_the_bit() {
 
 /// Drops some controls, by cycle and id.
 fn with_gaps(run: &AirspaceRun, controls: Vec<Control>) -> Vec<Control> {
-    let is_lost = |id: EntityId| (u64::from(id) * 5 + run.cycle() * 3) % 7 == 0;
+    let is_lost = |id: EntityId| (u64::from(id) * 5 + run.cycle() * 3).is_multiple_of(7);
     let silent = run.cycle() == 4;
     controls.into_iter().filter(|control| !silent && !is_lost(control.id)).collect()
 }

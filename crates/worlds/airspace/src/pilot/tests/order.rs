@@ -7,7 +7,7 @@ use sidestep_kernel::stream::{Draws, Purpose, Streams};
 
 /// Something that a pilot has yet to learn.
 enum Due {
-    Sight(Sight),
+    Sight(Box<Sight>),
     Packet(EntityId, Vec<u8>),
 }
 
@@ -16,12 +16,12 @@ enum Due {
 fn decided(pilots: &mut [Pilot], sights: Vec<Sight>, draws: &mut Draws) -> Vec<Control> {
     let ids: Vec<EntityId> = sights.iter().map(|sight| sight.own.id).collect();
     let mut due: Vec<(EntityId, Due)> =
-        sights.into_iter().map(|sight| (sight.own.id, Due::Sight(sight))).collect();
+        sights.into_iter().map(|sight| (sight.own.id, Due::Sight(Box::new(sight)))).collect();
     while !due.is_empty() {
         let (id, next) = due.swap_remove(draws.below(due.len() as u32) as usize);
         let pilot = &mut pilots[id as usize];
         match next {
-            Due::Sight(sight) => pilot.begin(sight, 0),
+            Due::Sight(sight) => pilot.begin(*sight, 0),
             Due::Packet(from, bytes) => pilot.on_packet(from, &bytes, 0),
         }
         for Packet { to, payload, .. } in pilot.take_packets() {

@@ -1,0 +1,108 @@
+//! A cycle of one airplane, as far as it has come.
+
+use crate::agents::contact::Contacts;
+use crate::agents::network::Traffic;
+use crate::agents::packet::{TalkId, Topic};
+use crate::agents::{Ended, Talk};
+use crate::decide::Considered;
+use crate::events::{Event, EventKind};
+use crate::pilot::control::Control;
+use crate::pilot::schedule::Schedule;
+use crate::pilot::sight::Sight;
+use crate::pilot::talks::{Came, Speaker};
+use crate::world::AirspaceWorld;
+use sidestep_kernel::EntityId;
+use std::sync::Arc;
+
+/// A cycle of one airplane.
+pub(super) struct Turn {
+    pub(super) sight: Sight,
+    pub(super) schedule: Schedule,
+    pub(super) members: Arc<[EntityId]>,
+    pub(super) stage: Stage,
+    pub(super) considered: Considered,
+    /// What it does, as far as that is decided.
+    pub(super) control: Control,
+}
+
+/// The part of a cycle that an airplane is in.
+pub(super) enum Stage {
+    /// In a talk about what each wants.
+    Deciding(Talk<Speaker>),
+    /// It knows what it wants, and waits until the shield's exchange starts.
+    Decided,
+    /// In the shield's exchange; the places of the ways that it has proposed, among all that it considers.
+    Shielding(Talk<Speaker>, Vec<usize>),
+    /// The control is there.
+    Over,
+}
+
+/// The place of a talk beside those of a cycle.
+pub(super) enum Stands {
+    /// It comes later.
+    Before,
+    /// It comes so much later that nobody can be there.
+    FarBefore,
+    /// It is of the same cycle and subject, and of other members.
+    Beside,
+    /// It is over.
+    Beyond,
+}
+
+impl Turn {
+    /// Returns the talk that it is in.
+    pub(super) fn talk(&mut self) -> Option<&mut Talk<Speaker>> {
+        match &mut self.stage {
+            Stage::Deciding(talk) | Stage::Shielding(talk, _) => Some(talk),
+            Stage::Decided | Stage::Over => None,
+        }
+    }
+
+    /// Returns where a talk stands that is none of those that it has been in.
+    pub(super) fn stands_at(&self, talk: &TalkId) -> Stands {
+        let topic = match self.stage {
+            Stage::Deciding(_) | Stage::Decided => Topic::Decision,
+            Stage::Shielding(..) | Stage::Over => Topic::Shield,
+        };
+        let here = TalkId { topic, ..TalkId::new(self.sight.cycle, topic, &self.members) };
+        // Nobody begins a cycle before all have ended the one before it.
+        let last = self.sight.cycle.saturating_add(1);
+        match () {
+            () if talk.cycle > last => Stands::FarBefore,
+            () if here.is_before(talk) => Stands::Before,
+            () if (talk.cycle, talk.topic) == (here.cycle, here.topic) => Stands::Beside,
+            () => Stands::Beyond,
+        }
+    }
+
+    /// Notes the packets of the talk that it is in, and the time that it took.
+    pub(super) fn note_traffic(&mut self, ticks: u64) {
+        let (traffic, noted) = match &self.stage {
+            Stage::Deciding(talk) => (talk.traffic(), &mut self.control.deciding),
+            Stage::Shielding(talk, _) => (talk.traffic(), &mut self.control.shielding),
+            Stage::Decided | Stage::Over => return,
+        };
+        *noted = Traffic { ticks, ..traffic };
+    }
+
+    /// Notes how a talk has ended, and which others it no longer hears.
+    pub(super) fn note_end(
+        &mut self,
+        world: &AirspaceWorld,
+        end: &Ended<Came>,
+        contacts: &Contacts,
+    ) {
+        let (id, now) = (self.sight.own.id, self.sight.cycle);
+        let heard_in = |other: &EntityId| match contacts.get(other) {
+            Some(contact) => contact.heard_in,
+            None => world.appears_in(*other as usize),
+        };
+        let unheard = end.unheard.iter().map(|&place| self.members[place]);
+        let lost = unheard.filter(|other| heard_in(other) + 1 >= now);
+        let events = &mut self.control.events;
+        events.extend(lost.map(|other| Event::of_pair(now, EventKind::Unheard, id, other)));
+        if end.late {
+            events.push(Event::of(now, EventKind::Deadline, id));
+        }
+    }
+}
