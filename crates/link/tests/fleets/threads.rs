@@ -6,6 +6,7 @@ use sidestep_link::wire::memory::Exchange;
 use sidestep_link::wire::zenoh::{ZenohWire, hold};
 use sidestep_link::wire::{Party, Wire};
 use sidestep_link::words::{Clock, Topology};
+use std::time::Duration;
 
 /// Deployments in which each airplane has a program of its own.
 const DEPLOYMENTS: [&str; 4] = ["team", "compact-team", "pim", "hierarchical-pim"];
@@ -81,7 +82,7 @@ fn sockets_come_out_as_one_process_does_in_a_mesh_and_in_a_star() {
             let held = ports.get(agent as usize).map(|port| hold(port).expect("free"));
             Box::new(wire.listening(held.into_iter().collect()))
         };
-        let (clock, lease) = (Clock::Lockstep, LONG);
+        let (clock, lease) = (Clock::Lockstep, Duration::from_secs(10));
         let way = Way {
             clock,
             topology,
