@@ -154,6 +154,7 @@ impl Program for Aboard {
         if (percept.own.id, percept.cycle) != (self.pilot.id(), cycle) {
             return Err("it is of another airplane, or of another cycle".into());
         }
+        percept.check(&self.world).map_err(|why| format!("it cannot be: {why:?}"))?;
         self.heard_before = std::mem::take(&mut self.heard);
         let tick = self.world.first_tick(cycle);
         self.pilot.begin(percept, tick);
