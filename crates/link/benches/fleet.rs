@@ -1,4 +1,4 @@
-//! The costs of a fleet: a round of a team, a whole super-conflict beside one process, memory and bytes of nodes.
+//! Benchmarks of fleets: a round of a team, a whole super-conflict beside one process, memory and bytes of nodes.
 //!
 //! Percentiles, and ratios within one run: `cargo bench -p sidestep-link`. Words choose: `round`, `conflict`, `nodes`.
 

@@ -25,7 +25,7 @@ Examples:
 On a cluster (docs/src/clusters.md has a Slurm array and a Kubernetes job):
   sidestep sweep plan methods.toml --out sweeps/methods
   sidestep sweep run sweeps/methods --shard 0/8   and so on to 7/8
-  sidestep sweep status sweeps/methods            how far it is; for any sweep with a folder
+  sidestep sweep status sweeps/methods            how far it is
   sidestep sweep collect sweeps/methods
 
 A sweep file is TOML: format = 1, scenario = \"FILE\", replicates, [set], [vary], [[variant]], \

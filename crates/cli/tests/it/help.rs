@@ -12,7 +12,7 @@ fn every_command_has_help_with_examples() {
         let help = place.run(&[command, "--help"]);
         assert_eq!(help.code(), 0);
         let examples = help.out().matches(&format!("sidestep {command} ")).count();
-        assert!((2..=9).contains(&examples), "{command}: {}", help.out());
+        assert!((2..=10).contains(&examples), "{command}: {}", help.out());
     }
     for words in [["learn", "sensor"], ["learn", "effector"], ["reproduce", "loria"]] {
         let help = place.run(&[words[0], words[1], "--help"]).out();

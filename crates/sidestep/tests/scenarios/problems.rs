@@ -63,7 +63,9 @@ impl Mistakes<'_> {
                 continue;
             }
             let is_dotted = self.text[name.span().end..].starts_with('.');
-            if !has_names && !is_dotted && !self.is_header(value) {
+            // Without it space is a plane, for which other values are wrong, too.
+            let makes_a_plane = key == ["chain", "dimensions"];
+            if !has_names && !is_dotted && !makes_a_plane && !self.is_header(value) {
                 let misspelled = format!("{}_", name.get_ref());
                 let at = [way, std::slice::from_ref(&misspelled)].concat();
                 self.add(&at, "a misspelled key", name.span(), misspelled.clone());

@@ -125,7 +125,7 @@ fn arms_of_joints_have_the_same_bits_however_they_are_run() {
              targets_m = [{target}]\nplans_after_s = 0.1\n"
         )
     };
-    let pillar = "[[obstacles]]\nends_m = [[0.45, 0.0, 0.0], [0.45, 0.0, 0.7]]\nradius_m = 0.06\n";
+    let pillar = "[[obstacles]]\nends_m = [[0.45, 0.0, 0.0], [0.45, 0.0, 0.5]]\nradius_m = 0.06\n";
     let text = format!(
         "[chain]\ndimensions = 3\n{pillar}{}{}",
         arm("[0.0, 0.0, 0.0]", "[0.4, 0.35, 0.45], [0.4, -0.35, 0.45]"),
