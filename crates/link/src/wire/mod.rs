@@ -1,6 +1,6 @@
 //! The wire: frames from one party of a fleet to another, of which some may be lost.
 //!
-//! Everything that must arrive is numbered, acknowledged and repeated above it ([`crate::post`]).
+//! Everything that must arrive is numbered, acknowledged and repeated above it (`post.rs`).
 
 pub mod board;
 pub mod memory;

@@ -63,9 +63,7 @@ impl Mistakes<'_> {
                 continue;
             }
             let is_dotted = self.text[name.span().end..].starts_with('.');
-            // Without it space is a plane, for which other values are wrong, too.
-            let makes_a_plane = key == ["chain", "dimensions"];
-            if !has_names && !is_dotted && !makes_a_plane && !self.is_header(value) {
+            if !has_names && !is_dotted && !self.is_header(value) {
                 let misspelled = format!("{}_", name.get_ref());
                 let at = [way, std::slice::from_ref(&misspelled)].concat();
                 self.add(&at, "a misspelled key", name.span(), misspelled.clone());
@@ -194,7 +192,13 @@ fn are_independent(a: &Mistake, b: &Mistake) -> bool {
 fn some_of(all: &[Mistake], count: usize, start: usize) -> Vec<&Mistake> {
     let stride = if all.len().is_multiple_of(17) { 19 } else { 17 };
     let mut chosen: Vec<&Mistake> = Vec::new();
-    for one in (0..all.len()).map(|i| &all[(start + stride * i) % all.len()]) {
+    // Without its dimensions a chain's places are read as those of the plane, so every other one is wrong too.
+    let rules_others = |one: &Mistake| {
+        let parts: Vec<&str> = one.key.iter().map(|part| part.trim_end_matches('_')).collect();
+        parts == ["chain", "dimensions"]
+    };
+    let in_turn = (0..all.len()).map(|i| &all[(start + stride * i) % all.len()]);
+    for one in in_turn.filter(|one| !rules_others(one)) {
         if chosen.len() < count && chosen.iter().all(|other| are_independent(other, one)) {
             chosen.push(one);
         }
