@@ -78,7 +78,7 @@ fn what_cannot_be_read_and_who_is_no_neighbor_is_counted_and_dropped() {
     assert_eq!(agent.control().expect("time is up").traffic.dropped, 5);
 }
 
-/// Who asks without end, and packets of cycles to come, take no memory without end.
+/// Floods of questions, and packets of cycles to come, take a bounded room.
 #[test]
 fn a_flood_takes_a_bounded_room() {
     let mut agent = agents().remove(4);
