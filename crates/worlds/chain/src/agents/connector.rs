@@ -1,4 +1,4 @@
-//! The agent of one connector: its identity, its links, its clock, and the end of its cycle.
+//! The agent of one connector: its identity, its links, and the part it plays in a cycle.
 
 mod climb;
 mod clock;
@@ -52,7 +52,7 @@ pub struct ConnectorAgent<const D: usize> {
     beside: Both<Option<Track<D>>>,
     links: Both<Option<Link<Message<D>>>>,
     missing: Both<Option<u32>>,
-    /// Packets of cycles that have not begun here yet.
+    /// Packets of a cycle that has not begun here yet.
     held: Vec<(Side, Packet<D>)>,
     following: Option<Following>,
     leading: Option<Leading<D>>,
@@ -246,10 +246,10 @@ impl<const D: usize> ConnectorAgent<D> {
     fn take_held(&mut self, cycle: Cycle) {
         let held = std::mem::take(&mut self.held);
         for (side, packet) in held {
-            match packet.cycle.cmp(&cycle) {
-                std::cmp::Ordering::Less => {}
-                std::cmp::Ordering::Equal => self.take(side, packet),
-                std::cmp::Ordering::Greater => self.held.push((side, packet)),
+            match packet.cycle.checked_sub(cycle) {
+                Some(0) => self.take(side, packet),
+                Some(1) => self.held.push((side, packet)),
+                _ => {}
             }
         }
     }
@@ -265,10 +265,11 @@ impl<const D: usize> ConnectorAgent<D> {
             self.traffic.dropped += 1;
             return;
         };
-        match self.cycle {
-            Some(cycle) if packet.cycle == cycle => self.take(side, packet),
-            Some(cycle) if packet.cycle < cycle => {}
-            _ if self.held.len() < MOST_HELD => self.held.push((side, packet)),
+        // Of later cycles only the next one may have begun elsewhere.
+        match self.cycle.map(|cycle| packet.cycle.checked_sub(cycle)) {
+            Some(Some(0)) => self.take(side, packet),
+            Some(None) => {}
+            None | Some(Some(1)) if self.held.len() < MOST_HELD => self.held.push((side, packet)),
             _ => self.traffic.dropped += 1,
         }
     }

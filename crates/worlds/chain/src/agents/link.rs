@@ -11,6 +11,9 @@ use std::collections::{BTreeMap, VecDeque};
 
 /// Most messages that are kept because an earlier one is missing.
 const MOST_EARLY: u32 = 256;
+/// Most messages that wait for a confirmation: far more than agents say that do not lie. Who makes an
+/// agent say more is no longer answered in the cycle.
+const MOST_SAID: usize = 4096;
 
 /// One end of a link, for the time of a cycle.
 #[derive(Debug, Clone)]
@@ -73,7 +76,9 @@ impl<M: Clone> Link<M> {
 
     /// Says something, which the next parcel carries.
     pub(super) fn say(&mut self, message: M) {
-        self.said.push_back(message);
+        if self.said.len() < MOST_SAID {
+            self.said.push_back(message);
+        }
     }
 
     /// Takes a parcel; returns the messages that are new, in order.

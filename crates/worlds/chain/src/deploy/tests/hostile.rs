@@ -78,6 +78,30 @@ fn what_cannot_be_read_and_who_is_no_neighbor_is_counted_and_dropped() {
     assert_eq!(agent.control().expect("time is up").traffic.dropped, 5);
 }
 
+/// Floods of questions, and packets of cycles to come, take a bounded room.
+#[test]
+fn a_flood_takes_a_bounded_room() {
+    let mut agent = agents().remove(4);
+    let neighbor = agents().remove(3).id();
+    agent.begin(shown([-0.8, 0.6]).remove(4), 0).expect("a sight");
+    let flood = |k: u32| {
+        let mut bytes = vec![1, 5, 0];
+        bytes.extend(postcard::to_stdvec(&(3 * k, 0u32)).expect("numbers"));
+        // Three times "Where are you?", never a confirmation.
+        bytes.extend([3, 5, 5, 5]);
+        bytes
+    };
+    for k in 0..10_000 {
+        agent.on_packet(neighbor, &flood(k), 1);
+        agent.on_packet(neighbor, &[1, 9, 0, 0, 0, 0], 1);
+    }
+    let sent: usize = agent.take_packets().iter().map(|out| out.payload.len()).sum();
+    assert!((1000..500_000).contains(&sent), "{sent} bytes");
+    assert!(agent.control().is_none(), "its time is not up");
+    agent.on_timer(1_000_000);
+    assert_eq!(agent.control().expect("time is up").traffic.dropped, 10_000);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
     #[test]
