@@ -60,8 +60,11 @@ pub struct Node {
     status: Status,
     report_at: Instant,
     /// Told how the node is, as often as the server.
-    looks: Box<dyn FnMut(EntityId, &Status)>,
+    looks: Box<Onlooker>,
 }
+
+/// Somebody who is told how a node is.
+type Onlooker = dyn FnMut(EntityId, &Status);
 
 impl Node {
     /// Returns a node of an agent that may join, with its program and the faults of what it sends.
@@ -105,11 +108,10 @@ impl Node {
             let wait = self.turn.as_ref().and_then(|turn| turn.wait(self.program.as_ref()));
             let heard = self.mail.receive(wait.unwrap_or(LOOK).min(LOOK));
             let is_quiet = heard.is_none();
-            if let Some(heard) = heard {
-                if self.hear(heard)? {
-                    self.leave();
-                    return Ok(self.status);
-                }
+            let has_ended = heard.map_or(Ok(false), |heard| self.hear(heard))?;
+            if has_ended {
+                self.leave();
+                return Ok(self.status);
             }
             self.go_on();
             self.report();
@@ -196,12 +198,12 @@ impl Node {
         match &mut self.turn {
             Some(turn) if packet.cycle == turn.cycle() => turn.on_packet(from, packet),
             // Another node may have heard of the cycle before this one.
-            turn if turn.as_ref().is_none_or(|turn| packet.cycle > turn.cycle()) => {
-                if self.early.len() < MOST_EARLY {
-                    self.early.push((from, packet));
-                }
+            turn if turn.as_ref().is_none_or(|turn| packet.cycle > turn.cycle())
+                && self.early.len() < MOST_EARLY =>
+            {
+                self.early.push((from, packet));
             }
-            // Of a talk that is over.
+            // Of a talk that is over, or of more to come than there is room for.
             _ => {}
         }
     }
