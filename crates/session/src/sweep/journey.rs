@@ -473,7 +473,7 @@ mod tests {
         let value = if cell.id == 555 { json!(0.5) } else { json!(cell.id) };
         let mut metrics = serde_json::Map::from_iter([("wide".to_string(), value)]);
         if cell.id > 400 {
-            metrics.insert("late".into(), json!(cell.id % 3 == 0));
+            metrics.insert("late".into(), json!(cell.id.is_multiple_of(3)));
         }
         let costs = serde_json::Map::from_iter([("run_wall_s".to_string(), json!(0.25))]);
         let (digest, failure) = (format!("end {}", cell.id), None);
