@@ -80,7 +80,7 @@ mod tests {
                 picks.iter().map(|(k, v)| format!("{}={}", KEYS[*k], VALUES[*v])).collect();
             let together = Source::new("s.toml", text, "").with(&overrides);
             let first = Ok(Source::new("s.toml", text, ""));
-            let one_by_one = overrides.iter().fold(first, |source: Result<Source, _>, o| source?.with(std::slice::from_ref(&o)));
+            let one_by_one = overrides.iter().fold(first, |source: Result<Source, _>, o| source?.with(std::slice::from_ref(o)));
             match (together, one_by_one) {
                 (Ok(a), Ok(b)) => prop_assert_eq!(a.text, b.text),
                 (a, b) => prop_assert_eq!(a.is_err(), b.is_err()),
