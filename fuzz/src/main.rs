@@ -33,7 +33,7 @@ use std::sync::{Arc, LazyLock};
 /// A reader of text or bytes, by its name. A folder of the same name in `seeds` has inputs to begin with.
 type Target = (&'static str, fn(&[u8]));
 
-const TARGETS: [Target; 30] = [
+const TARGETS: &[Target] = &[
     ("scenario", |data| text(data, scenario)),
     ("override", |data| text(data, overridden)),
     ("edit", |data| text(data, edited)),
