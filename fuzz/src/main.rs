@@ -71,8 +71,8 @@ fuzz_target!(|data: &[u8]| (CHOSEN.1)(data));
 
 static CHOSEN: LazyLock<Target> = LazyLock::new(|| {
     let name = std::env::var("SIDESTEP_FUZZ").unwrap_or_default();
-    let names = TARGETS.map(|(name, _)| name).join(", ");
-    let chosen = TARGETS.into_iter().find(|(own, _)| *own == name);
+    let names = TARGETS.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+    let chosen = TARGETS.iter().copied().find(|(own, _)| *own == name);
     chosen.unwrap_or_else(|| panic!("SIDESTEP_FUZZ is one of {names}"))
 });
 
