@@ -1,22 +1,56 @@
-//! `cargo xtask test`: every test of the workspace in the profile `release`, so that the program and
-//! its tests share all that cargo compiles.
+//! `cargo xtask test`: every test of the workspace, in two builds that share all that others wrote.
+//!
+//! Tests beside the code run with overflow checks and debug assertions on, in a build that is quick to make.
+//! Tests from outside (`tests/`: promises, the program itself) run against what is shipped, so that the
+//! program and its tests share all that cargo compiles.
 
 use crate::arguments::house;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::{Command, ExitCode, Stdio};
 
+/// Settings of the build with checks, as environment of cargo. They are no profile of their own: that would
+/// compile the dependencies again. A low level of optimization changes no bit of a result.
+const CHECKS: [(&str, &str); 3] = [
+    ("CARGO_PROFILE_RELEASE_OVERFLOW_CHECKS", "true"),
+    ("CARGO_PROFILE_RELEASE_DEBUG_ASSERTIONS", "true"),
+    ("CARGO_PROFILE_RELEASE_OPT_LEVEL", "1"),
+];
+
+/// A part of the tests, compiled in one way.
+struct Part {
+    /// Targets of cargo.
+    targets: &'static [&'static str],
+    environment: &'static [(&'static str, &'static str)],
+}
+
+/// Tests beside the code, and the promises of the library, whose golden digests hold with checks as well.
+const BESIDE: Part = Part { targets: &["--lib", "--bins", "--test", "promises"], environment: &CHECKS };
+
+/// Tests from outside. Examples are compiled, so that none falls behind.
+const OUTSIDE: Part = Part { targets: &["--test", "*", "--examples"], environment: &[] };
+
+/// Examples in the documentation.
+const EXAMPLES: Part = Part { targets: &["--doc"], environment: &[] };
+
+/// All of one package, as it is shipped: not every package has each sort of target.
+const ONE_PACKAGE: Part = Part { targets: &[], environment: &[] };
+
 /// Runs the tests by nextest where it is installed, else by `cargo test`. `chosen` is handed to it: a
 /// filter, for example. Nextest does not know the examples in the documentation; they follow it
-/// when nothing was chosen.
+/// when nothing was chosen. With `--no-run`, everything is compiled only.
 pub(crate) fn run(chosen: &[String]) -> ExitCode {
     let skipped = Skipped::new();
-    let passed = if has_nextest() {
-        cargo(&["nextest", "run"], chosen) && (!chosen.is_empty() || cargo(&["test", "--doc"], &[]))
+    let runner: &[&str] = if has_nextest() {
+        &["nextest", "run", "--no-tests", "pass"]
     } else {
         eprintln!("nextest is not installed: `cargo test` runs one test program after the other");
-        cargo(&["test", "--no-fail-fast"], chosen)
+        &["test", "--no-fail-fast"]
     };
+    let parts = if names_a_package(chosen) { &[ONE_PACKAGE][..] } else { &[BESIDE, OUTSIDE] };
+    // All are run, whatever the first come to: whoever mends wants to see every failure.
+    let failed = parts.iter().filter(|part| !cargo(runner, part, chosen)).count();
+    let passed = failed == 0 && (!chosen.is_empty() || cargo(&["test"], &EXAMPLES, &[]));
     skipped.tell();
     if passed { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
@@ -55,12 +89,16 @@ fn has_nextest() -> bool {
     asked.is_ok_and(|status| status.success())
 }
 
+fn names_a_package(words: &[String]) -> bool {
+    words.iter().any(|word| word.starts_with("-p") || word.starts_with("--package"))
+}
+
 /// Returns whether the command succeeded, in the whole workspace unless `more` names a package.
-fn cargo(words: &[&str], more: &[String]) -> bool {
+fn cargo(words: &[&str], part: &Part, more: &[String]) -> bool {
     let mut cargo = command(words);
-    let is_chosen = more.iter().any(|word| word.starts_with("-p") || word.starts_with("--package"));
     cargo.env("SIDESTEP_SKIPPED", house().join("target/skipped-tests"));
-    cargo.arg("--release").args((!is_chosen).then_some("--workspace")).args(more);
+    cargo.envs(part.environment.iter().copied()).arg("--release").args(part.targets);
+    cargo.args((!names_a_package(more)).then_some("--workspace")).args(more);
     cargo.status().is_ok_and(|status| status.success())
 }
 

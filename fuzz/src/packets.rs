@@ -1,0 +1,123 @@
+//! Agents of the worlds, to whom packets come that nobody checked.
+
+use sidestep::scenario::Source;
+use sidestep::worlds::airspace::agents::contact::Contacts;
+use sidestep::worlds::airspace::agents::packet::{Draft, open};
+use sidestep::worlds::airspace::pilot::{Fleet, Packet, Pilot, Sight};
+use sidestep::worlds::airspace::{AirspaceWorld, airspace_run};
+use sidestep::worlds::chain::ChainState;
+use sidestep::worlds::chain::agents::ConnectorAgent;
+use sidestep::worlds::chain::scenario::Compiled;
+use std::collections::VecDeque;
+use std::sync::{Arc, LazyLock};
+
+/// Hands packets to the agent of a connector in the middle of a chain: each begins with its sender and its
+/// length. Whatever they are, the agent comes to a decision once time is up.
+pub(crate) fn to_a_connector(mut data: &[u8]) {
+    static TEAM: LazyLock<Compiled<2>> = LazyLock::new(|| {
+        let text = "format = 1\nworld = \"chain\"\n[chain]\nself_collision = false\nbacktracks = 0\n\
+                    deployment = \"team\"\nnetwork = { loss = 0.1 }\n[[obstacles]]\nat_m = [0.5, 0.3]\n\
+                    radius_m = 0.2\n[[chains]]\nconnectors = 5\nrod_m = [0.4, 0.5]\n[[chains.tasks]]\n\
+                    kind = \"wander\"\nconnector = 2\n";
+        Compiled::new(&Source::new("f", text, "")).expect("our own team")
+    });
+    let world = &*TEAM.world;
+    let state = ChainState::new(world).expect("a team at its start");
+    let (chain, mut sights) = world.sights_at(&state, 0).remove(0);
+    let mut agent = ConnectorAgent::new(world, chain, 2);
+    agent.begin(sights.remove(2), 0).expect("a sight");
+    let mut tick = 0;
+    while let Some((&[from, length], rest)) = data.split_first_chunk() {
+        let (packet, rest) = rest.split_at(rest.len().min(usize::from(length)));
+        tick += 1;
+        agent.on_packet(u32::from(from), packet, tick);
+        agent.on_timer(tick);
+        agent.take_packets();
+        data = rest;
+    }
+    agent.on_timer(u64::MAX);
+    assert!(agent.control().is_some(), "time is up");
+}
+
+/// Settings of airplanes that talk, with every kind of message.
+const TALKS: [&str; 7] = [
+    "deployment = \"team\"",
+    "deployment = \"compact-team\"",
+    "deployment = \"team\"\npreset = \"paper\"",
+    "deployment = \"compact-team\"\npreset = \"paper\"",
+    "deployment = \"pim\"",
+    "deployment = \"team\"\nmethod = \"mvp\"",
+    "deployment = \"hierarchical-pim\"\npreset = \"paper\"\nnetwork = { loss = 0.1 }",
+];
+
+/// Lets three pilots talk, on a network that does what the data says: the first byte chooses the settings, and then
+/// each four bytes are a step: a packet arrives as it is, or changed with a right checksum, or damaged, or time passes.
+pub(crate) fn among_pilots(data: &[u8]) {
+    static FLEETS: LazyLock<Vec<(Arc<AirspaceWorld>, Vec<Sight>)>> = LazyLock::new(|| {
+        let fleet = |talk: &&str| {
+            let text = format!(
+                "format = 1\nworld = \"airspace\"\n[airspace]\n{talk}\nmax_rounds = 3\n\
+                 [airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 2600.0\n"
+            );
+            let run = airspace_run(&Source::new("f", text, ""), 1).expect("our own scenario");
+            (run.world().clone(), run.sights())
+        };
+        TALKS.iter().map(fleet).collect()
+    });
+    let Some((&which, steps)) = data.split_first() else { return };
+    let (world, sights) = &FLEETS[usize::from(which) % FLEETS.len()];
+    let mut pilots: Vec<Pilot> =
+        (0..3).map(|id| Pilot::new(world.clone(), id, Contacts::new())).collect();
+    let (mut due, mut tick) = (VecDeque::new(), 0);
+    for (pilot, sight) in pilots.iter_mut().zip(sights) {
+        pilot.begin(sight.clone(), tick);
+    }
+    for step in steps.as_chunks::<4>().0 {
+        for pilot in &mut pilots {
+            for Packet { to, payload, .. } in pilot.take_packets() {
+                let others = (0..3).filter(|&id| id != pilot.id() && to.is_none_or(|to| to == id));
+                due.extend(others.map(|other| (pilot.id(), other, payload.clone())));
+            }
+        }
+        tick += 1;
+        arrive(world, &mut pilots, &mut due, tick, *step);
+    }
+}
+
+/// Carries out a step of the network.
+fn arrive(
+    world: &AirspaceWorld,
+    pilots: &mut [Pilot],
+    due: &mut VecDeque<(u32, u32, Vec<u8>)>,
+    tick: u64,
+    [kind, place, high, change]: [u8; 4],
+) {
+    if kind % 4 == 3 {
+        let next = pilots.iter().filter_map(Pilot::next_timer).min().unwrap_or(tick);
+        return pilots.iter_mut().for_each(|pilot| pilot.on_timer(next.max(tick)));
+    }
+    let Some((from, to, payload)) = due.pop_front() else { return };
+    let at = usize::from(place) | usize::from(high) << 8;
+    let mut bytes = payload.clone();
+    match (kind % 4, open(&payload, world.fingerprint)) {
+        (1, Ok((seal, message))) => {
+            let mut message = message.to_vec();
+            let at = at % message.len().max(1);
+            match message.get_mut(at) {
+                Some(byte) if change > 0 => *byte ^= change,
+                _ => message.truncate(at),
+            }
+            bytes = Draft::of_bytes(&message).sealed(&seal);
+        }
+        (2, _) => {
+            let at = at % bytes.len();
+            bytes[at] ^= change;
+        }
+        _ => {}
+    }
+    pilots[to as usize].on_packet(from, &bytes, tick);
+    if kind & 4 > 0 {
+        // It is told the real thing, too, or again.
+        pilots[to as usize].on_packet(from, &payload, tick);
+    }
+}

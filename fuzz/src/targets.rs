@@ -1,0 +1,130 @@
+//! The list of all targets, and those that read files and texts.
+
+use crate::files::{beside_an_image, file, folder, mrclam_folder, run_folder};
+use crate::packets;
+use sidestep::experiment::sweep::Sweep;
+use sidestep::import::table::CsvTable;
+use sidestep::import::urdf::{Model, srdf::Semantics};
+use sidestep::import::{
+    ascii, bag, bluesky, carmen, image::Bitmap, movingai, mrclam, rosmap, stage, stl, traffic,
+};
+use sidestep::kernel::checkpoint;
+use sidestep::learn::{effector, sensor};
+use sidestep::scenario::Source;
+use sidestep::worlds::WORLDS;
+use sidestep_record::sweep::read_journal;
+use sidestep_record::{McapRun, RunView, read_table};
+use sidestep_server::protocol::Edit;
+use std::sync::LazyLock;
+
+/// A reader of text or bytes, by its name. A folder of the same name in `seeds` has inputs to begin with.
+pub(crate) type Target = (&'static str, fn(&[u8]));
+
+pub(crate) const TARGETS: &[Target] = &[
+    ("scenario", |data| text(data, scenario)),
+    ("override", |data| text(data, overridden)),
+    ("edit", |data| text(data, edited)),
+    ("script", |data| text(data, script)),
+    ("chain_packets", packets::to_a_connector),
+    ("sweep", |data| text(data, |t| drop(Sweep::parse(&Source::new("f", t, ""))))),
+    ("ascii_map", |data| text(data, |t| drop(ascii::parse("f", t, 0.25)))),
+    ("movingai_map", |data| text(data, |t| drop(movingai::parse_map("f", t, 0.25)))),
+    ("movingai_scen", |data| text(data, |t| drop(movingai::parse_scen("f", t)))),
+    ("ros_map", |data| drop(rosmap::load(&beside_an_image(data)))),
+    ("image", |data| drop(Bitmap::decode("f", data.to_vec()))),
+    ("stage", |data| drop(stage::load(&file("f.world", data)))),
+    ("urdf", |data| text(data, |t| drop(Model::parse("f", t)))),
+    ("srdf", |data| text(data, srdf)),
+    ("stl", |data| drop(stl::parse("f", data))),
+    ("bluesky", |data| text(data, |t| drop(bluesky::parse(&"f", t)))),
+    ("traffic", |data| text(data, |t| drop(traffic::parse(&"f", t)))),
+    ("translate", |data| drop(WORLDS.translate(&file("f.scn", data)))),
+    ("carmen", |data| text(data, |t| drop(carmen::parse("f", t)))),
+    ("learn_carmen", |data| drop(effector::from_carmen(&file("f.log", data), &Default::default()))),
+    ("bag", |data| drop(bag::read(&file("f.mcap", data), &all_of_a_bag()))),
+    ("cdr", messages),
+    ("mrclam", |data| drop(mrclam::read(mrclam_folder(data)))),
+    ("learn_csv", |data| text(data, learned)),
+    ("checkpoint", |data| drop(checkpoint::decode_header(data))),
+    ("journal", |data| drop(read_journal(&file("f.jsonl", data), "0", |_: serde_json::Value| {}))),
+    ("manifest", |data| drop(RunView::open(run_folder(data)))),
+    ("mcap", |data| drop(McapRun::open(&file("f.mcap", data)))),
+    ("request", |data| text(data, |t| drop(sidestep_server::decode(t)))),
+    ("packets", packets::among_pilots),
+    ("parquet", tabled),
+];
+
+fn text(data: &[u8], read: impl Fn(&str)) {
+    if let Ok(text) = std::str::from_utf8(data) {
+        read(text);
+    }
+}
+
+fn scenario(text: &str) {
+    drop(WORLDS.compile(&Source::new("f", text, folder())));
+}
+
+/// Compiles the default scenario of each world with one setting.
+fn overridden(setting: &str) {
+    for kind in WORLDS.0 {
+        let source = Source::new("f", kind.default_scenario(), folder());
+        drop(
+            source.with(&[setting.to_string()]).and_then(|source| kind.compile(&source).map(drop)),
+        );
+    }
+}
+
+/// Edits a text: the JSON of the edits is the first line, the text the rest. What was TOML stays TOML.
+fn edited(input: &str) {
+    let Some((edits, text)) = input.split_once('\n') else { return };
+    let Ok(edits) = serde_json::from_str::<Vec<Edit>>(edits) else { return };
+    let edits: Vec<_> = edits.into_iter().map(Into::into).collect();
+    if let Ok(edited) = Source::new("f", text, "").edited(&edits) {
+        assert!(edits.is_empty() || edited.parse::<serde_json::Value>().is_ok(), "{}", edited.text);
+    }
+}
+
+/// Compiles a scenario of a chain that follows a motion script.
+fn script(script: &str) {
+    let chain = "format = 1\nworld = \"chain\"\ncycles = 10\n[[chains]]\nconnectors = 4\n\
+                 [[chains.tasks]]\nkind = \"script\"\n";
+    let script = serde_json::Value::from(script).to_string();
+    // JSON and TOML write strings alike, but for the escape of a slash and of what is above 16 bits.
+    scenario(&format!("{chain}script = {script}\n"));
+}
+
+fn srdf(text: &str) {
+    static ARM: LazyLock<Model> = LazyLock::new(|| {
+        let urdf = include_str!("../../scenarios/chain/arm.urdf");
+        Model::parse("arm.urdf", urdf).expect("our own arm")
+    });
+    drop(Semantics::parse("f", text, &ARM));
+}
+
+/// The topics of the seeds.
+fn all_of_a_bag() -> bag::Wanted {
+    let source = |topic: &str| bag::Source { topic: topic.into(), frames: None };
+    bag::Wanted {
+        odometry: Some(source("/robot_0/odom")),
+        truth: source("/robot_0/ground_truth"),
+        scans: Some("/robot_0/sonar_ring".into()),
+    }
+}
+
+fn messages(data: &[u8]) {
+    drop(bag::cdr::decode::<bag::messages::Odometry>(data));
+    drop(bag::cdr::decode::<bag::messages::LaserScan>(data));
+    drop(bag::cdr::decode::<bag::messages::TfMessage>(data));
+}
+
+fn learned(text: &str) {
+    if let Ok(table) = CsvTable::parse(&"f", text) {
+        drop(sensor::learn_csv(&table, &Default::default()));
+        drop(effector::learn_csv(&table, &Default::default()));
+    }
+}
+
+fn tabled(data: &[u8]) {
+    file("f.parquet", data);
+    drop(read_table(folder(), "f", ..));
+}
