@@ -8,6 +8,9 @@ use crate::flight::{Levels, Point};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::Slot;
 
+/// Bound on everything that is told of an intruder: beyond it, distances and their squares lose all sense.
+const FARTHEST: f64 = 1e15;
+
 /// An intruder as all of a group see it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Intruder {
@@ -33,6 +36,17 @@ impl Intruder {
     /// separation, and as far as it gets within `dt`.
     pub(crate) fn wide_m(&self, separation_m: f64) -> f64 {
         self.separation_m.max(separation_m) + self.top_m_s * self.dt_s
+    }
+
+    /// Returns whether one can compute with what is said of it.
+    pub(crate) fn is_sound(&self) -> bool {
+        let Self { at, velocity_m_s, top_m_s, separation_m, error_m, levels, dt_s, .. } = self;
+        let sizes = [*top_m_s, *separation_m, *error_m, *dt_s];
+        let places = [*at, *velocity_m_s];
+        // Nothing compares with what is no number; levels may be all that there are.
+        sizes.iter().all(|size| (0.0..=FARTHEST).contains(size))
+            && places.as_flattened().iter().all(|v| v.abs() <= FARTHEST)
+            && levels.low_m <= levels.high_m
     }
 
     /// Returns its place in the moving air after some seconds, if it flies straight on.

@@ -51,6 +51,7 @@ use super::link::{self, Most};
 use super::party::Unsound;
 use crate::flight::Pose;
 use crate::shield::{Certainty, Decision, Flyer, Named, Plan, Side, Way, filter};
+pub(super) use scene::turn;
 pub use scene::{Scene, Seen};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
@@ -104,6 +105,12 @@ struct Member {
     gone: bool,
 }
 
+impl Member {
+    fn new(seen: &Seen) -> Self {
+        Self { gone: !seen.takes_part, ..Self::default() }
+    }
+}
+
 /// Outcome of the exchange for one airplane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreed {
@@ -149,7 +156,7 @@ impl Agent {
             own: Proposal::new(&flyer, ways),
             flyer,
             contacts,
-            members: scene.seen.iter().map(|_| Member::default()).collect(),
+            members: scene.seen.iter().map(Member::new).collect(),
             scene,
             decision: None,
             asked: Vec::new(),

@@ -21,6 +21,8 @@ pub struct Seen {
     pub flyer: Flyer,
     /// Whether it is seen to be on its fallback.
     pub orbits: bool,
+    /// Whether it takes part in the exchange, so that it may be heard.
+    pub takes_part: bool,
     /// Its greatest speed in meters per second.
     pub top_m_s: f64,
     /// Largest number of different ways that it can propose.
@@ -112,7 +114,7 @@ fn rises(ids: &[EntityId]) -> bool {
 
 /// Returns a number by which airplanes take turns: drawn without a seed, because all have to know it,
 /// and anew when one has had time to get out of the others' way.
-fn turn(id: EntityId, now: Cycle) -> u64 {
+pub(crate) fn turn(id: EntityId, now: Cycle) -> u64 {
     let round = now / TURN_CYCLES;
     let [high, low, ..] = philox4x32([id, round as u32, (round >> 32) as u32, 0], [0; 2]);
     u64::from(high) << 32 | u64::from(low)

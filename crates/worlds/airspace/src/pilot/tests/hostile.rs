@@ -79,10 +79,7 @@ fn told_more(
     loop {
         for pilot in &mut *pilots {
             for Packet { to, payload, .. } in pilot.take_packets() {
-                let others = pilot.group().iter().filter(|&&other| other != pilot.id());
-                for &other in others.filter(|&&other| to.is_none_or(|to| to == other)) {
-                    due.push_back((pilot.id(), other, payload.clone()));
-                }
+                due.extend(to.iter().map(|&other| (pilot.id(), other, payload.clone())));
             }
         }
         tick += 1;
