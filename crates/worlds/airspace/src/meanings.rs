@@ -68,7 +68,7 @@ pub(super) const MEANINGS: &[Meaning] = &[
     Meaning {
         name: "beacon_bytes",
         words: "size of all beacons",
-        unit: "bytes",
+        unit: "",
         meaning: "bytes of those messages",
     },
     Meaning {
@@ -80,7 +80,7 @@ pub(super) const MEANINGS: &[Meaning] = &[
     Meaning {
         name: "beacon_multicast_bytes",
         words: "size of all beacons with multicast",
-        unit: "bytes",
+        unit: "",
         meaning: "bytes, if one such message could reach all near",
     },
     Meaning {

@@ -287,7 +287,10 @@ pub fn metrics(
         beacon_bytes: beacons.bytes,
         beacon_multicasts: beacons.multicasts,
         beacon_multicast_bytes: beacons.multicast_bytes,
-        network_s: world.network.as_ref().map(|network| network.seconds(traffic.ticks + beacons.ticks)),
+        network_s: world
+            .network
+            .as_ref()
+            .map(|network| network.seconds(traffic.ticks + beacons.ticks)),
         optimizations,
         rounds_mean: mean(rounds as f64, optimizations as usize),
         unconverged,

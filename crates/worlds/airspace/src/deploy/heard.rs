@@ -27,7 +27,10 @@ fn both(text: &str, cycles: u64) -> [(Digest, Metrics); 2] {
 fn is_alike(text: &str, cycles: u64) {
     let [(announced, told), (heard, found)] = both(text, cycles);
     assert_eq!(heard, announced, "{text}");
-    assert_eq!((found.messages, found.bytes, found.rounds_mean), (told.messages, told.bytes, told.rounds_mean));
+    assert_eq!(
+        (found.messages, found.bytes, found.rounds_mean),
+        (told.messages, told.bytes, told.rounds_mean)
+    );
     assert_eq!(told.beacons, 0);
     assert!(found.beacons > 0 && found.beacon_bytes > 0, "{found:?}");
 }
@@ -60,6 +63,32 @@ fn every_deployment_decides_alike_whether_groups_are_heard_or_announced() {
 }
 
 #[test]
+fn scenarios_that_are_shipped_are_flown_alike() {
+    let shipped = [
+        include_str!("../default.toml"),
+        include_str!("../../../../../scenarios/airspace/superconflict.toml"),
+        include_str!("../../../../papers/scenarios/agentfly/superconflict.toml"),
+    ];
+    for text in shipped {
+        let digest = |groups: &str| {
+            let keys = ["airspace.deployment=compact-team", &format!("airspace.groups={groups}")];
+            let source = Source::new("shipped", text, "").with(&keys.map(String::from));
+            let mut run = airspace_run(&source.expect("right"), 1).expect("a scenario");
+            run.advance(12);
+            run.digest()
+        };
+        assert_eq!(digest("heard"), digest("announced"), "{text}");
+    }
+}
+
+#[test]
+fn one_process_that_decides_for_all_hears_nobody() {
+    let text = scenario("groups = \"heard\"", CONFLICT);
+    let error = airspace_run(&Source::new("s", text, ""), 1).expect_err("refused");
+    assert!(error.to_string().contains("set deployment to team"), "{error}");
+}
+
+#[test]
 fn every_method_decides_alike_whether_groups_are_heard_or_announced() {
     for method in ["mvp", "orca", "none"] {
         is_alike(&scenario(&format!("deployment = \"team\"\nmethod = \"{method}\""), BESET), 20);
@@ -69,11 +98,13 @@ fn every_method_decides_alike_whether_groups_are_heard_or_announced() {
 /// A network that may lose messages, and loses none: airplanes report whom they hear.
 #[test]
 fn who_loses_nothing_and_cannot_know_it_finds_the_same_group() {
-    let network = "deployment = \"compact-team\"\nnetwork = { duplication = 0.3, max_delay_s = 0.004 }";
+    let network =
+        "deployment = \"compact-team\"\nnetwork = { duplication = 0.3, max_delay_s = 0.004 }";
     for airplanes in [CONFLICT, BESET, STREAMS] {
         let [(_, told), (_, found)] = both(&scenario(network, airplanes), 15);
         assert_eq!((found.contacts_lost, found.deadlines_missed), (0, 0), "{found:?}");
-        let flown = |m: &Metrics| (m.min_separation_m, m.shield_overrides, m.rounds_mean, m.arrived);
+        let flown =
+            |m: &Metrics| (m.min_separation_m, m.shield_overrides, m.rounds_mean, m.arrived);
         assert_eq!(flown(&found), flown(&told));
     }
 }
@@ -162,8 +193,14 @@ fn the_cost_of_hearing_is_measured() {
         ("loss 0.1", "{ loss = 0.1 }"),
         ("loss 0.5", "{ loss = 0.5 }"),
         ("two halves", "{ partitions = [{ sides = [[0, 2, 4, 6], [1, 3, 5, 7]] }] }"),
-        ("two halves for 60 s", "{ partitions = [{ from_s = 60, until_s = 120, sides = [[0, 2, 4, 6], [1, 3, 5, 7]] }] }"),
-        ("four one-way links", "{ one_way = [{ sender = 0, receiver = 3 }, { sender = 1, receiver = 4 }, { sender = 2, receiver = 5 }, { sender = 3, receiver = 6 }] }"),
+        (
+            "two halves for 60 s",
+            "{ partitions = [{ from_s = 60, until_s = 120, sides = [[0, 2, 4, 6], [1, 3, 5, 7]] }] }",
+        ),
+        (
+            "four one-way links",
+            "{ one_way = [{ sender = 0, receiver = 3 }, { sender = 1, receiver = 4 }, { sender = 2, receiver = 5 }, { sender = 3, receiver = 6 }] }",
+        ),
         ("range 3 km", "{ range_m = 3000.0 }"),
     ];
     for (name, network) in networks {
@@ -181,7 +218,8 @@ fn the_cost_of_hearing_is_measured() {
                 delays += metrics.mean_delay_percent.unwrap_or(f64::NAN) / 20.0;
                 lost += metrics.losses_of_separation;
                 arrived += metrics.arrived;
-                (bytes, beacons) = (bytes + metrics.bytes / 20, beacons + metrics.beacon_bytes / 20);
+                (bytes, beacons) =
+                    (bytes + metrics.bytes / 20, beacons + metrics.beacon_bytes / 20);
             }
             println!(
                 "{name}, {groups}: delay {delays:.2} %, {lost} losses, {arrived} of 160 arrived, \

@@ -100,7 +100,8 @@ impl Pilot {
     fn take_up(&mut self, sight: Sight, schedule: Schedule) {
         assert_eq!(sight.own.id, self.id, "the sight is that of another airplane");
         if let Some(turn) = self.turn.take()
-            && let Stage::Grouping(talk) | Stage::Deciding(talk) | Stage::Shielding(talk, _) = turn.stage
+            && let Stage::Grouping(talk) | Stage::Deciding(talk) | Stage::Shielding(talk, _) =
+                turn.stage
         {
             self.keep_past(talk);
         }
@@ -317,9 +318,7 @@ impl Pilot {
                 let party = proposes(world, (sight, unheard), contacts, &ways, radio);
                 Stage::Shielding(Talk::new(frame, party), allowed)
             }
-            Topic::Group => {
-                Stage::Grouping(Talk::new(frame, looks(world, sight, contacts, radio)))
-            }
+            Topic::Group => Stage::Grouping(Talk::new(frame, looks(world, sight, contacts, radio))),
             Topic::Decision if Manner::reacts(world) => {
                 let party = tells(world, sight, contacts, resolving, radio);
                 Stage::Deciding(Talk::new(frame, party))

@@ -13,11 +13,7 @@ use std::sync::Arc;
 
 /// Returns the knowledge that all agents of a group share before they talk. Each has its own of those near who
 /// are not heard, and takes them to fly straight on.
-pub(super) fn brief(
-    world: &AirspaceWorld,
-    sight: &Sight,
-    not_heard: &[Sighted],
-) -> Arc<Briefing> {
+pub(super) fn brief(world: &AirspaceWorld, sight: &Sight, not_heard: &[Sighted]) -> Arc<Briefing> {
     let straight = not_heard.iter().map(|one| unheard(world, one));
     Arc::new(Briefing {
         now: sight.cycle,

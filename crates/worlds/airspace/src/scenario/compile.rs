@@ -126,7 +126,10 @@ impl<'a> Compiler<'a> {
             mvp: section.mvp.or(MVP),
             orca: section.orca.or(ORCA),
             deployment: section.deployment,
-            groups: section.groups.as_ref().map_or_else(Grouping::default, |given| *given.get_ref()),
+            groups: section
+                .groups
+                .as_ref()
+                .map_or_else(Grouping::default, |given| *given.get_ref()),
             group_bytes: (section.group_memory_gib.map_or(2.0, f64::from) * GIB) as u64,
             shield: section.shield.0,
             vertical_m,
@@ -209,7 +212,8 @@ impl<'a> Compiler<'a> {
         if let Some(given) = &self.file.airspace.groups
             && (world.groups, world.deployment) == (Grouping::Heard, Deployment::Direct)
         {
-            let cause = "groups that are heard, but one process decides for all (deployment = \"direct\")";
+            let cause =
+                "groups that are heard, but one process decides for all (deployment = \"direct\")";
             let remedy = "set deployment to team, compact-team, pim or hierarchical-pim, or leave \
                           groups out";
             return Err(self.source.error(given.span(), cause, remedy));

@@ -139,8 +139,10 @@ impl Roster {
     fn take_group(&self, rest: &mut Vec<EntityId>) -> Vec<EntityId> {
         let mut group = vec![rest.remove(0)];
         // Of each of the rest, whether it may come in, and whether it hears a member.
-        let mut marks: Vec<(bool, bool)> =
-            rest.iter().map(|&id| (self.agrees(id, group[0]), self.is_linked(id, group[0]))).collect();
+        let mut marks: Vec<(bool, bool)> = rest
+            .iter()
+            .map(|&id| (self.agrees(id, group[0]), self.is_linked(id, group[0])))
+            .collect();
         while let Some(k) = marks.iter().position(|&(agrees, is_linked)| agrees && is_linked) {
             let taken = rest.remove(k);
             marks.remove(k);

@@ -77,6 +77,18 @@ fn over_a_network_that_loses_messages_it_is_the_same_run_too() {
     }
 }
 
+/// Also by pilots of which each sees no more than those near it.
+#[test]
+fn pilots_that_find_their_groups_fly_the_run_that_flies_itself() {
+    let faults = "network = { loss = 0.2, max_delay_s = 0.005, range_m = 4000.0, \
+                  one_way = [{ sender = 0, receiver = 1, until_s = 30.0 }] }";
+    for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {
+        let airspace = format!("deployment = \"{deployment}\"\ngroups = \"heard\"");
+        is_flown_alike(&airspace, TROUBLE, |_| {});
+        is_flown_alike(&format!("{airspace}\n{faults}"), FOUR, |_| {});
+    }
+}
+
 #[test]
 fn what_was_ordered_from_outside_is_in_the_sight() {
     use crate::wish::Wish;

@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 
 const THREE: &str = "[airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 2600.0\n";
 
-const KINDS: [&str; 12] = [
+const KINDS: [&str; 14] = [
     "deployment = \"team\"",
     "deployment = \"compact-team\"",
     "deployment = \"team\"\npreset = \"paper\"",
@@ -22,6 +22,8 @@ const KINDS: [&str; 12] = [
     "deployment = \"team\"\nmethod = \"mvp\"",
     "deployment = \"team\"\nmethod = \"none\"\nnetwork = {}",
     "deployment = \"team\"\nnetwork = { loss = 0.2 }",
+    "deployment = \"compact-team\"\ngroups = \"heard\"",
+    "deployment = \"compact-team\"\ngroups = \"heard\"\nnetwork = { loss = 0.2 }",
 ];
 
 /// Changes some bytes, or cuts some off, or adds some.

@@ -50,6 +50,8 @@ proptest! {
             "deployment = \"team\"\nmethod = \"mvp\"",
             "deployment = \"compact-team\"\nmethod = \"orca\"",
             "deployment = \"team\"\nmethod = \"none\"",
+            "deployment = \"compact-team\"\ngroups = \"heard\"",
+            "deployment = \"pim\"\ngroups = \"heard\"",
         ]),
     ) {
         let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(901));
