@@ -51,7 +51,6 @@ use super::link::{self, Most};
 use super::party::Unsound;
 use crate::flight::Pose;
 use crate::shield::{Certainty, Decision, Flyer, Named, Plan, Side, Way, filter};
-pub(super) use scene::turn;
 pub use scene::{Scene, Seen};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;

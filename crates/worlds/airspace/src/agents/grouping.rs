@@ -13,15 +13,16 @@
 //!    in a cycle are two items, each of which is there or not: no older version can be taken for a newer one.
 //! 3. An item goes on to those near who lack it: who do not see its airplane, or report that they have not
 //!    heard it. So each item goes from one to the next over all links that work.
-//! 4. Two airplanes *hear each other* if both say so. An airplane has all that it needs when it knows both items
-//!    of everybody to whom a chain of such pairs leads from itself, and of those whom these have heard. From that
-//!    it computes its group, as all others of the chain do from the same items (`roster.rs`).
+//! 4. Two airplanes *hear each other* if both say so. The *group* of an airplane are all to whom a chain of such
+//!    pairs leads from it. It has all that it needs when it knows both items of everybody in the chain, and
+//!    of those whom these have heard; all others of the chain find the same from the same items (`roster.rs`).
 //!
-//! **What a group is.** Of those to whom the chain leads, a largest set in which no two are at odds: two near each
-//! other that do not hear each other are, and two that are out of reach of each other's radio. It
-//! is found by adding one after the other, in an order in which all come first in turn, so that one
-//! that hears only some is not left out for ever. Where everybody hears everybody near, it is the whole chain: those
-//! whom the simulator would announce, because what is near is the same for both.
+//! **What a group is.** Where everybody hears everybody near, it is what the simulator would announce, because what is
+//! near is the same for both. A partition, or a range of radio that is too short, cuts it into those who can talk.
+//! Two near each other may be in it that do not hear each other, as long as others hear both: the talks
+//! that follow find that out as they do where groups are announced, and go on without the one for the other. To leave
+//! out one of the two would be simpler to say and costs more: with four links of 56 that work one way only, super-conflicts
+//! of 8 were delayed by 43 % instead of 5 %.
 //!
 //! **Talking in it.** All later talks of the cycle carry the cycle and a digest of the members
 //! ([`TalkId`](super::packet::TalkId)). Packets between airplanes of different opinions are of different
@@ -48,7 +49,7 @@ use crate::intruder::Intruder;
 use crate::shield::Certainty;
 pub use beacon::{Beacon, Item, Sighted};
 use roster::Roster;
-use sidestep_kernel::{Cycle, EntityId};
+use sidestep_kernel::EntityId;
 use std::collections::BTreeSet;
 
 /// Largest number of items of a message.
@@ -57,8 +58,6 @@ const MOST_ITEMS: usize = 64;
 /// The knowledge of an agent at its start.
 #[derive(Debug, Clone)]
 pub struct Start {
-    /// The present cycle.
-    pub now: Cycle,
     /// Place of its airplane among those near it.
     pub me: usize,
     /// Those near it, itself among them, by rising id.
@@ -109,7 +108,7 @@ impl Agent {
         let is_sure = start.certainty == Certainty::Sure;
         Self {
             gone: start.near.iter().map(is_beyond).collect(),
-            roster: Roster::new(beacon, is_sure, start.range_m),
+            roster: Roster::new(beacon, is_sure),
             start,
             heard: BTreeSet::new(),
             kept: BTreeSet::new(),
@@ -199,7 +198,7 @@ impl Agent {
 
     /// Finds its group from what it knows.
     fn find(&mut self) {
-        let members = self.roster.group(self.id(), self.start.now);
+        let members = self.roster.group(self.id());
         let mut intruders = self.start.intruders.clone();
         for beacon in members.iter().filter_map(|&id| self.roster.beacon(id)) {
             intruders.extend(beacon.intruders.iter().cloned());

@@ -134,15 +134,19 @@ proptest! {
 
 /// Airplane 0 and airplane 1 do not hear each other, and both hear airplane 2.
 #[test]
-fn who_hears_two_that_do_not_hear_each_other_decides_with_one_of_them_in_turn() {
+fn two_that_do_not_hear_each_other_are_in_one_group_by_way_of_one_that_hears_both() {
     let cut = "network = { partitions = [{ sides = [[0], [1]] }] }";
     let three = "[airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 4000.0\n";
     let text = scenario(&format!("deployment = \"compact-team\"\n{cut}"), three);
-    let mut run = run(&text, "groups = \"heard\"");
-    run.advance(250);
-    let metrics = run.metrics();
+    let flown = |groups: &str| {
+        let mut run = run(&text, &format!("groups = \"{groups}\""));
+        run.advance(250);
+        run.metrics()
+    };
+    let [metrics, told] = ["heard", "announced"].map(flown);
     assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 3), "{metrics:?}");
-    assert_eq!(metrics.deadlines_missed, 0, "they agree on who is in which group: {metrics:?}");
+    let [found, told] = [&metrics, &told].map(|m| m.mean_delay_percent.expect("arrived"));
+    assert!(found < told + 5.0, "{found} %, {told} % where groups are announced");
 }
 
 /// Flies a scenario of faults of [`Case`] by groups that are heard. Returns the pairs that lose separation

@@ -120,7 +120,6 @@ pub(super) fn looks(
 ) -> Box<Speaker> {
     let network = world.network.as_ref();
     let start = grouping::Start {
-        now: sight.cycle,
         me: radio.me,
         near: sight.group.clone(),
         intruders: sight.intruders.clone(),

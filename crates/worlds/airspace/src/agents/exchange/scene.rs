@@ -114,7 +114,7 @@ fn rises(ids: &[EntityId]) -> bool {
 
 /// Returns a number by which airplanes take turns: drawn without a seed, because all have to know it,
 /// and anew when one has had time to get out of the others' way.
-pub(crate) fn turn(id: EntityId, now: Cycle) -> u64 {
+fn turn(id: EntityId, now: Cycle) -> u64 {
     let round = now / TURN_CYCLES;
     let [high, low, ..] = philox4x32([id, round as u32, (round >> 32) as u32, 0], [0; 2]);
     u64::from(high) << 32 | u64::from(low)

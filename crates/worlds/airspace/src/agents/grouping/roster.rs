@@ -1,9 +1,7 @@
 //! What is known of who sees and who hears whom, and the groups that follow from it.
 
 use super::beacon::{Beacon, Item};
-use crate::agents::exchange::turn;
-use crate::flight::distance_m;
-use sidestep_kernel::{Cycle, EntityId};
+use sidestep_kernel::EntityId;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The items that one airplane knows, its own among them.
@@ -13,15 +11,13 @@ pub(super) struct Roster {
     reports: BTreeMap<EntityId, Vec<EntityId>>,
     /// Whether all hear all that are near them, without a report.
     is_sure: bool,
-    /// Distance in meters that messages reach.
-    range_m: f64,
 }
 
 impl Roster {
     /// Returns the roster of an airplane that has heard nothing yet.
-    pub(super) fn new(own: Beacon, is_sure: bool, range_m: f64) -> Self {
+    pub(super) fn new(own: Beacon, is_sure: bool) -> Self {
         let beacons = BTreeMap::from([(own.own.id, own)]);
-        Self { beacons, reports: BTreeMap::new(), is_sure, range_m }
+        Self { beacons, reports: BTreeMap::new(), is_sure }
     }
 
     /// Notes a beacon. Returns whether there was none of the airplane; what it says itself counts for more than
@@ -91,15 +87,6 @@ impl Roster {
         self.knows(a) && self.knows(b) && self.hears(a, b) && self.hears(b, a)
     }
 
-    /// Returns whether two airplanes can be in one group.
-    fn agrees(&self, a: EntityId, b: EntityId) -> bool {
-        if self.sees(a, b) || self.sees(b, a) {
-            return self.is_linked(a, b);
-        }
-        let at = |id: EntityId| self.beacons.get(&id).map(|beacon| beacon.own.pose.at);
-        at(a).zip(at(b)).is_some_and(|(a, b)| distance_m(a, b) <= self.range_m)
-    }
-
     /// Returns all to whom a chain of airplanes that hear each other leads from one, itself among them, and
     /// whether all is known that this depends on.
     fn chain(&self, from: EntityId) -> (BTreeSet<EntityId>, bool) {
@@ -121,37 +108,8 @@ impl Roster {
         self.chain(id).1
     }
 
-    /// Returns the group of an airplane in a cycle, itself among it, by rising id.
-    pub(super) fn group(&self, id: EntityId, now: Cycle) -> Vec<EntityId> {
-        let mut rest: Vec<EntityId> = self.chain(id).0.into_iter().collect();
-        rest.sort_by_key(|&id| (turn(id, now), id));
-        let mut group = Vec::new();
-        // Groups are taken off one after the other, so that all of the chain find the same ones.
-        while !group.contains(&id) {
-            group = self.take_group(&mut rest);
-        }
-        group.sort_unstable();
-        group
-    }
-
-    /// Takes the group of the first one out of some airplanes: those are added in their order that hear a member,
-    /// and that are at odds with none.
-    fn take_group(&self, rest: &mut Vec<EntityId>) -> Vec<EntityId> {
-        let mut group = vec![rest.remove(0)];
-        // Of each of the rest, whether it may come in, and whether it hears a member.
-        let mut marks: Vec<(bool, bool)> = rest
-            .iter()
-            .map(|&id| (self.agrees(id, group[0]), self.is_linked(id, group[0])))
-            .collect();
-        while let Some(k) = marks.iter().position(|&(agrees, is_linked)| agrees && is_linked) {
-            let taken = rest.remove(k);
-            marks.remove(k);
-            for (mark, &id) in marks.iter_mut().zip(rest.iter()) {
-                mark.0 = mark.0 && self.agrees(id, taken);
-                mark.1 |= self.is_linked(id, taken);
-            }
-            group.push(taken);
-        }
-        group
+    /// Returns the group of an airplane, itself among it, by rising id.
+    pub(super) fn group(&self, id: EntityId) -> Vec<EntityId> {
+        self.chain(id).0.into_iter().collect()
     }
 }
