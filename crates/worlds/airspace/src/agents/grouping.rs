@@ -41,6 +41,8 @@
 
 mod beacon;
 mod roster;
+#[cfg(test)]
+mod tests;
 
 use super::link::{self, Most};
 use super::party::Unsound;
