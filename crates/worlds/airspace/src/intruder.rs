@@ -8,8 +8,11 @@ use crate::flight::{Levels, Point};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::Slot;
 
-/// Bound on everything that is told of an intruder: beyond it, distances and their squares lose all sense.
-const FARTHEST: f64 = 1e15;
+/// Bounds on what is told of an intruder: meters, meters per second and seconds beyond which nothing makes sense, or
+/// takes for ever to look at.
+const FARTHEST_M: f64 = 1e15;
+const FASTEST_M_S: f64 = 1e5;
+const LONGEST_S: f64 = 1e4;
 
 /// An intruder as all of a group see it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -41,11 +44,13 @@ impl Intruder {
     /// Returns whether one can compute with what is said of it.
     pub(crate) fn is_sound(&self) -> bool {
         let Self { at, velocity_m_s, top_m_s, separation_m, error_m, levels, dt_s, .. } = self;
-        let sizes = [*top_m_s, *separation_m, *error_m, *dt_s];
-        let places = [*at, *velocity_m_s];
         // Nothing compares with what is no number; levels may be all that there are.
-        sizes.iter().all(|size| (0.0..=FARTHEST).contains(size))
-            && places.as_flattened().iter().all(|v| v.abs() <= FARTHEST)
+        let is_within = |most: f64| move |v: &f64| v.abs() <= most;
+        at.iter().all(is_within(FARTHEST_M))
+            && velocity_m_s.iter().chain([top_m_s]).all(is_within(FASTEST_M_S))
+            && [separation_m, error_m].into_iter().all(is_within(FARTHEST_M))
+            && is_within(LONGEST_S)(dt_s)
+            && [top_m_s, separation_m, error_m, dt_s].into_iter().all(|size| *size >= 0.0)
             && levels.low_m <= levels.high_m
     }
 
