@@ -9,7 +9,7 @@ use super::{AIRPLANES, Plan, SCENARIO, claim};
 use crate::claims::{Comparison, judged, listed};
 use crate::study::{Progress, finish, setting, source};
 use serde::Serialize;
-use sidestep::kernel::{InputError, Simulation};
+use sidestep::kernel::InputError;
 use sidestep::worlds::airspace::airspace_run;
 use sidestep_document::claim::Claim;
 use sidestep_document::{Estimate, Table};

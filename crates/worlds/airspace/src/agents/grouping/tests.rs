@@ -92,13 +92,23 @@ fn found(links: &Links, certainty: Certainty, draws: &mut Draws) -> (Vec<Vec<Ent
             let said = agents[to].on_message(place, items);
             say(&mut due, to, said);
         }
-        let Some(i) = agents.iter().position(|agent| !agent.is_done()) else { break };
-        let missing = agents[i].awaits();
-        assert!(!missing.is_empty(), "{i} waits for nobody and does not end");
-        for place in missing {
-            let said = agents[i].without(place, false);
-            say(&mut due, i, said);
+        if agents.iter().all(|agent| agent.is_done()) {
+            break;
         }
+        // Who is there answers that it waits, too, and is not given up.
+        let never_answers = |i: usize, agent: &Agent| {
+            let is_cut = |&place: &usize| {
+                let other = (0..n).find(|&j| id(j) == agent.start.near[place].id).expect("near");
+                !links.hears[i][other] || !links.hears[other][i]
+            };
+            agent.awaits().into_iter().find(is_cut)
+        };
+        let mut all = agents.iter().enumerate();
+        let (i, place) = all
+            .find_map(|(i, agent)| Some((i, never_answers(i, agent)?)))
+            .expect("nobody waits for what never comes");
+        let said = agents[i].without(place, false);
+        say(&mut due, i, said);
     }
     let members = |agent: &Agent| {
         let found = agent.outcome().expect("done");
