@@ -196,8 +196,7 @@ impl<A: Agent> Endpoint<A> {
     /// Says something to all others.
     fn say(&mut self, messages: Vec<A::Message>) {
         for message in messages {
-            // To find room anew while it is written takes as long as to write it.
-            let message = Draft::of_about(&Wired::Said(self.count, message), self.largest);
+            let message = Draft::of(&Wired::Said(self.count, message));
             self.count += 1;
             if self.radio.patience.asks() {
                 self.said.push(message.clone());

@@ -77,12 +77,7 @@ pub struct Draft(Vec<u8>);
 impl Draft {
     /// Returns a message in the form in which it travels.
     pub fn of<M: Serialize + ?Sized>(message: &M) -> Self {
-        Self::of_about(message, USUAL_BYTES)
-    }
-
-    /// Returns the same of a message that takes about so many bytes.
-    pub fn of_about<M: Serialize + ?Sized>(message: &M, bytes: usize) -> Self {
-        let mut room = Vec::with_capacity(bytes.max(USUAL_BYTES));
+        let mut room = Vec::with_capacity(USUAL_BYTES);
         room.resize(HEADER_BYTES, 0);
         Self(postcard::to_extend(message, room).expect("messages are plain data"))
     }
