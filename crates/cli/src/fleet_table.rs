@@ -137,6 +137,7 @@ mod tests {
         let nodes = (0..count).map(node).collect();
         let times = (Some(0.5), Some(2000.0));
         FleetNow {
+            flown_s: 0.0,
             cycle: 123_456,
             cycles: 1_000_000,
             has_begun: true,

@@ -84,7 +84,7 @@ impl LinkArgs {
 }
 
 /// Returns the program: as the variable says, beside this one, or on the path.
-fn find() -> Result<PathBuf, InputError> {
+pub(crate) fn find() -> Result<PathBuf, InputError> {
     let named = std::env::var_os(VARIABLE).map(PathBuf::from);
     let file = format!("{PROGRAM}{}", std::env::consts::EXE_SUFFIX);
     let beside = std::env::current_exe().ok().map(|own| own.with_file_name(&file));

@@ -175,13 +175,9 @@ impl Program for Aboard {
     }
 
     fn take_packets(&mut self) -> Vec<Outgoing> {
-        let packets = self.pilot.take_packets();
-        let (me, group) = (self.pilot.id(), self.pilot.group());
-        let outgoing = |Packet { to, sequence, payload }| {
-            let all = || group.iter().copied().filter(|&id| id != me).collect();
-            Outgoing { to: to.map_or_else(all, |one| vec![one]), sequence, payload }
-        };
-        packets.into_iter().map(outgoing).collect()
+        let outgoing =
+            |Packet { to, sequence, payload }| Outgoing { to: to.to_vec(), sequence, payload };
+        self.pilot.take_packets().into_iter().map(outgoing).collect()
     }
 
     fn control(&self) -> Option<Vec<u8>> {
@@ -194,10 +190,11 @@ impl Program for Aboard {
     }
 
     fn doing(&self) -> Doing {
-        let word = match (self.pilot.is_done(), self.pilot.has_decided()) {
-            (true, _) => "done",
-            (false, true) => "shield",
-            (false, false) => "decide",
+        let word = match &self.pilot {
+            pilot if pilot.is_done() => "done",
+            pilot if pilot.has_decided() => "shield",
+            pilot if pilot.has_group() => "decide",
+            _ => "group",
         };
         let progress = self.pilot.progress().unwrap_or_default();
         Doing { word, round: progress.round, epoch: progress.epoch.into() }

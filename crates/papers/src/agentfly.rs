@@ -10,6 +10,8 @@
 //! under way for 1 ms. A coordinator's hops follow one another; agents of a team send at the
 //! same time, everybody to each of the others in turn.
 
+mod sockets;
+
 use crate::cells::{Cell, Columns, Run, Runs, Value, column, figure, series};
 use crate::claims::{Comparison, File, Words, both, judged, listed};
 use crate::study::{Progress, Study, finish, known, number, setting, source};
@@ -21,6 +23,7 @@ use sidestep::worlds::airspace::{AirspaceRun, airspace_run};
 use sidestep_document::claim::{Claim, Verdict, tally};
 use sidestep_document::figure::Point;
 use sidestep_document::{Document, Estimate, Figure, FigureKind, Series, Table};
+pub use sockets::{Measured, Sockets, measure};
 
 /// The amount of work to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -33,21 +36,50 @@ pub struct Plan {
     pub cycles: u64,
     /// Workers.
     pub workers: usize,
+    /// The part over real sockets.
+    pub sockets: SocketsPlan,
     /// Whether this is a rehearsal.
     pub quick: bool,
+}
+
+/// The amount of work of the part over real sockets, whose flights come one after the other.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SocketsPlan {
+    /// Numbers of airplanes.
+    pub airplanes: Vec<usize>,
+    /// Runs of each number, by seed from 1.
+    pub seeds: usize,
+    /// Most cycles of each run.
+    pub cycles: u64,
 }
 
 impl Default for Plan {
     fn default() -> Self {
         let workers = sidestep::kernel::workers::available();
-        Self { airplanes: (2..=10).collect(), seeds: 20, cycles: 400, workers, quick: false }
+        let sockets = SocketsPlan { airplanes: (2..=10).collect(), seeds: 5, cycles: 400 };
+        Self {
+            airplanes: (2..=10).collect(),
+            seeds: 20,
+            cycles: 400,
+            workers,
+            sockets,
+            quick: false,
+        }
     }
 }
 
 impl Plan {
     /// Returns a rehearsal of minutes at most, long enough for airplanes to meet.
     pub fn quick() -> Self {
-        Self { airplanes: vec![2, 3, 5], seeds: 2, cycles: 60, quick: true, ..Self::default() }
+        let sockets = SocketsPlan { airplanes: vec![3], seeds: 1, cycles: 20 };
+        Self {
+            airplanes: vec![2, 3, 5],
+            seeds: 2,
+            cycles: 60,
+            sockets,
+            quick: true,
+            ..Self::default()
+        }
     }
 }
 
@@ -60,6 +92,8 @@ pub struct Report {
     cells: Vec<Cell>,
     /// The paper's claims and our verdicts.
     pub claims: Vec<Claim>,
+    /// Measurements over real sockets, once there are any.
+    sockets: Option<Sockets>,
     /// Ways of the airplanes of the largest team with the first seed, meters.
     tracks_m: Vec<Vec<AirPoint>>,
 }
@@ -170,7 +204,7 @@ pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, InputErro
     let claims = judge(&cells);
     let largest = plan.airplanes.iter().copied().max().unwrap_or(0);
     let tracks_m = tracks_m(plan, largest)?;
-    Ok(Report { plan: plan.clone(), cells, claims, tracks_m })
+    Ok(Report { plan: plan.clone(), cells, claims, sockets: None, tracks_m })
 }
 
 /// Returns the ways of `n` airplanes with the first seed.
@@ -328,6 +362,14 @@ fn hardly_in_time(cells: &[Cell]) -> Claim {
 }
 
 impl Report {
+    /// Returns the report with what was measured over real sockets.
+    #[must_use]
+    pub fn with_sockets(mut self, sockets: Sockets) -> Self {
+        self.claims.extend(sockets.claim());
+        self.sockets = Some(sockets);
+        self
+    }
+
     /// Returns figures 4 to 7.
     fn figures(&self) -> Vec<Figure> {
         let over = |title: &str, y_label: &str, y: &str| {
@@ -393,8 +435,9 @@ impl Report {
         let quick = if plan.quick { " --quick" } else { "" };
         let command =
             format!("sidestep reproduce agentfly{quick} --seeds {} --out DIR", plan.seeds);
-        let experiments =
-            WORDS.experiments([(self.figures(), vec![self.table(), self.links_table()])]);
+        let results = (self.figures(), vec![self.table(), self.links_table()]);
+        let sockets = self.sockets.iter().map(|sockets| (Vec::new(), vec![sockets.table()]));
+        let experiments = WORDS.experiments([results].into_iter().chain(sockets));
         WORDS.document(lead, plan.quick, (&self.claims, Vec::new(), experiments), command)
     }
 }

@@ -1,7 +1,7 @@
 //! The experiments of three papers, rerun, and the verdicts on their claims.
 //!
 //! ```text
-//! agentfly.rs   the source paper of the airspace world
+//! agentfly.rs   the source paper of the airspace world; agentfly/ has its flights over real sockets
 //! loria/        the source paper of the robots world
 //! serpentine/   the source of the chain world
 //! methods.rs    methods of the airspace world on the same traffic

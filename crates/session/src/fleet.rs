@@ -167,6 +167,8 @@ pub struct FleetNow {
     pub has_begun: bool,
     /// Number of cycles that began late, in real time.
     pub late_cycles: u64,
+    /// Seconds of real time since all nodes had joined; 0 before.
+    pub flown_s: f64,
     /// Median time in milliseconds from the percepts to the last control.
     pub talk_p50_ms: Option<f64>,
     /// The time in milliseconds below which 99 of 100 of them are.

@@ -1,7 +1,7 @@
 //! `reproduce`: a quick run writes a report, its figures and all its numbers.
 
 use crate::browser::{assert_sound, chromium};
-use crate::support::{Ended, Place, names, signal, wait_for};
+use crate::support::{Ended, Place, names, requires, signal, wait_for};
 use serde_json::Value;
 
 /// The names in the folder of a report.
@@ -67,4 +67,30 @@ fn a_rehearsal_of_the_serpentine_experiments_leaves_a_whole_report() {
     assert!(found["hover"].as_str().is_some_and(|words| words.contains("n =")), "{found}");
     let [as_told, rising, falling, again] = [0, 1, 2, 3].map(|k| &found["sorted"][k]);
     assert!(as_told == again && rising != falling, "a head sorts up, down, and as it was");
+}
+
+/// Whether the program that carries the network is there or not.
+#[test]
+fn a_rehearsal_of_the_airspace_experiments_measures_over_sockets_or_says_how_to() {
+    let place = Place::new();
+    let told = place.json(&["reproduce", "agentfly", "--quick", "--seeds", "1", "--out", "a"]);
+    assert_eq!(names(&place.path("a")), WHOLE);
+    let report = place.read("a/report.md");
+    assert!(report.contains("Over real sockets") && !report.contains("NaN"), "{report}");
+    let Some(cases) = told["sockets"]["measured"].as_array() else {
+        let reason = told["sockets"]["left-out"]["reason"].as_str().expect("a reason");
+        assert!(reason.contains("cargo install --path crates/link"), "{reason}");
+        assert!(report.contains("Left out"), "{report}");
+        return requires(
+            "link",
+            "sidestep-link is not built: cargo build --release -p sidestep-link",
+        );
+    };
+    assert_eq!(cases.len(), 4, "every deployment");
+    for case in cases {
+        let (alone, fleet) = (&case["alone"][0], &case["over_sockets"][0]);
+        assert!(alone["messages"].as_f64() > Some(0.0), "{case}");
+        assert_eq!([&alone["messages"], &alone["bytes"]], [&fleet["messages"], &fleet["bytes"]]);
+        assert!(fleet["elapsed_s"].as_f64() > Some(0.0), "{case}");
+    }
 }

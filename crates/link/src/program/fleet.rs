@@ -145,6 +145,8 @@ struct Captain<'a> {
     cycles: u64,
     board: metrics::Board,
     report_at: Instant,
+    /// Time at which all nodes had joined.
+    began: Option<Instant>,
     now: FleetNow,
     /// Packets and bytes of each node at the last report, and when that was.
     before: BTreeMap<EntityId, (u64, u64)>,
@@ -164,6 +166,7 @@ impl<'a> Captain<'a> {
             cycles,
             board,
             report_at: now,
+            began: None,
             now: FleetNow { cycles, ..FleetNow::default() },
             before: BTreeMap::new(),
             reported: now,
@@ -221,6 +224,7 @@ impl<'a> Captain<'a> {
             cycle: fleet.cycle,
             cycles: self.cycles,
             has_begun: fleet.has_begun,
+            flown_s: self.began.map_or(0.0, |began| began.elapsed().as_secs_f64()),
             late_cycles: fleet.tally.late_cycles,
             talk_p50_ms: quantile_ms(0.5),
             talk_p99_ms: quantile_ms(0.99),
@@ -236,6 +240,9 @@ impl Attendant for Captain<'_> {
         }
         if let Some(error) = self.unwritten.take() {
             return Err(Broken::World(error.into()));
+        }
+        if fleet.has_begun {
+            self.began.get_or_insert_with(Instant::now);
         }
         if Instant::now() >= self.report_at {
             self.report_at = Instant::now() + REPORT;

@@ -52,6 +52,17 @@ fn the_scenarios_own_faults_are_the_same_ones_in_threads_to_the_last_message() {
     }
 }
 
+/// Each sees no more than those near it, and finds its group from their beacons.
+#[test]
+fn airplanes_that_find_their_groups_come_out_as_in_one_process() {
+    for more in ["groups = \"heard\"".to_string(), format!("groups = \"heard\"\n{BAD_NETWORK}")] {
+        let text = superconflict(4, "compact-team", 20, &more);
+        let (threads, one) = (over_memory(&text), alone(&text));
+        assert!(one.metrics["beacons"].as_u64() > Some(0), "{}", one.metrics);
+        assert_eq!(threads, one, "{more}");
+    }
+}
+
 #[test]
 fn messages_that_take_time_by_their_size_take_it_in_threads_too() {
     let text = superconflict(4, "team", 6, "network = { bandwidth_bit_s = 1e6, loss = 0.05 }");

@@ -30,9 +30,7 @@ fn decided(pilots: &mut [Pilot], sights: Vec<Sight>) -> Vec<Control> {
     loop {
         for pilot in &mut *pilots {
             for Packet { to, payload, .. } in pilot.take_packets() {
-                let group = pilot.group().iter().copied();
-                let others = group.filter(|&id| id != pilot.id() && to.is_none_or(|to| to == id));
-                due.extend(others.map(|other| (other, pilot.id(), payload.clone())));
+                due.extend(to.iter().map(|&other| (other, pilot.id(), payload.clone())));
             }
         }
         let Some((to, from, payload)) = due.pop() else { break };

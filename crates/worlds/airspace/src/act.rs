@@ -23,6 +23,7 @@ use super::Turn;
 use super::decide::{Considered, straight_way};
 use super::deploy::{self, Deployment};
 use super::intruder::Intruder;
+use super::join::Flown;
 use super::perceive::intruders;
 use super::pilot::{Control, Own};
 use super::shield::Way;
@@ -70,29 +71,28 @@ fn fly(turn: &mut Turn<'_>, group: &[Slot]) {
 }
 
 /// Does what comes before decisions: airplanes come in, names of pairs begin and end, and orders that
-/// are due are carried out. Returns the airplanes of a group that the method flies, by id; `group` are
-/// those in the air.
-pub(super) fn begin(turn: &mut Turn<'_>, group: &[Slot]) -> Vec<Slot> {
-    let (world, now) = (turn.world, turn.now);
-    let flown: Vec<Slot> =
-        group.iter().copied().filter(|&slot| !world.is_intruder(slot, now)).collect();
-    if world.shield {
-        entry::release(turn, &flown);
-        entry::admit(turn, &flown);
-        errors::name(turn, &flown);
+/// are due are carried out. Returns the airplanes of a group that the method flies; `group` are those in
+/// the air, by id.
+pub(super) fn begin(turn: &mut Turn<'_>, group: &[Slot]) -> Flown {
+    // Who is near whom is as it was when the group was formed: orders change levels.
+    let flown = Flown::of(turn, group);
+    if turn.world.shield {
+        entry::release(turn, &flown.ids);
+        entry::admit(turn, &flown.ids);
+        errors::name(turn, &flown.ids);
     }
-    orders::carry_out(turn, group, &flown);
+    orders::carry_out(turn, group, &flown.ids);
     flown
 }
 
 /// Returns the ways of the airplanes that the method flies: as those aboard decide, or as somebody has said
 /// who decides outside of the run.
-fn ways(turn: &mut Turn<'_>, flown: &[Slot], intruders: &[Intruder]) -> Vec<Way> {
+fn ways(turn: &mut Turn<'_>, flown: &Flown, intruders: &[Intruder]) -> Vec<Way> {
     let Turn { world, state, now, .. } = *turn;
-    let own: Vec<Own> = flown.iter().map(|&slot| Own::of(turn, slot)).collect();
+    let own: Vec<Own> = flown.ids.iter().map(|&slot| Own::of(turn, slot)).collect();
     let contacts = turn.scratch.notes.as_ref().map(|notes| state.contacts(notes.slot));
     let (controls, considered): (Vec<Option<Control>>, Vec<Considered>) = if state.is_handed(now) {
-        (state.take_handed(flown), vec![Considered::default(); flown.len()])
+        (state.take_handed(&flown.ids), vec![Considered::default(); own.len()])
     } else {
         let all = match world.deployment {
             Deployment::Direct => direct::decided(turn, &own, intruders),

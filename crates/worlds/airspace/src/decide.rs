@@ -51,6 +51,8 @@ pub struct Effort {
     pub unconverged: u64,
     /// Messages on the network, including the shield's exchanges.
     pub traffic: Traffic,
+    /// Beacons on the network, by which airplanes have found their groups.
+    pub beacons: Traffic,
 }
 
 impl Effort {
@@ -110,9 +112,9 @@ pub(super) enum Manner {
 }
 
 impl Manner {
-    /// Returns the manner of a group.
-    pub(super) fn of(world: &AirspaceWorld, group: &[Known], intruders: &[Intruder]) -> Self {
-        let is_alone = group.is_empty() || group.len() + intruders.len() < 2;
+    /// Returns the manner of a group beside some others that do not decide with it.
+    pub(super) fn of(world: &AirspaceWorld, group: &[Known], others: usize) -> Self {
+        let is_alone = group.is_empty() || group.len() + others < 2;
         match world.method {
             _ if Self::reacts(world) => Self::Reacting,
             Method::Pc if is_alone => Self::Alone,

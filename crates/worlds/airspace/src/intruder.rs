@@ -8,6 +8,12 @@ use crate::flight::{Levels, Point};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::Slot;
 
+/// Bounds on what is told of an intruder: meters, meters per second and seconds beyond which nothing makes sense, or
+/// takes for ever to look at.
+const FARTHEST_M: f64 = 1e15;
+const FASTEST_M_S: f64 = 1e5;
+const LONGEST_S: f64 = 1e4;
+
 /// An intruder as all of a group see it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Intruder {
@@ -33,6 +39,19 @@ impl Intruder {
     /// separation, and as far as it gets within `dt`.
     pub(crate) fn wide_m(&self, separation_m: f64) -> f64 {
         self.separation_m.max(separation_m) + self.top_m_s * self.dt_s
+    }
+
+    /// Returns whether one can compute with what is said of it.
+    pub(crate) fn is_sound(&self) -> bool {
+        let Self { at, velocity_m_s, top_m_s, separation_m, error_m, levels, dt_s, .. } = self;
+        // Nothing compares with what is no number; levels may be all that there are.
+        let is_within = |most: f64| move |v: &f64| v.abs() <= most;
+        at.iter().all(is_within(FARTHEST_M))
+            && velocity_m_s.iter().chain([top_m_s]).all(is_within(FASTEST_M_S))
+            && [separation_m, error_m].into_iter().all(is_within(FARTHEST_M))
+            && is_within(LONGEST_S)(dt_s)
+            && [top_m_s, separation_m, error_m, dt_s].into_iter().all(|size| *size >= 0.0)
+            && levels.low_m <= levels.high_m
     }
 
     /// Returns its place in the moving air after some seconds, if it flies straight on.

@@ -3,9 +3,56 @@
 use super::Turn;
 use super::flight::{Levels, Task, distance_m};
 use super::perceive::claim;
+use super::world::Grouping;
 use sidestep_kernel::Slot;
 use sidestep_kernel::conflict::Groups;
 use std::ops::Range;
+
+/// The airplanes of a group that the method flies, and who of the group is near whom.
+#[derive(Debug, Default)]
+pub(super) struct Flown {
+    /// Their ids, rising.
+    pub(super) ids: Vec<Slot>,
+    /// Of each, those near it, itself and those who mind nobody among them, rising; empty where groups are
+    /// announced, and all see all.
+    near: Vec<Vec<Slot>>,
+}
+
+impl Flown {
+    /// Returns those of a group that the method flies; `group` are all in the air, by id.
+    pub(super) fn of(turn: &Turn<'_>, group: &[Slot]) -> Self {
+        let Turn { world, now, .. } = *turn;
+        let is_flown = |&slot: &Slot| !world.is_intruder(slot, now);
+        let ids: Vec<Slot> = group.iter().copied().filter(is_flown).collect();
+        let near = match world.groups {
+            Grouping::Announced => Vec::new(),
+            Grouping::Heard => ids.iter().map(|&slot| near(turn, group, slot)).collect(),
+        };
+        Self { ids, near }
+    }
+
+    /// Returns whether the `k`-th of them sees another airplane of the group.
+    pub(super) fn sees(&self, k: usize, other: Slot) -> bool {
+        self.near.get(k).is_none_or(|near| near.binary_search(&other).is_ok())
+    }
+}
+
+/// Returns those of a group that are near an airplane, itself among them, by id. Who is near the same intruder is
+/// near, too: what the one does to avoid it, the other has to mind.
+fn near(turn: &Turn<'_>, group: &[Slot], own: Slot) -> Vec<Slot> {
+    let Turn { world, now, .. } = *turn;
+    let (mut near, mut due) = (vec![own], vec![own]);
+    while let Some(from) = due.pop() {
+        for &other in group.iter().filter(|&&other| is_near(turn, from, other)) {
+            if !near.contains(&other) {
+                near.push(other);
+                due.extend(world.is_intruder(other, now).then_some(other));
+            }
+        }
+    }
+    near.sort_unstable();
+    near
+}
 
 /// Begins a cycle for all: returns the groups that airplanes form in it.
 pub(super) fn groups(turn: &mut Turn<'_>) -> Groups {

@@ -73,6 +73,8 @@ pub struct Scratch {
     /// Pairs that came near each other.
     pairs: BTreeMap<(Slot, Slot), PairRecord>,
     optimizations: Vec<Optimization>,
+    /// Beacons by which airplanes have found their groups.
+    grouped: Traffic,
     /// Messages and bytes that the shield has sent.
     exchanged: Traffic,
     events: Vec<Event>,

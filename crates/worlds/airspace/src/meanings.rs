@@ -60,6 +60,30 @@ pub(super) const MEANINGS: &[Meaning] = &[
         meaning: "bytes, if one message could reach all of a group",
     },
     Meaning {
+        name: "beacons",
+        words: "beacons",
+        unit: "",
+        meaning: "messages by which airplanes find their groups, beside all others; none where groups are announced",
+    },
+    Meaning {
+        name: "beacon_bytes",
+        words: "size of all beacons",
+        unit: "",
+        meaning: "bytes of those messages",
+    },
+    Meaning {
+        name: "beacon_multicasts",
+        words: "beacons with multicast",
+        unit: "",
+        meaning: "messages by which airplanes find their groups, if one could reach all near",
+    },
+    Meaning {
+        name: "beacon_multicast_bytes",
+        words: "size of all beacons with multicast",
+        unit: "",
+        meaning: "bytes, if one such message could reach all near",
+    },
+    Meaning {
         name: "network_s",
         words: "time on the network",
         unit: "",

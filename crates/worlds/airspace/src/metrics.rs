@@ -66,6 +66,15 @@ pub struct Metrics {
     pub multicasts: u64,
     /// Number of bytes if one message could reach all of a group.
     pub multicast_bytes: u64,
+    /// Number of messages by which airplanes have found their groups, beside all others; none where groups are
+    /// announced.
+    pub beacons: u64,
+    /// Number of bytes of those messages.
+    pub beacon_bytes: u64,
+    /// Number of those messages if one could reach all near.
+    pub beacon_multicasts: u64,
+    /// Number of their bytes if one message could reach all near.
+    pub beacon_multicast_bytes: u64,
     /// Seconds that all talks took on the network, one after the other; none where one process
     /// decides for all, or where messages take no time.
     pub network_s: Option<f64>,
@@ -262,7 +271,7 @@ pub fn metrics(
         airplane,
         callsign: world.callsign(airplane),
     };
-    let Effort { optimizations, rounds, unconverged, traffic } = ledger.effort;
+    let Effort { optimizations, rounds, unconverged, traffic, beacons } = ledger.effort;
     Metrics {
         min_separation_m: nearest,
         losses_of_separation: ledger.pairs.values().map(|r| u64::from(r.losses)).sum(),
@@ -274,7 +283,14 @@ pub fn metrics(
         bytes: traffic.bytes,
         multicasts: traffic.multicasts,
         multicast_bytes: traffic.multicast_bytes,
-        network_s: world.network.as_ref().map(|network| network.seconds(traffic.ticks)),
+        beacons: beacons.messages,
+        beacon_bytes: beacons.bytes,
+        beacon_multicasts: beacons.multicasts,
+        beacon_multicast_bytes: beacons.multicast_bytes,
+        network_s: world
+            .network
+            .as_ref()
+            .map(|network| network.seconds(traffic.ticks + beacons.ticks)),
         optimizations,
         rounds_mean: mean(rounds as f64, optimizations as usize),
         unconverged,

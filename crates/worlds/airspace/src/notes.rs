@@ -37,6 +37,8 @@ pub(crate) struct Notes {
     pub(crate) flyer: Option<Flyer>,
     /// Those because of whom it does not fly its first wish.
     pub(crate) because: Vec<EntityId>,
+    /// Beacons by which those of the group have found each other.
+    pub(crate) beacons: Traffic,
     /// Messages of the group's shield.
     pub(crate) exchanged: Traffic,
     /// The way that it flies.
@@ -60,6 +62,7 @@ impl Notes {
         let Considered { actions, ways, decided } = considered[me].clone();
         (self.wishes, self.ways, self.decided) = (actions, ways, decided);
         for control in controls.iter().flatten() {
+            self.beacons.add_beside(control.grouping);
             self.talk.add_beside(control.deciding);
             self.exchanged.add_beside(control.shielding);
         }

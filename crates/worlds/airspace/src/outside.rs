@@ -7,6 +7,7 @@ mod tests;
 
 use super::flight::Known;
 use super::intruder::Intruder;
+use super::join::Flown;
 use super::perceive::{intruders, known};
 use super::state::AirspaceState;
 use super::wish::Wish;
@@ -102,11 +103,13 @@ impl AirspaceWorld {
         let nothing = Percept::default();
         (0..agents.len()).for_each(|row| nothing.write(self, row, room));
         self.perceived(state, now, |turn, flown, intruders| {
-            if flown.iter().all(|known| agents.binary_search(&known.slot).is_err()) {
+            if flown.ids.iter().all(|slot| agents.binary_search(slot).is_err()) {
                 return;
             }
-            let all = Seen::all(turn, flown, intruders);
-            for own in flown {
+            let known = |&slot: &Slot| known(self, turn.state, now, slot);
+            let flown: Vec<Known> = flown.ids.iter().map(known).collect();
+            let all = Seen::all(turn, &flown, intruders);
+            for own in &flown {
                 if let Ok(row) = agents.binary_search(&own.slot) {
                     Percept::of(turn, own, &all).write(self, row, room);
                 }
@@ -121,7 +124,7 @@ impl AirspaceWorld {
         &self,
         state: &AirspaceState,
         now: Cycle,
-        mut look: impl FnMut(&Turn<'_>, &[Known], &[Intruder]),
+        mut look: impl FnMut(&Turn<'_>, &Flown, &[Intruder]),
     ) {
         let copy = AirspaceState::restore(self, &state.snapshot(now));
         let (clock, mut scratch) = (ManualClock::default(), Scratch::default());
@@ -134,8 +137,6 @@ impl AirspaceWorld {
             group.retain(|&slot| copy.is_there(self, slot, now));
             group.sort_unstable();
             let flown = act::begin(turn, &group);
-            let flown: Vec<Known> =
-                flown.iter().map(|&slot| known(self, &copy, now, slot)).collect();
             look(turn, &flown, &intruders(turn, &group));
         }
     }

@@ -101,6 +101,7 @@ impl World for AirspaceWorld {
         for (pair, record) in std::mem::take(&mut scratch.pairs) {
             ledger.add_pair(pair, record);
         }
+        ledger.effort.beacons.add(std::mem::take(&mut scratch.grouped));
         ledger.effort.traffic.add(std::mem::take(&mut scratch.exchanged));
         ledger.too_close.extend(std::mem::take(&mut scratch.too_close));
         books.decide_ns += std::mem::take(&mut scratch.decide_ns);

@@ -12,7 +12,7 @@ use super::flight::Airplane;
 use super::flight_plan::AirplaneSection;
 use super::shield::Side;
 use super::state::{AirplaneRecord, FLYING, Snapshot};
-use super::world::{AirspaceWorld, Method};
+use super::world::{AirspaceWorld, Grouping, Method};
 use airplanes::{GeneratorSection, ModelSection};
 use compile::Compiler;
 use network::NetworkSection;
@@ -66,6 +66,7 @@ struct AirspaceSection {
     method: Method,
     shield: Switch,
     deployment: Deployment,
+    groups: Option<Spanned<Grouping>>,
     network: Option<Spanned<NetworkSection>>,
     generator: Option<Spanned<GeneratorSection>>,
     dt_s: Option<Spanned<Number<Decision>>>,

@@ -132,6 +132,10 @@ fn too_close(world: &AirspaceWorld, pairs: &[(u32, u32)]) -> Lines {
 /// Returns the traffic on the network, and its faults.
 fn network(m: &Metrics) -> Lines {
     let mut lines = Lines::new();
+    if m.beacons > 0 {
+        let sent = format!("{}, {} bytes", grouped(m.beacons), grouped(m.beacon_bytes));
+        lines.push(line("beacons", sent));
+    }
     if m.messages > 0 {
         let sent = format!("{}, {} bytes", grouped(m.messages), grouped(m.bytes));
         let took = m.network_s.map_or(String::new(), |s| format!(", {s:.1} s on the network"));

@@ -88,6 +88,8 @@ pub struct AirspaceWorld {
     pub orca: Reactive,
     /// The deployment of the optimizer.
     pub deployment: Deployment,
+    /// How its agents know with whom they decide together.
+    pub groups: Grouping,
     /// The network that carries its messages, if it is unreliable.
     pub network: Option<Network>,
     /// Bytes that the pair tables of a group may take; larger groups are not optimized.
@@ -128,6 +130,17 @@ pub struct AirspaceWorld {
     pub(crate) first_fallbacks: Arc<Vec<Side>>,
     /// The airplanes that decide, by what may be ordered of them.
     pub(crate) teams: Arc<Teams>,
+}
+
+/// How airplanes know with whom they decide together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Grouping {
+    /// It is announced, by one who sees all.
+    #[default]
+    Announced,
+    /// They find it from beacons of those near them.
+    Heard,
 }
 
 /// Number of steps after which a flight alone is taken to be endless.

@@ -33,9 +33,7 @@ fn fly(mut pilot: Pilot, told: Receiver<Told>, others: Vec<Sender<Told>>, done: 
             Told::End => return,
         }
         for Packet { to, payload, .. } in pilot.take_packets() {
-            let group = pilot.group().iter().copied();
-            let receivers = group.filter(|&id| id != pilot.id() && to.is_none_or(|to| to == id));
-            receivers.for_each(|id| {
+            to.iter().for_each(|&id| {
                 // Whoever has come to an end hears no more.
                 let _ = others[id as usize].send(Told::Packet(pilot.id(), payload.clone()));
             });

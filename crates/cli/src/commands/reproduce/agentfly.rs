@@ -3,10 +3,15 @@
 use super::{EXAMPLES, Outcome, check_vacant, deliver};
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
+use crate::link;
 use crate::progress::Stages;
 use clap::Args;
-use sidestep_papers::agentfly;
-use std::path::PathBuf;
+use sidestep_papers::agentfly::{self, Measured, Plan, Sockets};
+use sidestep_session::fleet::{Clock, Common, FleetJob, Flown, Job, NodeNow, Told, Topology};
+use std::path::{Path, PathBuf};
+
+/// Seconds after which an airplane that is not heard is taken to be gone: all share this machine.
+const LEASE_S: f64 = 60.0;
 
 /// The extent of the experiments.
 #[derive(Debug, Args)]
@@ -25,6 +30,60 @@ pub(super) struct AgentflyArgs {
     seeds: Option<u32>,
 }
 
+/// Measures over real sockets, if the program is there that carries them.
+fn sockets(plan: &Plan, console: Console) -> Result<Sockets, Failure> {
+    if let Err(missing) = link::find() {
+        let reason = missing.to_string();
+        console.note(format!("The part over real sockets is left out: {reason}"));
+        return Ok(Sockets::LeftOut { reason });
+    }
+    let folder = tempfile::tempdir().map_err(|e| Failure::write(&std::env::temp_dir(), &e))?;
+    let file = folder.path().join("superconflict.toml");
+    let stages = Stages::new(console);
+    let mut flies = |text: &str| -> Result<Measured, Failure> {
+        std::fs::write(&file, text).map_err(|e| Failure::write(&file, &e))?;
+        flown(&file)
+    };
+    let measured = agentfly::measure(plan, &mut flies, &mut |what, share| stages.at(what, share));
+    stages.clear();
+    measured
+}
+
+/// Flies a scenario with a process for each airplane, and returns what was measured.
+fn flown(file: &Path) -> Result<Measured, Failure> {
+    let mut measured = Measured::default();
+    link::run(&Job::Fleet(job(file)), |told| {
+        if let Told::Ended { fleet, .. } = told {
+            let sum = |of: fn(&NodeNow) -> u64| fleet.nodes.iter().map(of).sum::<u64>() as f64;
+            let (messages, bytes) = (sum(|node| node.packets), sum(|node| node.bytes));
+            measured = Measured { elapsed_s: fleet.flown_s, messages, bytes };
+        }
+    })?;
+    Ok(measured)
+}
+
+fn job(file: &Path) -> FleetJob {
+    let build = sidestep_session::build().into();
+    let common = Common {
+        flown: Flown { file: file.into(), overrides: Vec::new(), build },
+        tls: None,
+        lease_s: LEASE_S,
+        metrics: None,
+        json_log: false,
+        log: "warn".into(),
+    };
+    FleetJob {
+        common,
+        nodes: None,
+        clock: Clock::Lockstep,
+        topology: Topology::Mesh,
+        listen: vec!["tcp/127.0.0.1:0".into()],
+        out: None,
+        replace: false,
+        packets: false,
+    }
+}
+
 pub(super) fn reproduce(args: &AgentflyArgs, console: Console) -> Result<ExitCode, Failure> {
     let default = if args.quick { agentfly::Plan::quick() } else { agentfly::Plan::default() };
     let plan =
@@ -35,7 +94,7 @@ pub(super) fn reproduce(args: &AgentflyArgs, console: Console) -> Result<ExitCod
     let stages = Stages::new(console);
     let report = agentfly::run(&plan, &mut |what, share| stages.at(what, share));
     stages.clear();
-    let report = report?;
+    let report = report?.with_sockets(sockets(&plan, console)?);
     let (document, claims, quick) = (report.document(), &report.claims, plan.quick);
     deliver(&report, &Outcome { document, claims, quick }, args.out.as_deref(), console)
 }

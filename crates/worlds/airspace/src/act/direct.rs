@@ -35,7 +35,7 @@ fn wanted(turn: &mut Turn<'_>, own: &[Own], intruders: &[Intruder]) -> Vec<(Cont
     let slots: Vec<Slot> = own.iter().map(|own| own.id).collect();
     let group: Vec<Known> = own.iter().map(Own::known).collect();
     let mut memories = state.take_memories(&slots);
-    let manner = Manner::of(world, &group, intruders);
+    let manner = Manner::of(world, &group, intruders.len());
     let considered: Vec<Considered> = match manner {
         Manner::Alone | Manner::TooMany => {
             own.iter().map(|own| alone(world, own.known(), own.wish.as_ref())).collect()

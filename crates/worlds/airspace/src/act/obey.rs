@@ -64,6 +64,7 @@ fn book(turn: &mut Turn<'_>, own: &[Own], controls: &[Option<Control>]) {
         })
     };
     let (deciding, shielding) = (sum(|control| control.deciding), sum(|control| control.shielding));
+    scratch.grouped.add(sum(|control| control.grouping));
     scratch.exchanged.add(shielding);
     let optimized: Vec<Optimized> = all().filter_map(|control| control.optimized).collect();
     if optimized.is_empty() {

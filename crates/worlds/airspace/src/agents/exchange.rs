@@ -104,6 +104,12 @@ struct Member {
     gone: bool,
 }
 
+impl Member {
+    fn new(seen: &Seen) -> Self {
+        Self { gone: !seen.takes_part, ..Self::default() }
+    }
+}
+
 /// Outcome of the exchange for one airplane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreed {
@@ -149,7 +155,7 @@ impl Agent {
             own: Proposal::new(&flyer, ways),
             flyer,
             contacts,
-            members: scene.seen.iter().map(|_| Member::default()).collect(),
+            members: scene.seen.iter().map(Member::new).collect(),
             scene,
             decision: None,
             asked: Vec::new(),

@@ -120,7 +120,9 @@ pub struct Endpoint<A> {
     agent: A,
     radio: Radio,
     most: Most,
-    /// Its messages so far, serialized, by number.
+    /// Number of its messages so far.
+    count: u32,
+    /// These, serialized, by number; none where nobody ever asks for one.
     said: Vec<Draft>,
     others: Vec<Other>,
     /// Messages that wait to be sent.
@@ -170,6 +172,7 @@ impl<A: Agent> Endpoint<A> {
             most: agent.most(),
             agent,
             radio,
+            count: 0,
             said: Vec::new(),
             others,
             out: Vec::new(),
@@ -193,8 +196,11 @@ impl<A: Agent> Endpoint<A> {
     /// Says something to all others.
     fn say(&mut self, messages: Vec<A::Message>) {
         for message in messages {
-            let message = Draft::of(&Wired::Said(self.said.len() as u32, message));
-            self.said.push(message.clone());
+            let message = Draft::of(&Wired::Said(self.count, message));
+            self.count += 1;
+            if self.radio.patience.asks() {
+                self.said.push(message.clone());
+            }
             self.send(None, message);
         }
     }

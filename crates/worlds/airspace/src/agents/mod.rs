@@ -12,6 +12,7 @@
 //! | [`informed`] | sends all its possible ways once, and then only samples or distributions |
 //! | [`coordinator`] | migrates from airplane to airplane, and decides for all |
 //! | [`intent`] | tells what nobody can see, once, for methods that find headings |
+//! | [`grouping`] | finds who decides together, where nobody announces it |
 //! | [`exchange`] | the shield: whether plans are safe together |
 //! | [`packet`] | the bytes around every message, and what is dropped |
 //!
@@ -21,6 +22,7 @@
 pub mod contact;
 pub mod coordinator;
 pub mod exchange;
+pub mod grouping;
 pub mod informed;
 pub mod intent;
 mod link;

@@ -162,6 +162,11 @@ pub struct Patience {
 }
 
 impl Patience {
+    /// Returns whether anybody ever asks, as nobody does on a network that loses nothing.
+    pub(crate) fn asks(&self) -> bool {
+        self.ticks < u64::MAX
+    }
+
     /// Returns the number of ticks after which it asks where messages are of this size: those that
     /// a message and its answer take on the way come on top.
     pub(crate) fn ticks_for(&self, bytes: usize) -> u64 {

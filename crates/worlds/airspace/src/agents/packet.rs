@@ -12,9 +12,10 @@
 
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
+use std::sync::Arc;
 
 const MAGIC: [u8; 2] = *b"Ss";
-const VERSION: u8 = 1;
+const VERSION: u8 = 2;
 /// Number of bytes before the message.
 pub const HEADER_BYTES: usize = 44;
 /// Place of the checksum among them.
@@ -22,9 +23,11 @@ const CHECKSUM_AT: usize = HEADER_BYTES - 8;
 /// Number of bytes for which there is room in a new packet.
 const USUAL_BYTES: usize = 512;
 
-/// The subject of a talk: each cycle has one talk of each, in this order.
+/// The subject of a talk: each cycle has one talk of each at most, in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Topic {
+    /// Who decides together, where nobody announces it.
+    Group,
     /// The choice of what each wants to fly.
     Decision,
     /// The shield's exchange, which checks that this is safe.
@@ -59,8 +62,8 @@ impl TalkId {
 /// A packet on its way out.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Packet {
-    /// The receiver; `None` for all others of the sender's group.
-    pub to: Option<EntityId>,
+    /// The receivers: one, or all others of the talk.
+    pub to: Arc<[EntityId]>,
     /// Number among the sender's packets of the talk.
     pub sequence: u32,
     /// All of its bytes.
@@ -149,8 +152,9 @@ impl Seal {
             return Err(Refusal::Version);
         }
         let topic = match bytes[3] {
-            0 => Topic::Decision,
-            1 => Topic::Shield,
+            0 => Topic::Group,
+            1 => Topic::Decision,
+            2 => Topic::Shield,
             _ => return Err(Refusal::Damaged),
         };
         let talk = TalkId { cycle: word(12), topic, members: word(20) };

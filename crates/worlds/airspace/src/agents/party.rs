@@ -103,8 +103,8 @@ const FARTHEST_M: f64 = 1e15;
 
 /// Returns whether coordinates and altitudes in meters are such that one can compute with them.
 pub(super) fn are_places(told_m: impl IntoIterator<Item = f64>) -> bool {
-    // Nothing compares with what is no number.
-    told_m.into_iter().all(|m| m.abs() <= FARTHEST_M)
+    // Nothing compares with what is no number. To look at all of them, whatever comes first, is several at a time.
+    told_m.into_iter().fold(true, |are, m| are & (m.abs() <= FARTHEST_M))
 }
 
 impl Unsound {

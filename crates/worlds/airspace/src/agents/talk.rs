@@ -28,6 +28,7 @@ pub struct Frame {
 /// A talk, with the party that is aboard.
 pub struct Talk<P: ?Sized> {
     frame: Frame,
+    others: Arc<[EntityId]>,
     /// Number of packets sent so far.
     sent: u32,
     traffic: Traffic,
@@ -37,7 +38,8 @@ pub struct Talk<P: ?Sized> {
 impl<P: Party + ?Sized> Talk<P> {
     /// Returns a talk in which nothing has been said yet.
     pub fn new(frame: Frame, party: Box<P>) -> Self {
-        Self { frame, sent: 0, traffic: Traffic::default(), party }
+        let others = frame.members.iter().copied().filter(|&id| id != frame.me).collect();
+        Self { frame, others, sent: 0, traffic: Traffic::default(), party }
     }
 
     /// Its identity, members and times.
@@ -102,16 +104,15 @@ impl<P: Party + ?Sized> Talk<P> {
     /// Seals all that the party has to send, and counts it.
     fn send(&mut self, out: &mut Vec<Packet>) {
         let Frame { id, me, fingerprint, is_silent, .. } = self.frame;
-        let others = self.frame.members.len() - 1;
         for Outgoing { to, message } in self.party.take_messages() {
-            let receivers = if to.is_some() { 1 } else { others };
-            if is_silent || receivers == 0 {
+            let to = to.map_or_else(|| self.others.clone(), |one| Arc::from([one]));
+            if is_silent || to.is_empty() {
                 continue;
             }
             let sequence = self.sent;
             let seal = Seal { fingerprint, talk: id, sender: me, sequence };
             let payload = message.sealed(&seal);
-            self.traffic.count(receivers, payload.len());
+            self.traffic.count(to.len(), payload.len());
             out.push(Packet { to, sequence, payload });
             self.sent += 1;
         }
@@ -128,7 +129,7 @@ impl<P: Concludes + ?Sized> Talk<P> {
 impl<O> Talk<dyn Concludes<Outcome = O>> {
     /// Returns the talk that it is for others once it has ended here: answers to their questions.
     pub fn past(self) -> Talk<dyn Party> {
-        let Self { frame, sent, traffic, party } = self;
-        Talk { frame, sent, traffic, party }
+        let Self { frame, others, sent, traffic, party } = self;
+        Talk { frame, others, sent, traffic, party }
     }
 }

@@ -13,9 +13,6 @@ pub(super) trait Station {
     /// Its airplane.
     fn id(&self) -> EntityId;
 
-    /// Those that it talks with, itself among them.
-    fn group(&self) -> &[EntityId];
-
     /// Takes a packet.
     fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64);
 
@@ -32,10 +29,6 @@ pub(super) trait Station {
 impl Station for Pilot {
     fn id(&self) -> EntityId {
         Pilot::id(self)
-    }
-
-    fn group(&self) -> &[EntityId] {
-        Pilot::group(self)
     }
 
     fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
@@ -90,13 +83,9 @@ fn send<S: Station>(transport: &mut impl Transport, station: &mut S, now: u64) {
         let mut to_one = |receiver: EntityId, payload: Vec<u8>| {
             transport.send(Envelope { cycle: now, sender, sequence, receiver, payload });
         };
-        match to {
-            Some(receiver) => to_one(receiver, payload),
-            None => {
-                let others = station.group().iter().filter(|&&id| id != sender);
-                others.for_each(|&receiver| to_one(receiver, payload.clone()));
-            }
-        }
+        let Some((last, others)) = to.split_last() else { continue };
+        others.iter().for_each(|&receiver| to_one(receiver, payload.clone()));
+        to_one(*last, payload);
     }
 }
 
@@ -220,10 +209,6 @@ mod tests {
     impl Station for Alone {
         fn id(&self) -> EntityId {
             self.talk.frame().me
-        }
-
-        fn group(&self) -> &[EntityId] {
-            &self.talk.frame().members
         }
 
         fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {

@@ -6,6 +6,7 @@ use crate::Turn;
 use crate::agents::network::Network;
 use crate::decide::Considered;
 use crate::intruder::Intruder;
+use crate::join::Flown;
 use crate::pilot::{Control, Memory, Pilot, Schedule, Sight};
 use crate::purpose;
 use crate::state::AirspaceState;
@@ -14,11 +15,10 @@ use sidestep_kernel::ports::MemoryTransport;
 use sidestep_kernel::{Cycle, Slot};
 use std::sync::Arc;
 
-/// Lets the pilots of a group decide. Returns what each does and what it has considered; `flown` are the group's
-/// airplanes that the method flies, by id.
+/// Lets the pilots of a group decide. Returns what each does and what it has considered.
 pub(crate) fn flown(
     turn: &mut Turn<'_>,
-    flown: &[Slot],
+    flown: &Flown,
     intruders: &[Intruder],
 ) -> Vec<(Control, Considered)> {
     let Turn { world, state, now, clock, .. } = *turn;
@@ -26,7 +26,7 @@ pub(crate) fn flown(
     let schedule = Schedule::of_cycle(now, world.network.as_ref());
     let sights = Sight::all(turn, flown, intruders);
     let mut transport = network(world, state, (now, schedule));
-    let mut pilots = pilots(world, flown, state.take_memories(flown));
+    let mut pilots = pilots(world, &flown.ids, state.take_memories(&flown.ids));
     for (pilot, sight) in pilots.iter_mut().zip(sights) {
         pilot.begin_by(sight, schedule);
     }

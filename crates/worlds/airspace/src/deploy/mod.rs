@@ -19,6 +19,8 @@ mod drive;
 mod ether;
 mod faulty;
 mod group;
+#[cfg(test)]
+mod heard;
 mod kind;
 #[cfg(test)]
 mod silence;

@@ -11,13 +11,13 @@ use sidestep_scenario::Source;
 const FLOWN_S: f64 = 300.0;
 
 /// Random scenarios, each made of the draws of its own seed.
-struct Case {
+pub(super) struct Case {
     draws: Draws,
     n: u32,
 }
 
 impl Case {
-    fn new(seed: u64) -> Self {
+    pub(super) fn new(seed: u64) -> Self {
         let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(900));
         let n = 2 + draws.below(7);
         Self { draws, n }
@@ -103,7 +103,7 @@ impl Case {
     }
 
     /// Returns the scenario.
-    fn text(&mut self) -> String {
+    pub(super) fn text(&mut self) -> String {
         let late = if self.happens(0.5) { self.late() } else { String::new() };
         let deployment = ["team", "compact-team", "pim"][self.draws.below(3) as usize];
         let method = if self.happens(0.1) { "pc" } else { "none" };

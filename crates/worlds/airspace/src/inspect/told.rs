@@ -134,6 +134,9 @@ impl Looking<'_> {
             let (bytes, multicast) = (number(t.bytes, "B"), number(t.multicast_bytes, "B"));
             [about.into(), number(t.messages, ""), bytes, number(t.multicasts, ""), multicast]
         };
+        if self.notes.beacons != Traffic::default() {
+            table.row(row("the group", self.notes.beacons));
+        }
         table.row(row("actions", self.notes.talk));
         table.row(row("the shield", self.notes.exchanged));
         let deployment = self.world.deployment.name();

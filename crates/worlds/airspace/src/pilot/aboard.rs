@@ -7,22 +7,21 @@ use super::control::{Control, Memory};
 use super::early::Early;
 use super::schedule::{Schedule, patience};
 use super::sight::Sight;
-use super::talks::{Speaker, optimizes, proposes, tells};
+use super::talks::{Speaker, looks, optimizes, proposes, tells};
 use crate::agents::contact::Contacts;
 use crate::agents::network::Traffic;
 use crate::agents::packet::{Packet, Refusal, Refused, TalkId, Topic, digest, open};
 use crate::agents::{Frame, Party, Progress, Radio, Talk};
 use crate::avoid::Beset;
 use crate::decide::{Considered, Manner};
-use crate::flight::Known;
-use crate::world::AirspaceWorld;
+use crate::world::{AirspaceWorld, Grouping};
 use sidestep_kernel::EntityId;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use turn::{Stage, Stands, Turn};
 
 /// Number of ended talks of which questions are answered: those of two cycles.
-const PAST_TALKS: usize = 4;
+const PAST_TALKS: usize = 6;
 
 /// The program aboard one airplane: see the [module](super).
 pub struct Pilot {
@@ -91,12 +90,9 @@ impl Pilot {
     /// Starts the talks of a cycle at ticks that all agree on.
     pub(crate) fn begin_by(&mut self, sight: Sight, schedule: Schedule) {
         self.take_up(sight, schedule);
-        let Some(turn) = &self.turn else { return };
-        let group: Vec<Known> = turn.sight.group.iter().map(|one| one.known()).collect();
-        let manner = Manner::of(&self.world, &group, &turn.sight.intruders);
-        match manner {
-            Manner::Optimizing | Manner::Reacting => self.talk(Topic::Decision, schedule.begins),
-            Manner::Alone | Manner::TooMany => self.decide_alone(manner, group.len()),
+        match self.world.groups {
+            Grouping::Announced => self.decide(schedule.begins),
+            Grouping::Heard => self.talk(Topic::Group, schedule.begins),
         }
         self.settle(schedule.begins);
     }
@@ -104,13 +100,15 @@ impl Pilot {
     fn take_up(&mut self, sight: Sight, schedule: Schedule) {
         assert_eq!(sight.own.id, self.id, "the sight is that of another airplane");
         if let Some(turn) = self.turn.take()
-            && let Stage::Deciding(talk) | Stage::Shielding(talk, _) = turn.stage
+            && let Stage::Grouping(talk) | Stage::Deciding(talk) | Stage::Shielding(talk, _) =
+                turn.stage
         {
             self.keep_past(talk);
         }
         let control = Control::orbit(self.id, sight.cycle, Memory::default());
         self.turn = Some(Turn {
             members: sight.members().into(),
+            unheard: Vec::new(),
             schedule,
             stage: Stage::Decided,
             considered: Considered::default(),
@@ -147,7 +145,7 @@ impl Pilot {
     pub fn next_timer(&self) -> Option<u64> {
         let turn = self.turn.as_ref()?;
         let present = match &turn.stage {
-            Stage::Deciding(talk) | Stage::Shielding(talk, _) => {
+            Stage::Grouping(talk) | Stage::Deciding(talk) | Stage::Shielding(talk, _) => {
                 let ends = talk.frame().ends;
                 Some(talk.next_timer().map_or(ends, |due| due.min(ends)))
             }
@@ -182,6 +180,7 @@ impl Pilot {
         // Questions were answered since.
         for talk in self.past.iter().filter(|talk| talk.frame().id.cycle == control.cycle) {
             let traffic = match talk.frame().id.topic {
+                Topic::Group => &mut control.grouping,
                 Topic::Decision => &mut control.deciding,
                 Topic::Shield => &mut control.shielding,
             };
@@ -190,9 +189,15 @@ impl Pilot {
         Some(control)
     }
 
+    /// Returns whether it knows with whom it decides in the present cycle.
+    pub fn has_group(&self) -> bool {
+        self.turn.as_ref().is_some_and(|turn| !matches!(turn.stage, Stage::Grouping(_)))
+    }
+
     /// Returns whether it knows what it wants in the present cycle.
     pub fn has_decided(&self) -> bool {
-        self.turn.as_ref().is_some_and(|turn| !matches!(turn.stage, Stage::Deciding(_)))
+        let is_open = |turn: &Turn| matches!(turn.stage, Stage::Grouping(_) | Stage::Deciding(_));
+        self.turn.as_ref().is_some_and(|turn| !is_open(turn))
     }
 
     /// Returns whether it has come to an end in the present cycle.
@@ -209,7 +214,9 @@ impl Pilot {
     /// Returns how far it has come in the talk that it is in, if it is in one.
     pub fn progress(&self) -> Option<Progress> {
         match &self.turn.as_ref()?.stage {
-            Stage::Deciding(talk) | Stage::Shielding(talk, _) => Some(talk.progress()),
+            Stage::Grouping(talk) | Stage::Deciding(talk) | Stage::Shielding(talk, _) => {
+                Some(talk.progress())
+            }
             Stage::Decided | Stage::Over => None,
         }
     }
@@ -257,7 +264,7 @@ impl Pilot {
     fn settle(&mut self, tick: u64) {
         while let Some(turn) = &mut self.turn {
             match &mut turn.stage {
-                Stage::Deciding(talk) | Stage::Shielding(talk, _)
+                Stage::Grouping(talk) | Stage::Deciding(talk) | Stage::Shielding(talk, _)
                     if talk.is_done() || tick >= talk.frame().ends =>
                 {
                     let ended = talk.end();
@@ -267,7 +274,7 @@ impl Pilot {
                         None => 0,
                     };
                     turn.note_traffic(ticks);
-                    self.conclude(ended);
+                    self.conclude(ended, tick);
                 }
                 Stage::Decided if tick >= turn.schedule.shield_from => {
                     self.talk(Topic::Shield, tick);
@@ -281,13 +288,21 @@ impl Pilot {
     fn talk(&mut self, topic: Topic, tick: u64) {
         let Some(turn) = &mut self.turn else { return };
         let world = &*self.world;
-        let Turn { sight, schedule, members, considered, .. } = turn;
+        let known: Arc<[EntityId]> = match topic {
+            Topic::Shield => turn.in_scene().into(),
+            Topic::Group | Topic::Decision => turn.members.clone(),
+        };
+        let Turn { sight, schedule, members, unheard, considered, .. } = turn;
         let (begins, ends) = schedule.of(topic, tick);
-        let id = TalkId::new(sight.cycle, topic, members);
+        let id = match topic {
+            // Nobody knows its members.
+            Topic::Group => TalkId::new(sight.cycle, topic, &[]),
+            Topic::Decision | Topic::Shield => TalkId::new(sight.cycle, topic, members),
+        };
         let is_silent = world.is_silent(self.id, sight.cycle);
         let radio = Radio {
-            group: members.clone(),
-            me: sight.me(),
+            me: known.binary_search(&self.id).expect("an airplane knows itself"),
+            group: known,
             patience: patience(world.network.as_ref(), topic),
             // A clock that has jumped may leave no time for it.
             ticks: ends.saturating_sub(begins),
@@ -300,15 +315,16 @@ impl Pilot {
             Topic::Shield => {
                 let allowed = allowed(world, sight, considered);
                 let ways: Vec<_> = allowed.iter().map(|&k| considered.ways[k].clone()).collect();
-                let party = proposes(world, sight, contacts, &ways, radio);
+                let party = proposes(world, (sight, unheard), contacts, &ways, radio);
                 Stage::Shielding(Talk::new(frame, party), allowed)
             }
+            Topic::Group => Stage::Grouping(Talk::new(frame, looks(world, sight, contacts, radio))),
             Topic::Decision if Manner::reacts(world) => {
                 let party = tells(world, sight, contacts, resolving, radio);
                 Stage::Deciding(Talk::new(frame, party))
             }
             Topic::Decision => {
-                let party = optimizes(world, sight, contacts, radio);
+                let party = optimizes(world, (sight, unheard), contacts, radio);
                 Stage::Deciding(Talk::new(frame, party))
             }
         };

@@ -11,8 +11,10 @@ use crate::world::AirspaceWorld;
 use sidestep_kernel::{EntityId, math};
 use std::sync::Arc;
 
-/// Returns the knowledge that all agents of a group share before they talk.
-pub(super) fn brief(world: &AirspaceWorld, sight: &Sight) -> Arc<Briefing> {
+/// Returns the knowledge that all agents of a group share before they talk. Each has its own of those near who
+/// are not heard, and takes them to fly straight on.
+pub(super) fn brief(world: &AirspaceWorld, sight: &Sight, not_heard: &[Sighted]) -> Arc<Briefing> {
+    let straight = not_heard.iter().map(|one| unheard(world, one));
     Arc::new(Briefing {
         now: sight.cycle,
         ids: sight.members().into(),
@@ -22,14 +24,18 @@ pub(super) fn brief(world: &AirspaceWorld, sight: &Sight) -> Arc<Briefing> {
         objective: world.objective,
         settings: world.settings,
         streams: world.streams,
-        intruders: sight.intruders.clone(),
+        intruders: sight.intruders.iter().cloned().chain(straight).collect(),
         is_shielded: world.shield,
     })
 }
 
 /// Returns the knowledge of an airplane's agent; `contacts` hold what it has heard of others before.
-pub(super) fn own_ship(world: &AirspaceWorld, sight: &Sight, contacts: &Contacts) -> OwnShip {
-    let (briefing, known) = (brief(world, sight), sight.own.known());
+pub(super) fn own_ship(
+    world: &AirspaceWorld,
+    (sight, unheard): (&Sight, &[Sighted]),
+    contacts: &Contacts,
+) -> OwnShip {
+    let (briefing, known) = (brief(world, sight, unheard), sight.own.known());
     let (beacon, mission) = (beacon(world, known), world.stage(known.slot, known.orders).mission);
     let me = sight.me();
     OwnShip {
@@ -82,28 +88,38 @@ fn presumed(world: &AirspaceWorld, id: EntityId) -> Contact {
     Contact { presumed: Some(orbiting), ..Contact::heard(beacon(world, known), heard_in) }
 }
 
-/// Returns the scene of the shield's exchange, as an airplane sees it.
-pub(super) fn scene(world: &AirspaceWorld, sight: &Sight) -> Scene {
-    let seen = |one: &Sighted| Seen {
+/// Returns whether plans hold that all have made from the same messages.
+pub(super) fn certainty(world: &AirspaceWorld) -> Certainty {
+    match world.network {
+        Some(_) => Certainty::Mixable,
+        None => Certainty::Sure,
+    }
+}
+
+/// Returns the scene of the shield's exchange, as an airplane sees it: its group, and those near who are not
+/// heard.
+pub(super) fn scene(world: &AirspaceWorld, sight: &Sight, unheard: &[Sighted]) -> Scene {
+    let seen = |(one, takes_part): (&Sighted, bool)| Seen {
         flyer: match one.id == sight.own.id {
             true => sight.own.flyer(world),
             false => other(world, &sight.own, one),
         },
         orbits: one.orbit.is_some(),
+        takes_part,
         top_m_s: world.top_m_s[one.id as usize],
         // One that was found by other means comes before those of its actions.
         most_ways: world.actions_of(one.id).len() + 1,
     };
+    let present = sight.group.iter().map(|one| (one, true));
+    let mut all: Vec<_> = present.chain(unheard.iter().map(|one| (one, false))).collect();
+    all.sort_unstable_by_key(|(one, _)| one.id);
     Scene {
         air: world.air(),
         vertical_m: world.vertical_m,
         now: sight.cycle,
-        certainty: match world.network {
-            Some(_) => Certainty::Mixable,
-            None => Certainty::Sure,
-        },
+        certainty: certainty(world),
         airplanes: world.airplanes.len(),
-        seen: sight.group.iter().map(seen).collect(),
+        seen: all.into_iter().map(seen).collect(),
     }
 }
 

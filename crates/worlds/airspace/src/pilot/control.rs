@@ -20,6 +20,8 @@ pub struct Control {
     pub course: Course,
     /// Outcome of the optimization; none where there was nothing to optimize.
     pub optimized: Option<Optimized>,
+    /// Packets of the talk about who decides together; none where that is announced.
+    pub grouping: Traffic,
     /// Packets of the talk about what each wants.
     pub deciding: Traffic,
     /// Packets of the shield's exchange.
@@ -98,6 +100,7 @@ impl Control {
             cycle,
             course: Course::Orbit,
             optimized: None,
+            grouping: Traffic::default(),
             deciding: Traffic::default(),
             shielding: Traffic::default(),
             events: Vec::new(),

@@ -67,8 +67,7 @@ impl AirspaceWorld {
     pub(crate) fn sights(&self, state: &AirspaceState, now: Cycle) -> Vec<Sight> {
         let mut all = Vec::new();
         self.perceived(state, now, |turn, flown, intruders| {
-            let slots: Vec<EntityId> = flown.iter().map(|known| known.slot).collect();
-            all.extend(Sight::all(turn, &slots, intruders));
+            all.extend(Sight::all(turn, flown, intruders));
         });
         all.sort_unstable_by_key(|sight| sight.own.id);
         all
@@ -82,10 +81,10 @@ impl AirspaceWorld {
             return all;
         }
         self.perceived(state, now, |turn, flown, _| {
-            for own in flown {
-                let is_beyond = |other: &EntityId| turn.state.apart_m([own.slot, *other]) > range_m;
-                let others = flown.iter().map(|known| known.slot).filter(|&id| id != own.slot);
-                all.push((own.slot, others.filter(is_beyond).collect()));
+            for &own in &flown.ids {
+                let is_beyond = |other: &EntityId| turn.state.apart_m([own, *other]) > range_m;
+                let others = flown.ids.iter().copied().filter(|&id| id != own);
+                all.push((own, others.filter(is_beyond).collect()));
             }
         });
         all.sort_unstable();

@@ -6,10 +6,10 @@
 //!              Packet  v   │  Packet               to and from the others of its group
 //! ```
 //!
-//! A [`Pilot`] knows the filed flights (the world), perceives a [`Sight`], talks with the others of its group
-//! first about what each wants and then about whether that is safe, and ends with a [`Control`]. It is a state
-//! machine without a clock, a socket or a thread. The simulator runs a group of them over a network in memory
-//! (`deploy/`); a process on a network runs one.
+//! A [`Pilot`] knows the filed flights (the world), perceives a [`Sight`], finds out with whom it decides where that
+//! is not announced, talks with the others of its group first about what each wants and then about whether that is
+//! safe, and ends with a [`Control`]. It is a state machine without a clock, a socket or a thread. The simulator
+//! runs a group of them over a network in memory (`deploy/`); a process on a network runs one.
 //!
 //! No process sees when all are done, so each ends by its own outcome or its deadline, and goes on to answer
 //! what others ask about talks that it has ended. One that is ahead may talk about what comes next: such

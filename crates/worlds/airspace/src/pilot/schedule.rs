@@ -13,7 +13,9 @@ const FOR_EVER: Patience =
 pub(crate) struct Schedule {
     /// Start of the first one.
     pub(crate) begins: u64,
-    /// Its end in any case.
+    /// End in any case of the talk about who decides together, where there is one.
+    pub(crate) grouped_by: u64,
+    /// End in any case of the talk about what each wants.
     pub(crate) decided_by: u64,
     /// Start of the shield's exchange, unless the first talk takes longer.
     pub(crate) shield_from: u64,
@@ -26,11 +28,14 @@ impl Schedule {
     /// over one that loses nothing the second follows on the first, and each takes as long as it takes.
     pub(crate) fn from(tick: u64, network: Option<&Network>) -> Self {
         let Some(network) = network else {
-            return Self { begins: tick, decided_by: u64::MAX, shield_from: tick, ends: u64::MAX };
+            let (grouped_by, decided_by, ends) = (u64::MAX, u64::MAX, u64::MAX);
+            return Self { begins: tick, grouped_by, decided_by, shield_from: tick, ends };
         };
         let long = network.deadline_ticks();
         Self {
             begins: tick,
+            // To find the group takes part of the time for decisions.
+            grouped_by: tick.saturating_add(long / 2),
             decided_by: tick.saturating_add(long),
             shield_from: tick.saturating_add(long + 1),
             ends: tick.saturating_add(2 * long + 1),
@@ -49,7 +54,8 @@ impl Schedule {
     /// Returns the first and the last tick of a talk that starts in `tick`.
     pub(crate) fn of(&self, topic: Topic, tick: u64) -> (u64, u64) {
         match topic {
-            Topic::Decision => (self.begins, self.decided_by),
+            Topic::Group => (tick, self.grouped_by),
+            Topic::Decision => (tick, self.decided_by),
             Topic::Shield => (tick.max(self.shield_from), self.ends),
         }
     }
@@ -58,7 +64,7 @@ impl Schedule {
 /// Returns how agents that do not answer are asked again.
 pub(crate) fn patience(network: Option<&Network>, topic: Topic) -> Patience {
     network.map_or(FOR_EVER, |network| match topic {
-        Topic::Decision => network.short_patience(),
+        Topic::Group | Topic::Decision => network.short_patience(),
         Topic::Shield => network.patience(),
     })
 }

@@ -2,8 +2,10 @@
 
 use crate::Turn;
 use crate::agents::Unsound;
+pub use crate::agents::grouping::Sighted;
 use crate::flight::{Known, Levels, Pose, Stage, distance_m};
 use crate::intruder::Intruder;
+use crate::join::Flown;
 use crate::perceive::seen;
 use crate::shield::{Flyer, Holding, Side, Way};
 use crate::wish::Wish;
@@ -25,9 +27,10 @@ pub struct Sight {
     pub cycle: Cycle,
     /// Its own airplane.
     pub own: Own,
-    /// Those who decide together in this cycle, itself among them, by rising id: what all see of each.
+    /// Those who decide together in this cycle, itself among them, by rising id: what all see of each. Where
+    /// groups are heard rather than announced, those near it.
     pub group: Vec<Sighted>,
-    /// Airplanes near the group that mind nobody, as all see them.
+    /// Airplanes near these that mind nobody, as all see them.
     pub intruders: Vec<Intruder>,
 }
 
@@ -58,19 +61,6 @@ pub struct Own {
     pub named: Vec<EntityId>,
     /// The wish that was ordered of it, if it is decided from outside.
     pub wish: Option<Wish>,
-}
-
-/// An airplane as others see it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Sighted {
-    /// The airplane.
-    pub id: EntityId,
-    /// Its pose, with the error of the cycle.
-    pub pose: Pose,
-    /// Altitude in meters.
-    pub altitude_m: f64,
-    /// The side to which it turns, if it is seen to be on its stored orbit.
-    pub orbit: Option<Side>,
 }
 
 impl Own {
@@ -169,17 +159,19 @@ impl Sighted {
 }
 
 impl Sight {
-    /// Returns what each airplane of a group perceives; `flown` are those that the method flies, by rising
-    /// id.
-    pub(crate) fn all(turn: &Turn<'_>, flown: &[Slot], intruders: &[Intruder]) -> Vec<Self> {
-        let group: Vec<Sighted> = flown.iter().map(|&slot| Sighted::of(turn, slot)).collect();
-        let one = |&slot: &Slot| Self {
-            cycle: turn.now,
-            own: Own::of(turn, slot),
-            group: group.clone(),
-            intruders: intruders.to_vec(),
+    /// Returns what each airplane of a group perceives; `intruders` are those that mind nobody.
+    pub(crate) fn all(turn: &Turn<'_>, flown: &Flown, intruders: &[Intruder]) -> Vec<Self> {
+        let group: Vec<Sighted> = flown.ids.iter().map(|&slot| Sighted::of(turn, slot)).collect();
+        let one = |(k, &slot): (usize, &Slot)| {
+            let sees = |id: Slot| flown.sees(k, id);
+            Self {
+                cycle: turn.now,
+                own: Own::of(turn, slot),
+                group: group.iter().filter(|one| sees(one.id)).copied().collect(),
+                intruders: intruders.iter().filter(|one| sees(one.slot)).cloned().collect(),
+            }
         };
-        flown.iter().map(one).collect()
+        flown.ids.iter().enumerate().map(one).collect()
     }
 
     /// Checks a sight that came off a network: that it is about airplanes of the world, its own among them.

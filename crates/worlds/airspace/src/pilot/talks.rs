@@ -1,10 +1,11 @@
 //! The talks of a cycle: the parties to them, by deployment and method, and what comes of them.
 
-use super::briefing::{filed, own_ship, scene};
+use super::briefing::{certainty, filed, own_ship, scene};
 use super::sight::Sight;
 use crate::agents::contact::Contacts;
 use crate::agents::coordinator::Host;
 use crate::agents::exchange::{self, Agreed};
+use crate::agents::grouping::{self, Found, Sighted};
 use crate::agents::intent::{self, Intent};
 use crate::agents::{
     Agent, Concludes, Conclusion, Ended, Endpoint, Outgoing, Party, Progress, Radio, Unsound,
@@ -20,12 +21,20 @@ use std::sync::Arc;
 
 /// The outcome of a talk.
 pub(super) enum Came {
+    /// Of looking for those who decide together.
+    Found(Found),
     /// Of an optimization.
     Decided(Conclusion),
     /// Of telling each other where all mean to fly.
     Told(Vec<Option<Intent>>),
     /// Of the shield's exchange.
     Agreed(Agreed),
+}
+
+impl From<Found> for Came {
+    fn from(found: Found) -> Self {
+        Self::Found(found)
+    }
 }
 
 impl From<Conclusion> for Came {
@@ -102,14 +111,41 @@ where
     Box::new(Any(Endpoint::new(agent, radio)))
 }
 
-/// Returns the party of the deployment to an optimization.
-pub(super) fn optimizes(
+/// Returns the party to a talk about who decides together.
+pub(super) fn looks(
     world: &AirspaceWorld,
     sight: &Sight,
     contacts: &Contacts,
     radio: Radio,
 ) -> Box<Speaker> {
-    let own = own_ship(world, sight, contacts);
+    let network = world.network.as_ref();
+    let start = grouping::Start {
+        me: radio.me,
+        near: sight.group.clone(),
+        intruders: sight.intruders.clone(),
+        expected: expected(sight, contacts),
+        airplanes: world.airplanes.len(),
+        range_m: network.map_or(f64::INFINITY, |network| network.range_m),
+        certainty: certainty(world),
+    };
+    endpoint(grouping::Agent::new(start), radio)
+}
+
+/// Returns of each one of a group whether it was heard lately, or is met for the first time.
+fn expected(sight: &Sight, contacts: &Contacts) -> Vec<bool> {
+    let is_expected =
+        |id: EntityId| contacts.get(&id).is_none_or(|contact| contact.heard_in + 1 >= sight.cycle);
+    sight.group.iter().map(|one| is_expected(one.id)).collect()
+}
+
+/// Returns the party of the deployment to an optimization, beside those near who are not heard.
+pub(super) fn optimizes(
+    world: &AirspaceWorld,
+    (sight, unheard): (&Sight, &[Sighted]),
+    contacts: &Contacts,
+    radio: Radio,
+) -> Box<Speaker> {
+    let own = own_ship(world, (sight, unheard), contacts);
     match (world.deployment, world.settings.estimator) {
         (Deployment::Pim | Deployment::HierarchicalPim, _) => {
             let is_hierarchy = world.deployment == Deployment::HierarchicalPim;
@@ -134,8 +170,6 @@ pub(super) fn tells(
     radio: Radio,
 ) -> Box<Speaker> {
     let own = &sight.own;
-    let expected =
-        |id: EntityId| contacts.get(&id).is_none_or(|contact| contact.heard_in + 1 >= sight.cycle);
     let start = intent::Start {
         me: radio.me,
         own: Intent {
@@ -146,7 +180,7 @@ pub(super) fn tells(
         },
         filed: sight.group.iter().map(|one| filed(world, one.id)).collect(),
         airplanes: world.airplanes.len(),
-        expected: sight.group.iter().map(|one| expected(one.id)).collect(),
+        expected: expected(sight, contacts),
     };
     endpoint(intent::Agent::new(start), radio)
 }
@@ -154,11 +188,11 @@ pub(super) fn tells(
 /// Returns the party to the shield's exchange of an airplane that may fly some ways.
 pub(super) fn proposes(
     world: &AirspaceWorld,
-    sight: &Sight,
+    (sight, unheard): (&Sight, &[Sighted]),
     contacts: &Contacts,
     ways: &[Way],
     radio: Radio,
 ) -> Box<Speaker> {
-    let scene = Arc::new(scene(world, sight));
+    let scene = Arc::new(scene(world, sight, unheard));
     endpoint(exchange::Agent::new(scene, radio.me, ways, contacts.clone()), radio)
 }

@@ -3,7 +3,7 @@
 use super::{AirspaceFile, Compiled, Preset, Recipe};
 use crate::agents::packet::fingerprint;
 use crate::baseline::Reactive;
-use crate::deploy::refuses;
+use crate::deploy::{Deployment, refuses};
 use crate::flight::Levels;
 use crate::flight::{Airplane, Task};
 use crate::flight::{Passing, Timing};
@@ -11,7 +11,7 @@ use crate::memory::largest_at_start;
 use crate::perceive::seen;
 use crate::shield::{Bounds, Flyer, Named, Side, first_fallbacks};
 use crate::state::AirspaceState;
-use crate::world::{AirspaceWorld, Disturbance, Method};
+use crate::world::{AirspaceWorld, Disturbance, Grouping, Method};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
 use sidestep_scenario::{Seeds, Source, Spanned};
@@ -126,6 +126,10 @@ impl<'a> Compiler<'a> {
             mvp: section.mvp.or(MVP),
             orca: section.orca.or(ORCA),
             deployment: section.deployment,
+            groups: section
+                .groups
+                .as_ref()
+                .map_or_else(Grouping::default, |given| *given.get_ref()),
             group_bytes: (section.group_memory_gib.map_or(2.0, f64::from) * GIB) as u64,
             shield: section.shield.0,
             vertical_m,
@@ -205,6 +209,15 @@ impl<'a> Compiler<'a> {
 
     /// Refuses settings that the deployment cannot compute.
     fn fits_deployment(&self, world: &AirspaceWorld) -> Result<(), InputError> {
+        if let Some(given) = &self.file.airspace.groups
+            && (world.groups, world.deployment) == (Grouping::Heard, Deployment::Direct)
+        {
+            let cause =
+                "groups that are heard, but one process decides for all (deployment = \"direct\")";
+            let remedy = "set deployment to team, compact-team, pim or hierarchical-pim, or leave \
+                          groups out";
+            return Err(self.source.error(given.span(), cause, remedy));
+        }
         if let Some(reason) = refuses(world.deployment, &world.settings) {
             let cause = format!("deployment {}: {reason}", world.deployment.name());
             let remedy = "set order = \"parallel\" and utility = \"joint\", or \

@@ -21,6 +21,8 @@ pub struct Seen {
     pub flyer: Flyer,
     /// Whether it is seen to be on its fallback.
     pub orbits: bool,
+    /// Whether it takes part in the exchange, so that it may be heard.
+    pub takes_part: bool,
     /// Its greatest speed in meters per second.
     pub top_m_s: f64,
     /// Largest number of different ways that it can propose.

@@ -5,15 +5,48 @@ use super::turn::Stage;
 use crate::agents::contact::{Contacts, note};
 use crate::agents::exchange::Agreed;
 use crate::agents::intent::Intent;
+use crate::agents::packet::Topic;
 use crate::agents::{Conclusion, Ended};
 use crate::decide::{Considered, Manner, alone, as_decided, by_velocity};
 use crate::events::{Event, EventKind};
 use crate::flight::Known;
 use crate::pilot::briefing::unheard;
 use crate::pilot::control::{Course, Optimized};
+use crate::pilot::sight::Sighted;
 use crate::pilot::talks::Came;
 
 impl Pilot {
+    /// Notes who decides together, as it has found; without an outcome it is alone.
+    fn is_grouped(&mut self, came: Option<Came>, tick: u64) {
+        let Some(turn) = &mut self.turn else { return };
+        let sight = &mut turn.sight;
+        let near = std::mem::take(&mut sight.group);
+        match came {
+            Some(Came::Found(found)) => {
+                (sight.group, sight.intruders) = (found.members, found.intruders);
+            }
+            _ => sight.group = near.iter().filter(|one| one.id == self.id).copied().collect(),
+        }
+        turn.members = sight.members().into();
+        let is_member = |one: &Sighted| turn.members.binary_search(&one.id).is_ok();
+        turn.unheard = near.into_iter().filter(|one| !is_member(one)).collect();
+        let unheard = turn.unheard.iter().map(|one| one.id).collect();
+        turn.note_unheard(&self.world, unheard, &self.memory.contacts);
+        self.decide(tick);
+    }
+
+    /// Starts to find out what it wants.
+    pub(super) fn decide(&mut self, tick: u64) {
+        let Some(turn) = &self.turn else { return };
+        let group: Vec<Known> = turn.sight.group.iter().map(|one| one.known()).collect();
+        let others = turn.sight.intruders.len() + turn.unheard.len();
+        let manner = Manner::of(&self.world, &group, others);
+        match manner {
+            Manner::Optimizing | Manner::Reacting => self.talk(Topic::Decision, tick),
+            Manner::Alone | Manner::TooMany => self.decide_alone(manner, group.len()),
+        }
+    }
+
     /// Decides without a talk.
     pub(super) fn decide_alone(&mut self, manner: Manner, members: usize) {
         let Some(turn) = &mut self.turn else { return };
@@ -47,12 +80,16 @@ impl Pilot {
     }
 
     /// Ends the talk that it is in, and draws the conclusion from it.
-    pub(super) fn conclude(&mut self, ended: Ended<Came>) {
+    pub(super) fn conclude(&mut self, ended: Ended<Came>, tick: u64) {
         let Some(turn) = &mut self.turn else { return };
         if self.world.network.is_some() {
             turn.note_end(&self.world, &ended, &self.memory.contacts);
         }
         match std::mem::replace(&mut turn.stage, Stage::Decided) {
+            Stage::Grouping(talk) => {
+                self.keep_past(talk);
+                self.is_grouped(ended.outcome, tick);
+            }
             Stage::Deciding(talk) => {
                 self.keep_past(talk);
                 match ended.outcome {
@@ -108,7 +145,8 @@ impl Pilot {
     fn react(&mut self, told: &[Option<Intent>]) {
         let Some(turn) = &self.turn else { return };
         let (mut group, mut memory, mut me) = (Vec::new(), Vec::new(), 0);
-        let mut intruders = turn.sight.intruders.clone();
+        let beside = turn.unheard.iter().map(|one| unheard(&self.world, one));
+        let mut intruders: Vec<_> = turn.sight.intruders.iter().cloned().chain(beside).collect();
         for (one, intent) in turn.sight.group.iter().zip(told) {
             let Some(intent) = intent else {
                 intruders.push(unheard(&self.world, one));

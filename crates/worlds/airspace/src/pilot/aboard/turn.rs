@@ -8,7 +8,7 @@ use crate::decide::Considered;
 use crate::events::{Event, EventKind};
 use crate::pilot::control::Control;
 use crate::pilot::schedule::Schedule;
-use crate::pilot::sight::Sight;
+use crate::pilot::sight::{Sight, Sighted};
 use crate::pilot::talks::{Came, Speaker};
 use crate::world::AirspaceWorld;
 use sidestep_kernel::EntityId;
@@ -18,7 +18,10 @@ use std::sync::Arc;
 pub(super) struct Turn {
     pub(super) sight: Sight,
     pub(super) schedule: Schedule,
+    /// Ids of those who decide together as far as it knows, rising.
     pub(super) members: Arc<[EntityId]>,
+    /// Those near who are not among them, by rising id.
+    pub(super) unheard: Vec<Sighted>,
     pub(super) stage: Stage,
     pub(super) considered: Considered,
     /// Its control, as far as that is decided.
@@ -27,6 +30,8 @@ pub(super) struct Turn {
 
 /// The part of a cycle that an airplane is in.
 pub(super) enum Stage {
+    /// In a talk about who decides together.
+    Grouping(Talk<Speaker>),
     /// In a talk about what each wants.
     Deciding(Talk<Speaker>),
     /// It knows what it wants, and waits until the shield's exchange starts.
@@ -53,7 +58,7 @@ impl Turn {
     /// Returns the talk that it is in.
     pub(super) fn talk(&mut self) -> Option<&mut Talk<Speaker>> {
         match &mut self.stage {
-            Stage::Deciding(talk) | Stage::Shielding(talk, _) => Some(talk),
+            Stage::Grouping(talk) | Stage::Deciding(talk) | Stage::Shielding(talk, _) => Some(talk),
             Stage::Decided | Stage::Over => None,
         }
     }
@@ -61,6 +66,7 @@ impl Turn {
     /// Returns where a talk stands that is none of those that it has been in.
     pub(super) fn stands_at(&self, talk: &TalkId) -> Stands {
         let topic = match self.stage {
+            Stage::Grouping(_) => Topic::Group,
             Stage::Deciding(_) | Stage::Decided => Topic::Decision,
             Stage::Shielding(..) | Stage::Over => Topic::Shield,
         };
@@ -78,6 +84,7 @@ impl Turn {
     /// Notes the packets of the talk that it is in, and the time that it took.
     pub(super) fn note_traffic(&mut self, ticks: u64) {
         let (traffic, noted) = match &self.stage {
+            Stage::Grouping(talk) => (talk.traffic(), &mut self.control.grouping),
             Stage::Deciding(talk) => (talk.traffic(), &mut self.control.deciding),
             Stage::Shielding(talk, _) => (talk.traffic(), &mut self.control.shielding),
             Stage::Decided | Stage::Over => return,
@@ -92,17 +99,47 @@ impl Turn {
         end: &Ended<Came>,
         contacts: &Contacts,
     ) {
+        // Who is missing where groups are found is told once it is known who is in them.
+        let is_group = matches!(self.stage, Stage::Grouping(_));
+        let missing = end.unheard.iter().filter(|_| !is_group);
+        self.note_unheard(world, missing.map(|&place| self.spoken_to()[place]).collect(), contacts);
+        if end.late {
+            let event = Event::of(self.sight.cycle, EventKind::Deadline, self.sight.own.id);
+            self.control.events.push(event);
+        }
+    }
+
+    /// Returns the ids of those that the party to the present talk knows, by their places.
+    fn spoken_to(&self) -> Vec<EntityId> {
+        match self.stage {
+            Stage::Shielding(..) => self.in_scene(),
+            _ => self.members.to_vec(),
+        }
+    }
+
+    /// Returns the ids of all whom the shield minds: its group, and those near who are not heard, rising.
+    pub(super) fn in_scene(&self) -> Vec<EntityId> {
+        let unheard = self.unheard.iter().map(|one| one.id);
+        let mut all: Vec<EntityId> = self.members.iter().copied().chain(unheard).collect();
+        all.sort_unstable();
+        all
+    }
+
+    /// Notes the others of whom nothing is heard any more.
+    pub(super) fn note_unheard(
+        &mut self,
+        world: &AirspaceWorld,
+        unheard: Vec<EntityId>,
+        contacts: &Contacts,
+    ) {
         let (id, now) = (self.sight.own.id, self.sight.cycle);
         let heard_in = |other: &EntityId| match contacts.get(other) {
             Some(contact) => contact.heard_in,
             None => world.appears_in(*other as usize),
         };
-        let unheard = end.unheard.iter().map(|&place| self.members[place]);
-        let lost = unheard.filter(|other| heard_in(other) + 1 >= now);
-        let events = &mut self.control.events;
-        events.extend(lost.map(|other| Event::of_pair(now, EventKind::Unheard, id, other)));
-        if end.late {
-            events.push(Event::of(now, EventKind::Deadline, id));
-        }
+        let lost = unheard.into_iter().filter(|other| heard_in(other) + 1 >= now);
+        let lost: Vec<Event> =
+            lost.map(|other| Event::of_pair(now, EventKind::Unheard, id, other)).collect();
+        self.control.events.extend(lost);
     }
 }

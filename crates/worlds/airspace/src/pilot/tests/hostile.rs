@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 
 const THREE: &str = "[airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 2600.0\n";
 
-const KINDS: [&str; 12] = [
+const KINDS: [&str; 14] = [
     "deployment = \"team\"",
     "deployment = \"compact-team\"",
     "deployment = \"team\"\npreset = \"paper\"",
@@ -22,6 +22,8 @@ const KINDS: [&str; 12] = [
     "deployment = \"team\"\nmethod = \"mvp\"",
     "deployment = \"team\"\nmethod = \"none\"\nnetwork = {}",
     "deployment = \"team\"\nnetwork = { loss = 0.2 }",
+    "deployment = \"compact-team\"\ngroups = \"heard\"",
+    "deployment = \"compact-team\"\ngroups = \"heard\"\nnetwork = { loss = 0.2 }",
 ];
 
 /// Changes some bytes, or cuts some off, or adds some.
@@ -79,10 +81,7 @@ fn told_more(
     loop {
         for pilot in &mut *pilots {
             for Packet { to, payload, .. } in pilot.take_packets() {
-                let others = pilot.group().iter().filter(|&&other| other != pilot.id());
-                for &other in others.filter(|&&other| to.is_none_or(|to| to == other)) {
-                    due.push_back((pilot.id(), other, payload.clone()));
-                }
+                due.extend(to.iter().map(|&other| (pilot.id(), other, payload.clone())));
             }
         }
         tick += 1;

@@ -25,10 +25,7 @@ fn decided(pilots: &mut [Pilot], sights: Vec<Sight>, draws: &mut Draws) -> Vec<C
             Due::Packet(from, bytes) => pilot.on_packet(from, &bytes, 0),
         }
         for Packet { to, payload, .. } in pilot.take_packets() {
-            let others = pilot.group().iter().filter(|&&other| other != id);
-            for &other in others.filter(|&&other| to.is_none_or(|to| to == other)) {
-                due.push((other, Due::Packet(id, payload.clone())));
-            }
+            due.extend(to.iter().map(|&other| (other, Due::Packet(id, payload.clone()))));
         }
     }
     let control = |&id: &EntityId| pilots[id as usize].control().expect("nobody waits any more");
@@ -53,6 +50,8 @@ proptest! {
             "deployment = \"team\"\nmethod = \"mvp\"",
             "deployment = \"compact-team\"\nmethod = \"orca\"",
             "deployment = \"team\"\nmethod = \"none\"",
+            "deployment = \"compact-team\"\ngroups = \"heard\"",
+            "deployment = \"pim\"\ngroups = \"heard\"",
         ]),
     ) {
         let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(901));

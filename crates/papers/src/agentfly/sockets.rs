@@ -1,0 +1,222 @@
+//! The same flights by processes, which talk over real sockets, beside those in one process.
+//!
+//! Who runs the experiments hands over how a fleet is flown: this crate opens no socket and starts no process.
+//! Messages and bytes are counted at the nodes, heads of packets included and those of the network below not. Time is
+//! that of a clock from when all nodes have joined to the end of the flight, so it depends on the machine and on
+//! what else runs on it.
+
+use super::{AIRPLANES, Plan, SCENARIO, claim};
+use crate::claims::{Comparison, judged, listed};
+use crate::study::{Progress, finish, setting, source};
+use serde::Serialize;
+use sidestep::kernel::InputError;
+use sidestep::worlds::airspace::airspace_run;
+use sidestep_document::claim::Claim;
+use sidestep_document::{Estimate, Table};
+use std::time::Instant;
+
+/// Deployments whose agents can be processes.
+const DEPLOYMENTS: [&str; 4] = ["team", "compact-team", "pim", "hierarchical-pim"];
+
+/// A flight, as it was measured.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Measured {
+    /// Seconds by a clock.
+    pub elapsed_s: f64,
+    /// Messages, one per receiver.
+    pub messages: f64,
+    /// Bytes of the messages.
+    pub bytes: f64,
+}
+
+/// What flies a scenario by processes: it is given the scenario's text.
+pub type Flies<'a, E> = dyn FnMut(&str) -> Result<Measured, E> + 'a;
+
+/// The measurements over sockets, or the reason why there are none.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sockets {
+    /// They were left out.
+    LeftOut {
+        /// The reason, and how to get them.
+        reason: String,
+    },
+    /// By number of airplanes, and then by deployment.
+    Measured(Vec<Case>),
+}
+
+/// The flights of some airplanes with one deployment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Case {
+    /// Number of airplanes.
+    pub airplanes: usize,
+    /// The deployment.
+    pub deployment: &'static str,
+    /// By seed, in one process.
+    pub alone: Vec<Measured>,
+    /// By seed, over sockets.
+    pub over_sockets: Vec<Measured>,
+}
+
+/// Measures the flights of a plan in one process, and by `flies`.
+///
+/// # Errors
+/// When the plan asks for an impossible scenario, and those of `flies`.
+pub fn measure<E: From<InputError>>(
+    plan: &Plan,
+    flies: &mut Flies<'_, E>,
+    progress: &mut Progress<'_>,
+) -> Result<Sockets, E> {
+    let all = plan.sockets.airplanes.iter().flat_map(|&n| DEPLOYMENTS.map(|name| (n, name)));
+    let all: Vec<(usize, &'static str)> = all.collect();
+    let mut cases = Vec::with_capacity(all.len());
+    for (k, &(airplanes, deployment)) in all.iter().enumerate() {
+        progress("fleets over sockets", k as f64 / all.len() as f64);
+        let (mut alone, mut over_sockets) = (Vec::new(), Vec::new());
+        for seed in 1..=plan.sockets.seeds as i64 {
+            let settings = [
+                setting("seed", seed),
+                setting(AIRPLANES, airplanes as i64),
+                setting("airspace.deployment", deployment),
+                setting("cycles", plan.sockets.cycles as i64),
+            ];
+            let text = source(SCENARIO, &settings)?.text;
+            alone.push(in_one_process(&text)?);
+            over_sockets.push(flies(&text)?);
+        }
+        cases.push(Case { airplanes, deployment, alone, over_sockets });
+    }
+    Ok(Sockets::Measured(cases))
+}
+
+fn in_one_process(text: &str) -> Result<Measured, InputError> {
+    let mut run = airspace_run(&source(text, &[])?, 1)?;
+    let began = Instant::now();
+    finish(&mut run, |_| {});
+    let (elapsed_s, metrics) = (began.elapsed().as_secs_f64(), run.metrics());
+    Ok(Measured { elapsed_s, messages: metrics.messages as f64, bytes: metrics.bytes as f64 })
+}
+
+fn each(measured: &[Measured], of: fn(&Measured) -> f64) -> Vec<Option<f64>> {
+    measured.iter().map(|one| Some(of(one))).collect()
+}
+
+impl Case {
+    /// Returns how many times as long the flight takes over sockets, seed by seed.
+    fn slower(&self) -> Estimate {
+        let [sockets, alone] = [&self.over_sockets, &self.alone].map(|m| each(m, |m| m.elapsed_s));
+        Estimate::ratio(&sockets, &alone)
+    }
+
+    fn cells(&self) -> Vec<String> {
+        let of: [fn(&Measured) -> f64; 3] = [|m| m.elapsed_s, |m| m.messages, |m| m.bytes];
+        let pair = |of| [&self.alone, &self.over_sockets].map(|all| Estimate::of(each(all, of)));
+        let case = [self.airplanes.to_string(), self.deployment.to_string()];
+        let numbers = of.into_iter().flat_map(pair).map(|estimate| estimate.to_string());
+        case.into_iter().chain(numbers).chain([self.slower().to_string()]).collect()
+    }
+}
+
+impl Sockets {
+    /// Returns the claim about time, judged by what was measured; none without measurements.
+    pub(super) fn claim(&self) -> Option<Claim> {
+        let Self::Measured(cases) = self else { return None };
+        let times = |name: &str, airplanes: usize| {
+            let is_it = |case: &&Case| case.deployment == name && case.airplanes == airplanes;
+            let of = |case: &Case| each(&case.over_sockets, |m| m.elapsed_s);
+            cases.iter().find(is_it).map_or_else(Vec::new, of)
+        };
+        let teams = cases.iter().filter(|case| case.deployment == "team");
+        let ratio = |case: &Case| {
+            Estimate::ratio(
+                &times("pim", case.airplanes),
+                &each(&case.over_sockets, |m| m.elapsed_s),
+            )
+        };
+        let ratios: Vec<Estimate> = teams.map(ratio).collect();
+        let verdict = judged(ratios.iter().map(|ratio| Comparison::above(ratio, 1.0)));
+        let ours = format!("pim / team: {}", listed(&ratios, ToString::to_string));
+        Some(claim("A-7", verdict, ours))
+    }
+
+    /// Returns all numbers.
+    pub(super) fn table(&self) -> Table {
+        let left_out;
+        let note = match self {
+            Self::Measured(_) => {
+                "Per run, with 95 % intervals: in one process, and with a process for each airplane, which \
+                 talk over sockets of the loopback, in lockstep. Time is that of a clock, from when all have \
+                 joined to the end; bytes are those of packets, without what the network below adds."
+            }
+            Self::LeftOut { reason } => {
+                left_out = format!("Left out: {reason}");
+                &left_out
+            }
+        };
+        let heads = [
+            "airplanes",
+            "deployment",
+            "time, s",
+            "over sockets",
+            "messages",
+            "over sockets",
+            "bytes",
+            "over sockets",
+            "time, times as long",
+        ];
+        let mut table = Table::new("Over real sockets", note, &heads);
+        if let Self::Measured(cases) = self {
+            cases.iter().for_each(|case| table.row(case.cells()));
+        }
+        table
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::SocketsPlan;
+    use super::*;
+    use sidestep_document::claim::Verdict;
+
+    fn plan(seeds: usize) -> Plan {
+        let sockets = SocketsPlan { airplanes: vec![3], seeds, cycles: 8 };
+        Plan { sockets, ..Plan::quick() }
+    }
+
+    /// Measures what takes as long as `times` says of the flights of a deployment.
+    fn measured(seeds: usize, times: impl Fn(&str) -> f64) -> Sockets {
+        let mut flies = |text: &str| -> Result<Measured, InputError> {
+            let name = DEPLOYMENTS.iter().find(|name| text.contains(&format!("\"{name}\"")));
+            let alone = in_one_process(text)?;
+            Ok(Measured { elapsed_s: times(name.expect("a deployment")), ..alone })
+        };
+        measure(&plan(seeds), &mut flies, &mut |_, _| ()).expect("right")
+    }
+
+    #[test]
+    fn every_deployment_is_measured_beside_itself_in_one_process() {
+        let Sockets::Measured(cases) = measured(2, |_| 3.0) else { panic!("measured") };
+        assert_eq!(cases.iter().map(|case| case.deployment).collect::<Vec<_>>(), DEPLOYMENTS);
+        for case in &cases {
+            assert!(case.alone[0].messages > 0.0, "{case:?}");
+            assert_eq!(case.alone[0].messages, case.over_sockets[0].messages);
+            assert_eq!(case.cells().len(), Sockets::Measured(Vec::new()).table().columns.len());
+        }
+    }
+
+    #[test]
+    fn a_slower_coordinator_holds_the_claim_and_a_faster_one_refutes_it() {
+        let verdict = |pim_s: f64| {
+            let measured = measured(5, |name| if name == "pim" { pim_s } else { 1.0 });
+            measured.claim().expect("judged").verdict
+        };
+        assert_eq!((verdict(2.0), verdict(0.5)), (Verdict::Held, Verdict::Refuted));
+    }
+
+    #[test]
+    fn what_was_left_out_judges_nothing_and_says_why() {
+        let left_out = Sockets::LeftOut { reason: "it is not there; get it".into() };
+        assert_eq!(left_out.claim(), None);
+        assert_eq!(left_out.table().note, "Left out: it is not there; get it");
+    }
+}

@@ -1,0 +1,93 @@
+//! What airplanes tell about themselves before they know whom they decide with.
+
+use crate::agents::party::{Unsound, are_places};
+use crate::flight::Pose;
+use crate::intruder::Intruder;
+use crate::shield::Side;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::EntityId;
+
+/// Bound on headings in radians that anybody tells.
+const FARTHEST_RAD: f64 = 1e6;
+
+/// An airplane as others see it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Sighted {
+    /// The airplane.
+    pub id: EntityId,
+    /// Its pose, with the error of the cycle.
+    pub pose: Pose,
+    /// Altitude in meters.
+    pub altitude_m: f64,
+    /// The side to which it turns, if it is seen to be on its stored orbit.
+    pub orbit: Option<Side>,
+}
+
+/// A message by which an airplane makes itself known.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Beacon {
+    /// The sender, as all see it.
+    pub own: Sighted,
+    /// Ids of those that it sees near it, rising.
+    pub near: Vec<EntityId>,
+    /// Airplanes near it that mind nobody, by rising id.
+    pub intruders: Vec<Intruder>,
+}
+
+/// Something that is known of an airplane.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Item {
+    /// Its beacon.
+    Beacon(Beacon),
+    /// Its report.
+    Report {
+        /// The airplane.
+        about: EntityId,
+        /// Ids of those near it whose beacons it has heard from themselves, rising.
+        heard: Vec<EntityId>,
+    },
+}
+
+impl Item {
+    /// The airplane that it is about.
+    pub(super) fn about(&self) -> EntityId {
+        match self {
+            Self::Beacon(beacon) => beacon.own.id,
+            Self::Report { about, .. } => *about,
+        }
+    }
+
+    /// Checks what it says, in a world of some airplanes.
+    pub(super) fn check(&self, airplanes: usize) -> Result<(), Unsound> {
+        let list = match self {
+            Self::Beacon(beacon) => &beacon.near,
+            Self::Report { heard, .. } => heard,
+        };
+        let is_known = |id: EntityId| (id as usize) < airplanes;
+        let rises = list.windows(2).all(|pair| pair[0] < pair[1]);
+        let are_others = list.iter().all(|&id| is_known(id) && id != self.about());
+        Unsound::Airplane.unless(is_known(self.about()) && rises && are_others)?;
+        match self {
+            Self::Beacon(beacon) => beacon.check(airplanes),
+            Self::Report { .. } => Ok(()),
+        }
+    }
+}
+
+impl Beacon {
+    fn check(&self, airplanes: usize) -> Result<(), Unsound> {
+        let Sighted { pose: Pose { at: [x, y], heading_rad }, altitude_m, .. } = self.own;
+        Unsound::Number.unless(heading_rad.abs() < FARTHEST_RAD)?;
+        Unsound::Number.unless(are_places([x, y, altitude_m]))?;
+        let rises = self.intruders.windows(2).all(|pair| pair[0].slot < pair[1].slot);
+        let are_known = self.intruders.iter().all(|one| (one.slot as usize) < airplanes);
+        Unsound::Airplane.unless(rises && are_known)?;
+        Unsound::Number.unless(self.intruders.iter().all(Intruder::is_sound))
+    }
+}
+
+/// Returns the largest number of bytes of an item in a world of some airplanes.
+pub(super) fn most_bytes(airplanes: usize) -> usize {
+    // Of each other one its id, and perhaps where it is seen to fly.
+    64 + airplanes * (5 + 96)
+}

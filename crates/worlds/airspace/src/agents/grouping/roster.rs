@@ -1,0 +1,115 @@
+//! What is known of who sees and who hears whom, and the groups that follow from it.
+
+use super::beacon::{Beacon, Item};
+use sidestep_kernel::EntityId;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The items that one airplane knows, its own among them.
+#[derive(Debug)]
+pub(super) struct Roster {
+    beacons: BTreeMap<EntityId, Beacon>,
+    reports: BTreeMap<EntityId, Vec<EntityId>>,
+    /// Whether all hear all that are near them, without a report.
+    is_sure: bool,
+}
+
+impl Roster {
+    /// Returns the roster of an airplane that has heard nothing yet.
+    pub(super) fn new(own: Beacon, is_sure: bool) -> Self {
+        let beacons = BTreeMap::from([(own.own.id, own)]);
+        Self { beacons, reports: BTreeMap::new(), is_sure }
+    }
+
+    /// Notes a beacon. Returns whether there was none of the airplane; what it says itself counts for more than
+    /// what others pass on.
+    pub(super) fn note_beacon(&mut self, beacon: Beacon, is_own: bool) -> bool {
+        let id = beacon.own.id;
+        if !is_own && self.beacons.contains_key(&id) {
+            return false;
+        }
+        self.beacons.insert(id, beacon).is_none()
+    }
+
+    /// Notes whom an airplane has heard. Returns whether that is new: the first report counts.
+    pub(super) fn note_report(&mut self, id: EntityId, heard: Vec<EntityId>) -> bool {
+        let is_new = !self.reports.contains_key(&id);
+        self.reports.entry(id).or_insert(heard);
+        is_new
+    }
+
+    pub(super) fn beacon(&self, id: EntityId) -> Option<&Beacon> {
+        self.beacons.get(&id)
+    }
+
+    /// Returns whether the beacon of an airplane is known.
+    pub(super) fn knows(&self, id: EntityId) -> bool {
+        self.beacons.contains_key(&id)
+    }
+
+    /// Returns whether all is known of an airplane that there is to know.
+    pub(super) fn is_known(&self, id: EntityId) -> bool {
+        self.knows(id) && self.heard_by(id).is_some()
+    }
+
+    /// Returns an item about an airplane.
+    pub(super) fn item(&self, about: EntityId, is_report: bool) -> Option<Item> {
+        if is_report {
+            let heard = self.reports.get(&about)?.clone();
+            return Some(Item::Report { about, heard });
+        }
+        self.beacons.get(&about).cloned().map(Item::Beacon)
+    }
+
+    /// Returns whether one airplane does not hear another one's items from itself, as far as is known.
+    pub(super) fn lacks(&self, id: EntityId, about: EntityId) -> bool {
+        let has_not_heard = |heard: &Vec<EntityId>| heard.binary_search(&about).is_err();
+        !self.sees(about, id) || self.reports.get(&id).is_some_and(has_not_heard)
+    }
+
+    /// Returns those near an airplane that it has heard, if that is known.
+    fn heard_by(&self, id: EntityId) -> Option<&[EntityId]> {
+        match self.is_sure {
+            true => self.beacons.get(&id).map(|beacon| &beacon.near[..]),
+            false => self.reports.get(&id).map(Vec::as_slice),
+        }
+    }
+
+    fn sees(&self, id: EntityId, other: EntityId) -> bool {
+        self.beacons.get(&id).is_some_and(|beacon| beacon.near.binary_search(&other).is_ok())
+    }
+
+    fn hears(&self, id: EntityId, other: EntityId) -> bool {
+        self.heard_by(id).is_some_and(|heard| heard.binary_search(&other).is_ok())
+    }
+
+    /// Returns whether two airplanes hear each other.
+    fn is_linked(&self, a: EntityId, b: EntityId) -> bool {
+        self.knows(a) && self.knows(b) && self.hears(a, b) && self.hears(b, a)
+    }
+
+    /// Returns all to whom a chain of airplanes that hear each other leads from one, itself among them, and
+    /// whether all is known that this depends on.
+    fn chain(&self, from: EntityId) -> (BTreeSet<EntityId>, bool) {
+        let (mut chain, mut due, mut is_complete) = (BTreeSet::from([from]), vec![from], true);
+        while let Some(id) = due.pop() {
+            is_complete &= self.is_known(id);
+            for &other in self.heard_by(id).unwrap_or_default() {
+                is_complete &= self.is_known(other);
+                if self.is_linked(id, other) && chain.insert(other) {
+                    due.push(other);
+                }
+            }
+        }
+        (chain, is_complete)
+    }
+
+    /// Returns whether all is known on which the group of an airplane depends.
+    pub(super) fn is_complete(&self, id: EntityId) -> bool {
+        self.chain(id).1
+    }
+
+    /// Returns the group of an airplane, itself among it, by rising id.
+    pub(super) fn group(&self, id: EntityId) -> Vec<EntityId> {
+        self.chain(id).0.into_iter().collect()
+    }
+}

@@ -1,0 +1,172 @@
+//! Agents that look for their groups, over links of which some never carry anything.
+
+use super::*;
+use crate::flight::Pose;
+use crate::shield::Side;
+use link::Agent as _;
+use proptest::prelude::*;
+use sidestep_kernel::Seed;
+use sidestep_kernel::stream::{Draws, Purpose, Streams};
+
+/// Who is near whom, and which of those hear whom.
+struct Links {
+    near: Vec<Vec<bool>>,
+    hears: Vec<Vec<bool>>,
+}
+
+impl Links {
+    fn drawn(n: usize, near: f64, heard: f64, draws: &mut Draws) -> Self {
+        let mut links = Self { near: vec![vec![false; n]; n], hears: vec![vec![false; n]; n] };
+        for (i, j) in (0..n).flat_map(|i| (0..i).map(move |j| (i, j))) {
+            let is_near = draws.uniform() < near;
+            (links.near[i][j], links.near[j][i]) = (is_near, is_near);
+            links.hears[i][j] = is_near && draws.uniform() < heard;
+            links.hears[j][i] = is_near && draws.uniform() < heard;
+        }
+        links
+    }
+
+    /// Returns all to whom a chain of those that hear each other leads.
+    fn chain(&self, from: usize) -> Vec<EntityId> {
+        let mut chain = vec![from];
+        let mut k = 0;
+        while k < chain.len() {
+            let i = chain[k];
+            let linked = |j: &usize| self.hears[i][*j] && self.hears[*j][i] && !chain.contains(j);
+            let more: Vec<usize> = (0..self.near.len()).filter(linked).collect();
+            chain.extend(more);
+            k += 1;
+        }
+        chain.sort_unstable();
+        chain.into_iter().map(id).collect()
+    }
+
+    fn agent(&self, i: usize, certainty: Certainty) -> Agent {
+        let near: Vec<usize> =
+            (0..self.near.len()).filter(|&j| j == i || self.near[i][j]).collect();
+        Agent::new(Start {
+            me: near.iter().position(|&j| j == i).expect("it is among them"),
+            expected: vec![true; near.len()],
+            near: near.into_iter().map(sighted).collect(),
+            intruders: Vec::new(),
+            airplanes: 100,
+            range_m: f64::INFINITY,
+            certainty,
+        })
+    }
+}
+
+/// Ids are no places.
+fn id(place: usize) -> EntityId {
+    3 * place as EntityId + 1
+}
+
+fn sighted(place: usize) -> Sighted {
+    let pose = Pose { at: [1000.0 * place as f64, 0.0], heading_rad: 0.1 };
+    Sighted { id: id(place), pose, altitude_m: 0.0, orbit: (place == 1).then_some(Side::Left) }
+}
+
+/// Lets all look for their groups; messages come in any order. Returns what each has found, and how many
+/// messages were sent.
+fn found(links: &Links, certainty: Certainty, draws: &mut Draws) -> (Vec<Vec<EntityId>>, usize) {
+    let n = links.near.len();
+    let mut agents: Vec<Agent> = (0..n).map(|i| links.agent(i, certainty)).collect();
+    let (mut due, mut sent) = (Vec::new(), 0);
+    let mut say = |due: &mut Vec<(usize, usize, Vec<Item>)>, from: usize, said: Vec<Vec<Item>>| {
+        for items in said {
+            let to = (0..n).filter(|&to| links.near[from][to]);
+            sent += to.clone().count();
+            due.extend(to.filter(|&to| links.hears[to][from]).map(|to| (from, to, items.clone())));
+        }
+    };
+    for (i, agent) in agents.iter_mut().enumerate() {
+        let said = agent.start();
+        say(&mut due, i, said);
+    }
+    loop {
+        while !due.is_empty() {
+            let (from, to, items) = due.swap_remove(draws.below(due.len() as u32) as usize);
+            let seen = &agents[to].start.near;
+            let place = seen.binary_search_by_key(&id(from), |one| one.id).expect("near");
+            agents[to].check(place, &items).expect("sound");
+            let said = agents[to].on_message(place, items);
+            say(&mut due, to, said);
+        }
+        if agents.iter().all(|agent| agent.is_done()) {
+            break;
+        }
+        // Who is there answers that it waits, too, and is not given up.
+        let never_answers = |i: usize, agent: &Agent| {
+            let is_cut = |&place: &usize| {
+                let other = (0..n).find(|&j| id(j) == agent.start.near[place].id).expect("near");
+                !links.hears[i][other] || !links.hears[other][i]
+            };
+            agent.awaits().into_iter().find(is_cut)
+        };
+        let mut all = agents.iter().enumerate();
+        let (i, place) = all
+            .find_map(|(i, agent)| Some((i, never_answers(i, agent)?)))
+            .expect("nobody waits for what never comes");
+        let said = agents[i].without(place, false);
+        say(&mut due, i, said);
+    }
+    let members = |agent: &Agent| {
+        let found = agent.outcome().expect("done");
+        found.members.iter().map(|one| one.id).collect()
+    };
+    (agents.iter().map(members).collect(), sent)
+}
+
+proptest! {
+    /// Whichever links work, both ways or one way only: no two are of different opinions.
+    #[test]
+    fn all_find_those_to_whom_others_lead_that_hear_each_other(
+        seed in any::<u64>(), n in 1usize..9, near in 0.2f64..1.0, heard in 0.3f64..1.0,
+    ) {
+        let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(904));
+        let links = Links::drawn(n, near, heard, &mut draws);
+        let (groups, _) = found(&links, Certainty::Mixable, &mut draws);
+        for (i, group) in groups.iter().enumerate() {
+            prop_assert_eq!(group, &links.chain(i), "airplane {}", i);
+        }
+    }
+
+    #[test]
+    fn where_nothing_is_lost_all_find_the_whole_group_without_a_report(
+        seed in any::<u64>(), n in 1usize..12, near in 0.1f64..1.0,
+    ) {
+        let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(905));
+        let links = Links::drawn(n, near, 1.0, &mut draws);
+        let (groups, _) = found(&links, Certainty::Sure, &mut draws);
+        for (i, group) in groups.iter().enumerate() {
+            prop_assert_eq!(group, &links.chain(i), "airplane {}", i);
+        }
+    }
+}
+
+#[test]
+fn among_those_that_all_see_each_other_nothing_is_passed_on() {
+    let mut draws = Streams::new(Seed(1)).draws(0, 0, Purpose(906));
+    let links = Links::drawn(6, 1.0, 1.0, &mut draws);
+    assert_eq!(found(&links, Certainty::Sure, &mut draws).1, 6 * 5, "a beacon to each");
+    assert_eq!(found(&links, Certainty::Mixable, &mut draws).1, 2 * 6 * 5, "and a report");
+}
+
+#[test]
+fn a_beacon_from_where_nobody_sees_its_airplane_is_refused() {
+    let mut draws = Streams::new(Seed(1)).draws(0, 0, Purpose(907));
+    let agent = Links::drawn(3, 1.0, 1.0, &mut draws).agent(0, Certainty::Mixable);
+    let right = Beacon { own: sighted(1), near: vec![id(0), id(2)], intruders: Vec::new() };
+    let check = |beacon: &Beacon| agent.check(1, &vec![Item::Beacon(beacon.clone())]);
+    assert_eq!(check(&right), Ok(()));
+    let altered = |alter: fn(&mut Beacon)| {
+        let mut beacon = right.clone();
+        alter(&mut beacon);
+        check(&beacon)
+    };
+    assert_eq!(altered(|beacon| beacon.own.pose.at[0] += 1.0), Err(Unsound::Plan));
+    assert_eq!(altered(|beacon| beacon.own.altitude_m = f64::NAN), Err(Unsound::Number));
+    assert_eq!(altered(|beacon| beacon.near = vec![7, 1]), Err(Unsound::Airplane));
+    assert_eq!(altered(|beacon| beacon.near = vec![beacon.own.id]), Err(Unsound::Airplane));
+    assert_eq!(agent.check(1, &Vec::new()), Err(Unsound::Length));
+}
