@@ -1,6 +1,8 @@
-//! Benchmarks of fleets: a round of a team, a whole super-conflict beside one process, memory and bytes of nodes.
+//! Benchmarks of fleets: a round of a team, a whole super-conflict beside one process, how long a group takes to go on
+//! without one that is killed, memory and bytes of nodes.
 //!
-//! Percentiles, and ratios within one run: `cargo bench -p sidestep-link`. Words choose: `round`, `conflict`, `nodes`.
+//! Percentiles, and ratios within one run: `cargo bench -p sidestep-link`. Words choose: `round`, `conflict`, `recovery`,
+//! `nodes`. `SIDESTEP_BENCH_S` is how many seconds the last one flies (60).
 
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
@@ -9,10 +11,11 @@ use sidestep_link::wire::{Party, Wire};
 use sidestep_link::words::{Life, Member};
 use sidestep_session::fleet::{Clock, Common, FleetJob, FleetNow, Flown, Job, Told, Topology};
 use sidestep_session::{Journey, Keep, Unwatched};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Barrier};
 use std::time::{Duration, Instant};
 
@@ -28,8 +31,12 @@ fn main() {
     if is_wanted("conflict") {
         conflict(10);
     }
+    if is_wanted("recovery") {
+        recovery(6, 24);
+    }
     if is_wanted("nodes") {
-        nodes(50, Duration::from_secs(60));
+        let seconds = std::env::var("SIDESTEP_BENCH_S").ok().and_then(|text| text.parse().ok());
+        nodes(50, Duration::from_secs(seconds.unwrap_or(60)));
     }
 }
 
@@ -67,12 +74,13 @@ fn rounds(team: u32, rounds: usize) {
     let times = nodes.into_iter().map(|node| node.join().expect("no panic"));
     let mut times: Vec<Duration> = times.flatten().collect();
     times.sort_unstable();
+    println!("one round of a team of {team}, 500 B, all hear all: {}", percentiles(&times));
+}
+
+/// Returns words for times in rising order.
+fn percentiles(times: &[Duration]) -> String {
     let at = |part: f64| 1e3 * times[(part * (times.len() - 1) as f64) as usize].as_secs_f64();
-    println!(
-        "one round of a team of {team}, 500 B, all hear all: p50 {:.2} ms, p99 {:.2} ms",
-        at(0.5),
-        at(0.99)
-    );
+    format!("p50 {:.2} ms, p99 {:.2} ms", at(0.5), at(0.99))
 }
 
 /// A frame of a round: its number, the sender, and as many bytes as a small message has.
@@ -103,10 +111,8 @@ fn meet(wire: &mut dyn Wire, agent: u32, team: u32) {
 }
 
 fn say(wire: &mut dyn Wire, agent: u32, team: u32, round: u32) {
-    let frame = frame(round, agent);
-    (0..team)
-        .filter(|other| *other != agent)
-        .for_each(|other| wire.send(Party::Node(other), &frame));
+    let others: Vec<Party> = (0..team).filter(|other| *other != agent).map(Party::Node).collect();
+    wire.send(&others, &frame(round, agent));
 }
 
 fn one_round(wire: &mut dyn Wire, (agent, team): (u32, u32), round: u32) -> Duration {
@@ -205,15 +211,117 @@ fn conflict(n: u32) {
     println!("  median of the ratios: {:.1}", ratios[1]);
 }
 
+/// News of a fleet: how it is, or the part of a cycle to which an airplane has come.
+enum News {
+    Fleet(FleetNow),
+    Part { airplane: u32, cycle: u64, talk: String, at: Instant },
+}
+
+/// Starts a fleet; the second channel tells its news until it ends.
+fn watched(job: FleetJob) -> (Child, Receiver<News>) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sidestep-link"));
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("the program starts");
+    let stdin = child.stdin.as_mut().expect("a pipe");
+    writeln!(stdin, "{}", serde_json::json!(Job::Fleet(job))).expect("told");
+    let (tells, news) = channel();
+    let out = BufReader::new(child.stdout.take().expect("a pipe"));
+    let logs = BufReader::new(child.stderr.take().expect("a pipe"));
+    let told = tells.clone();
+    std::thread::spawn(move || {
+        for line in out.lines().map_while(Result::ok) {
+            if let Ok(Told::Fleet(now)) = serde_json::from_str(&line) {
+                let _ = told.send(News::Fleet(now));
+            }
+        }
+    });
+    std::thread::spawn(move || {
+        for line in logs.lines().map_while(Result::ok) {
+            let line: serde_json::Value = serde_json::from_str(&line).expect("JSON");
+            let number = |name: &str| line[name].as_u64();
+            if let (Some(airplane), Some(cycle), Some(talk)) =
+                (number("airplane"), number("cycle"), line["talk"].as_str())
+            {
+                let (airplane, talk, at) = (airplane as u32, talk.to_string(), Instant::now());
+                let _ = tells.send(News::Part { airplane, cycle, talk, at });
+            }
+        }
+    });
+    (child, news)
+}
+
+/// A node that was killed, and those of the others that have their controls since.
+struct Killed {
+    at: Instant,
+    cycle: u64,
+    done: BTreeSet<u32>,
+}
+
+/// Prints how long the others of a group take until all have their controls after one of them, where the coordinator is or
+/// comes next, is killed while they decide.
+fn recovery(n: u32, kills: usize) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = text(n, 1_000_000).replace("compact-team", "pim") + "radius_m = 60000.0\n";
+    std::fs::write(folder.path().join("s.toml"), text).expect("written");
+    let mut job = job(folder.path(), Clock::Realtime { speed: 5.0 });
+    (job.common.json_log, job.common.log) = (true, "debug".into());
+    let (mut child, news) = watched(job);
+    let (mut times, mut killed): (Vec<Duration>, Option<Killed>) = (Vec::new(), None);
+    let mut now = FleetNow::default();
+    while times.len() < kills {
+        let victim = times.len() as u32 % n;
+        match news.recv_timeout(LONG).expect("the fleet flies") {
+            News::Fleet(fleet) => now = fleet,
+            News::Part { airplane, cycle, talk, at } => match &mut killed {
+                None if airplane == victim && talk == "decide" => {
+                    let Some(node) = now.nodes.get(victim as usize) else { continue };
+                    // All are back from what has happened before.
+                    let is_whole = now.nodes.iter().all(|node| node.heard + 1 == n as usize);
+                    if let Some(process) = node.process.filter(|_| is_whole) {
+                        kill(process);
+                        let done = BTreeSet::new();
+                        killed = Some(Killed { at: Instant::now(), cycle, done });
+                    }
+                }
+                Some(since) if airplane != victim && talk == "done" && cycle >= since.cycle => {
+                    since.done.insert(airplane);
+                    if since.done.len() + 1 == n as usize {
+                        times.push(at.saturating_duration_since(since.at));
+                        killed = None;
+                    }
+                }
+                _ => {}
+            },
+        }
+    }
+    drop(child.stdin.take());
+    child.wait().expect("it ends");
+    times.sort_unstable();
+    println!(
+        "a host of the coordinator is killed, {n} airplanes, {kills} times, dt 1 s: the others have their controls after {}",
+        percentiles(&times)
+    );
+}
+
+fn kill(process: u32) {
+    let killed = Command::new("kill").args(["-KILL", &process.to_string()]).status();
+    assert!(killed.expect("kill is there").success());
+}
+
 /// Prints what many nodes take in real time: deadlines missed, memory, bytes.
 fn nodes(n: u32, flown_for: Duration) {
     let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join("s.toml"), text(n, 1_000_000)).expect("written");
-    let (mut first, mut rss_kb) = (None, Vec::new());
+    // As wide as they fly in that time, so that they meet in the middle of it.
+    let radius_m = 8_000.0 + 35.0 * flown_for.as_secs_f64() / 2.0;
+    let text = format!("{}radius_m = {radius_m:?}\n", text(n, 1_000_000));
+    std::fs::write(folder.path().join("s.toml"), text).expect("written");
+    let (mut first, mut memory_kb) = (None, [0, 0]);
     let (_, fleet) = fly(job(folder.path(), Clock::Realtime { speed: 1.0 }), |now| {
         if now.has_begun {
             let since = *first.get_or_insert(Instant::now());
-            rss_kb = now.nodes.iter().filter_map(|node| resident_kb(node.process?)).collect();
+            let nodes = now.nodes.iter();
+            let each: Vec<[u64; 2]> = nodes.filter_map(|node| memory(node.process?)).collect();
+            memory_kb = [0, 1].map(|k| each.iter().map(|kb| kb[k]).max().unwrap_or(0));
             return since.elapsed() < flown_for;
         }
         true
@@ -223,16 +331,22 @@ fn nodes(n: u32, flown_for: Duration) {
     let bytes: u64 = fleet.nodes.iter().map(|node| node.bytes).sum();
     println!(
         "{n} nodes for {flown_s} s, {} cycles: {late} controls late, {} cycles of the server late; \
-         {:.0} bytes a node and second; memory of a node at most {:.1} MB",
+         {:.0} bytes a node and second; memory of a node at most {:.1} MB resident, {:.1} MB as its share",
         fleet.cycle,
         fleet.late_cycles,
         bytes as f64 / f64::from(n) / flown_s,
-        rss_kb.iter().max().copied().unwrap_or(0) as f64 / 1e3,
+        memory_kb[0] as f64 / 1e3,
+        memory_kb[1] as f64 / 1e3,
     );
 }
 
-fn resident_kb(process: u32) -> Option<u64> {
-    let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
-    line.split_whitespace().nth(1)?.parse().ok()
+/// Returns the memory of a process in kB: all that is resident, and its share of it. The program itself is resident once
+/// for all nodes.
+fn memory(process: u32) -> Option<[u64; 2]> {
+    let text = std::fs::read_to_string(format!("/proc/{process}/smaps_rollup")).ok()?;
+    let of = |name: &str| {
+        let line = text.lines().find(|line| line.starts_with(name))?;
+        line.split_whitespace().nth(1)?.parse().ok()
+    };
+    Some([of("Rss:")?, of("Pss:")?])
 }

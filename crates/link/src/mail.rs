@@ -2,10 +2,11 @@
 
 use crate::post::Post;
 use crate::wire::{Party, Wire, WireError};
-use crate::words::{Body, Frame, Life, Member, Word};
+use crate::words::{Address, Frame, Life, Member, Word};
 use sidestep::kernel::EntityId;
 use std::collections::BTreeMap;
 use std::hash::{BuildHasher, RandomState};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Counts of a party's mail.
@@ -28,6 +29,13 @@ struct Other {
     post: Post,
     /// Time at which it was heard last.
     heard: Duration,
+}
+
+impl Other {
+    /// Returns the address of a letter, or of a note.
+    fn address(&mut self, party: Party, number: Option<u64>) -> Address {
+        Address { party, life: Some(self.life), received: self.post.received(), number }
+    }
 }
 
 /// A word that has come.
@@ -105,35 +113,55 @@ impl Mail {
 
     /// Sends a word that may be lost.
     pub fn note(&mut self, to: Party, word: Word) {
-        let (received, life) = match self.others.get_mut(&to) {
-            Some(other) => (other.post.received(), Some(other.life)),
-            None => (0, None),
+        self.notes(&[to], &word);
+    }
+
+    /// Sends a word that may be lost to some parties.
+    pub fn notes(&mut self, to: &[Party], word: &Word) {
+        let address = |&party: &Party| match self.others.get_mut(&party) {
+            Some(other) => other.address(party, None),
+            None => Address { party, life: None, received: 0, number: None },
         };
-        self.fly((to, life), received, Body::Note(word));
+        let to = to.iter().map(address).collect();
+        self.fly(to, Some(word));
     }
 
     /// Sends a word that may be lost to one life of another party, whichever of them it exchanges letters with.
     pub fn reply(&mut self, to: Party, life: Life, word: Word) {
-        self.fly((to, Some(life)), 0, Body::Note(word));
+        let address = Address { party: to, life: Some(life), received: 0, number: None };
+        self.fly(vec![address], Some(&word));
     }
 
     /// Sends a word that is repeated until it has come; lost if the other was not met.
     pub fn letter(&mut self, to: Party, word: Word) {
-        let now = self.now();
-        let Some(other) = self.others.get_mut(&to) else {
-            self.drop_for("stranger");
-            return;
-        };
-        let number = other.post.send(word.clone(), now);
-        let (received, life) = (other.post.received(), Some(other.life));
-        self.fly((to, life), received, Body::Letter(number, word));
+        self.letters(&[to], word);
     }
 
-    fn fly(&mut self, (to, to_life): (Party, Option<Life>), received: u64, body: Body) {
-        let frame = Frame { from: self.me, life: self.life, to_life, received, body }.encode();
+    /// Sends a word to some parties, to each of which it is repeated until it has come there; lost to those that were
+    /// not met.
+    pub fn letters(&mut self, to: &[Party], word: Word) {
+        let (now, word) = (self.now(), Arc::new(word));
+        let mut addresses = Vec::with_capacity(to.len());
+        for &party in to {
+            let Some(other) = self.others.get_mut(&party) else {
+                self.drop_for("stranger");
+                continue;
+            };
+            let number = other.post.send(word.clone(), now);
+            addresses.push(other.address(party, Some(number)));
+        }
+        self.fly(addresses, Some(&word));
+    }
+
+    fn fly(&mut self, to: Vec<Address>, word: Option<&Word>) {
+        let parties: Vec<Party> = to.iter().map(|address| address.party).collect();
+        if parties.is_empty() {
+            return;
+        }
+        let frame = Frame { from: self.me, life: self.life, to, word }.encode();
         self.counts.frames += 1;
         self.counts.bytes += frame.len() as u64;
-        self.wire.send(to, &frame);
+        self.wire.send(&parties, &frame);
     }
 
     fn drop_for(&mut self, reason: &'static str) {
@@ -149,13 +177,13 @@ impl Mail {
         for to in due {
             let Some(other) = self.others.get_mut(&to) else { continue };
             let due = other.post.due(now);
-            let (received, life) = (other.post.received(), Some(other.life));
+            let address = other.address(to, None);
             self.counts.retries += due.again.len() as u64;
             for (number, word) in due.again {
-                self.fly((to, life), received, Body::Letter(number, word));
+                self.fly(vec![Address { number: Some(number), ..address }], Some(&word));
             }
             if due.acknowledge {
-                self.fly((to, life), received, Body::Received);
+                self.fly(vec![address], None);
             }
         }
     }
@@ -195,32 +223,34 @@ impl Mail {
                 return None;
             }
         };
-        let Frame { from, life, to_life, received, body } = frame;
+        let Frame { from, life, to, word } = frame;
+        // Where all hear what is for most, some hear what is not for them.
+        let address = to.into_iter().find(|address| address.party == self.me)?;
         // It is to the process that was here before, whose letters had numbers of their own.
-        if to_life.is_some_and(|to| to != self.life) {
+        if address.life.is_some_and(|to| to != self.life) {
             self.drop_for("former-life");
             return None;
         }
-        let now = self.now();
-        let known = self.others.get_mut(&from).filter(|other| other.life == life);
-        if let Some(other) = known {
-            other.heard = now;
-            if to_life.is_some() {
-                other.post.on_received(received, now);
-            }
-            if let Body::Letter(number, _) = body
-                && !other.post.takes(number, now)
-            {
-                self.drop_for("out-of-order");
-                return None;
-            }
-        } else if !matches!(body, Body::Note(_)) {
-            self.drop_for("stranger");
+        if let Err(reason) = self.note_of(from, life, &address) {
+            self.drop_for(reason);
             return None;
         }
-        match body {
-            Body::Received => None,
-            Body::Note(word) | Body::Letter(_, word) => Some(Heard { from, life, word }),
+        Some(Heard { from, life, word: word? })
+    }
+
+    /// Notes what a frame says of letters; an error is the reason why its word does not count.
+    fn note_of(&mut self, from: Party, life: Life, address: &Address) -> Result<(), &'static str> {
+        let now = self.now();
+        let Some(other) = self.others.get_mut(&from).filter(|other| other.life == life) else {
+            return if address.number.is_none() { Ok(()) } else { Err("stranger") };
+        };
+        other.heard = now;
+        if address.life.is_some() {
+            other.post.on_received(address.received, now);
+        }
+        match address.number {
+            Some(number) if !other.post.takes(number, now) => Err("out-of-order"),
+            _ => Ok(()),
         }
     }
 }
@@ -239,17 +269,20 @@ mod tests {
     const SOON: Duration = Duration::from_millis(1);
     const LATER: Duration = Duration::from_secs(20);
 
-    /// A wire that loses the first frames.
+    /// A wire that loses the first frames on the way to their last receiver.
     struct Lossy {
         wire: Box<dyn Wire>,
         lost: usize,
     }
 
     impl Wire for Lossy {
-        fn send(&mut self, to: Party, frame: &[u8]) {
+        fn send(&mut self, to: &[Party], frame: &[u8]) {
             match self.lost {
                 0 => self.wire.send(to, frame),
-                _ => self.lost -= 1,
+                _ => {
+                    self.lost -= 1;
+                    self.wire.send(&to[..to.len() - 1], frame);
+                }
             }
         }
 
@@ -289,6 +322,33 @@ mod tests {
     }
 
     #[test]
+    fn a_letter_to_several_comes_once_to_each_in_the_order_of_its_own_letters() {
+        let exchange = Exchange::default();
+        let [a, b, c] = [1, 2, 3].map(Party::Node);
+        let mut first = mail(&exchange, a, 0);
+        let mut others = [b, c].map(|party| mail(&exchange, party, 0));
+        first.meet(b, others[0].life());
+        first.letter(b, Word::Hello);
+        first.letters(&[b, c], Word::Close(1));
+        assert_eq!(first.counts().dropped["stranger"], 1, "one of them was not met");
+        first.meet(c, others[1].life());
+        first.wire = Box::new(Lossy { wire: Box::new(exchange.wire(a)), lost: 1 });
+        first.letters(&[b, c], Word::Close(2));
+        for other in &mut others {
+            other.meet(a, first.life());
+        }
+        let mut heard = [Vec::new(), Vec::new()];
+        while !first.has_delivered() {
+            first.receive(SOON);
+            for (other, heard) in others.iter_mut().zip(&mut heard) {
+                heard.extend(other.receive(SOON).map(|heard| heard.word));
+            }
+        }
+        assert_eq!(heard[0], [Word::Hello, Word::Close(1), Word::Close(2)]);
+        assert_eq!(heard[1], [Word::Close(2)], "lost at first, and sent again");
+    }
+
+    #[test]
     fn frames_to_an_earlier_life_and_letters_of_strangers_are_dropped_and_counted() {
         let exchange = Exchange::default();
         let (a, b) = (Party::Server, Party::Node(3));
@@ -302,7 +362,7 @@ mod tests {
         first.letter(b, Word::End);
         assert_eq!(second.receive(SOON), None, "it has not met the server");
         assert_eq!(second.counts().dropped["stranger"], 1);
-        exchange.wire(Party::Node(9)).send(b, b"something else");
+        exchange.wire(Party::Node(9)).send(&[b], b"something else");
         assert_eq!(second.receive(SOON), None);
         assert_eq!(second.counts().dropped["foreign"], 1);
     }

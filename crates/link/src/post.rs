@@ -7,6 +7,7 @@
 
 use crate::words::Word;
 use std::collections::VecDeque;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Time after which a letter is first sent again.
@@ -24,8 +25,8 @@ const AGAIN_AT_ONCE: usize = 16;
 /// The letters from and to one other party.
 #[derive(Debug)]
 pub(crate) struct Post {
-    /// Letters that the other may not have, from the oldest on.
-    waiting: VecDeque<Word>,
+    /// Letters that the other may not have, from the oldest on. Others may wait for the same.
+    waiting: VecDeque<Arc<Word>>,
     /// Number of the oldest of them.
     oldest: u64,
     /// Time at which they are sent again.
@@ -54,14 +55,14 @@ impl Default for Post {
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Due {
     /// Letters that are sent again, with their numbers.
-    pub(crate) again: Vec<(u64, Word)>,
+    pub(crate) again: Vec<(u64, Arc<Word>)>,
     /// Whether the other is told what has come, in a frame of its own.
     pub(crate) acknowledge: bool,
 }
 
 impl Post {
     /// Keeps a letter until it is acknowledged, and returns its number.
-    pub(crate) fn send(&mut self, word: Word, now: Duration) -> u64 {
+    pub(crate) fn send(&mut self, word: Arc<Word>, now: Duration) -> u64 {
         self.waiting.push_back(word);
         self.again_at.get_or_insert(now + self.wait);
         self.oldest + self.waiting.len() as u64 - 1
@@ -129,19 +130,19 @@ mod tests {
 
     const STEP: Duration = Duration::from_millis(10);
 
-    fn letter(number: u64) -> Word {
-        Word::Close(number)
+    fn letter(number: u64) -> Arc<Word> {
+        Arc::new(Word::Close(number))
     }
 
     /// A frame from one post to another: what it says has come, and a letter.
-    type Flying = (u64, Option<(u64, Word)>);
+    type Flying = (u64, Option<(u64, Arc<Word>)>);
 
     /// Two posts and the frames between them.
     struct Pair {
         posts: [Post; 2],
         flying: Vec<(usize, Flying)>,
         now: Duration,
-        taken: Vec<Word>,
+        taken: Vec<Arc<Word>>,
     }
 
     impl Pair {
@@ -150,7 +151,7 @@ mod tests {
             Self { posts, flying: Vec::new(), now: Duration::ZERO, taken: Vec::new() }
         }
 
-        fn fly(&mut self, from: usize, letter: Option<(u64, Word)>) {
+        fn fly(&mut self, from: usize, letter: Option<(u64, Arc<Word>)>) {
             let received = self.posts[from].received();
             self.flying.push((1 - from, (received, letter)));
         }
@@ -213,7 +214,7 @@ mod tests {
                     pair.arrive(frame);
                 }
             }
-            let all: Vec<Word> = (0..count).map(letter).collect();
+            let all: Vec<Arc<Word>> = (0..count).map(letter).collect();
             prop_assert_eq!(pair.taken, all);
         }
     }

@@ -9,7 +9,7 @@ use sidestep::kernel::{Cycle, EntityId};
 pub use sidestep_session::fleet::{Clock, Topology};
 
 /// First bytes of every frame: `Sk`, and the version of the format.
-const MAGIC: [u8; 3] = [b'S', b'k', 1];
+const MAGIC: [u8; 3] = [b'S', b'k', 2];
 
 /// Most bytes of a frame: a longer one is not read.
 pub const MOST_BYTES: usize = 64 << 20;
@@ -18,30 +18,31 @@ pub const MOST_BYTES: usize = 64 << 20;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Life(pub u64);
 
-/// A frame on a wire.
+/// A frame on a wire: a word for some parties, or nothing but what has come.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Frame {
+pub struct Frame<W = Word> {
     /// The sender.
     pub from: Party,
     /// The sender's life.
     pub life: Life,
-    /// The receiver's life, where the sender knows of one.
-    pub to_life: Option<Life>,
-    /// All letters of the receiver below this number have come.
-    pub received: u64,
-    /// Its content.
-    pub body: Body,
+    /// The receivers.
+    pub to: Vec<Address>,
+    /// The word, which is the same for all of them.
+    pub word: Option<W>,
 }
 
-/// The content of a frame.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Body {
-    /// Nothing but the number of letters received.
-    Received,
-    /// A word that may be lost.
-    Note(Word),
-    /// A word that is repeated until it has come, with its number.
-    Letter(u64, Word),
+/// A receiver of a frame, and what is told to it alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Address {
+    /// The receiver.
+    pub party: Party,
+    /// Its life, where the sender knows of one.
+    pub life: Option<Life>,
+    /// All letters of the receiver below this number have come.
+    pub received: u64,
+    /// Number of the word among the letters to the receiver, which are repeated until they have come; none of a
+    /// note, which may be lost.
+    pub number: Option<u64>,
 }
 
 /// A word from one party to another.
@@ -67,8 +68,8 @@ pub enum Word {
     Tick(Tick),
     /// Node to server: it has done a tick.
     Ticked(Ticked),
-    /// Node to node: a packet of a talk.
-    Packet(Packet),
+    /// Node to node: packets of a talk, sent in one step.
+    Packets(Vec<Packet>),
     /// Server to node: the cycle's talks are over, or time is.
     Close(Cycle),
     /// Node to server: the agent's control.
@@ -76,7 +77,7 @@ pub enum Word {
     /// Server to node, as a note: it is there.
     Beat,
     /// Node to server: packets that it has sent, where all are recorded.
-    Packets(Vec<Logged>),
+    Log(Vec<Logged>),
     /// Server to node: the fleet has ended.
     End,
     /// Node to server: it has said all that it had to say.
@@ -140,6 +141,7 @@ pub struct Begin {
     /// The cycle.
     pub cycle: Cycle,
     /// The agent's percept, serialized.
+    #[serde(with = "bytes")]
     pub sight: Vec<u8>,
     /// Agents that its radio does not reach, rising.
     pub beyond: Vec<EntityId>,
@@ -183,6 +185,7 @@ pub struct Packet {
     /// The tick in which it arrives, where time is counted in ticks.
     pub arrives: u64,
     /// Its content.
+    #[serde(with = "bytes")]
     pub payload: Vec<u8>,
 }
 
@@ -248,12 +251,14 @@ pub enum Unreadable {
     TooLong,
 }
 
-impl Frame {
+impl<W: Serialize> Frame<W> {
     /// Returns the bytes of the frame.
     pub fn encode(&self) -> Vec<u8> {
         postcard::to_extend(self, MAGIC.to_vec()).expect("frames are plain data")
     }
+}
 
+impl Frame {
     /// Reads a frame.
     ///
     /// # Errors
@@ -281,6 +286,35 @@ impl Unreadable {
     }
 }
 
+/// Bytes in one piece: what is read one by one takes ten times as long. The format is the same.
+mod bytes {
+    use serde::de::{Deserializer, Error, Visitor};
+    use serde::ser::Serializer;
+    use std::fmt;
+
+    pub(super) fn serialize<S: Serializer>(bytes: &[u8], to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_bytes(bytes)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<u8>, D::Error> {
+        struct Whole;
+
+        impl Visitor<'_> for Whole {
+            type Value = Vec<u8>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("bytes")
+            }
+
+            fn visit_bytes<E: Error>(self, bytes: &[u8]) -> Result<Vec<u8>, E> {
+                Ok(bytes.to_vec())
+            }
+        }
+
+        from.deserialize_bytes(Whole)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -288,9 +322,15 @@ mod tests {
 
     fn frame(payload: Vec<u8>) -> Frame {
         let packet = Packet { cycle: 3, left: 5, sequence: 7, arrives: 6, payload };
-        let body = Body::Letter(9, Word::Packet(packet));
-        let (life, to_life) = (Life(1), Some(Life(2)));
-        Frame { from: Party::Node(4), life, to_life, received: 11, body }
+        let address = |id, number| Address {
+            party: Party::Node(id),
+            life: Some(Life(2)),
+            received: 11,
+            number,
+        };
+        let to = vec![address(5, Some(9)), address(6, None)];
+        let word = Some(Word::Packets(vec![packet.clone(), packet]));
+        Frame { from: Party::Node(4), life: Life(1), to, word }
     }
 
     proptest! {

@@ -9,11 +9,11 @@ mod join;
 mod turn;
 
 use crate::mail::{Heard, Mail};
-use crate::ports::{Channel, Program};
+use crate::ports::{Channel, Doing, Program};
 use crate::wire::{Party, WireError};
 use crate::words::{Begin, Clock, Member, Packet, Refusal, Status, Welcome, Word};
 pub use join::{Asked, join};
-use sidestep::kernel::EntityId;
+use sidestep::kernel::{Cycle, EntityId};
 use std::time::{Duration, Instant};
 use turn::{Ends, Turn};
 
@@ -25,6 +25,9 @@ const LOOK: Duration = Duration::from_millis(100);
 
 /// Most packets that are kept for a cycle that has not begun here: those beyond are lost.
 const MOST_EARLY: usize = 100_000;
+
+/// Most words that are taken before a node goes on, so that it gets to it however much it hears.
+const MOST_AT_ONCE: usize = 1_000;
 
 /// The end of a node before the fleet's.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -61,6 +64,8 @@ pub struct Node {
     /// Packets of a cycle that has not begun here.
     early: Vec<(EntityId, Packet)>,
     status: Status,
+    /// The part of a cycle that was logged last.
+    part: (Cycle, &'static str),
     report_at: Instant,
     looks: Looks,
 }
@@ -87,6 +92,7 @@ impl Node {
             turn: None,
             early: Vec::new(),
             status: Status::default(),
+            part: Default::default(),
             report_at: Instant::now(),
             looks: Box::new(|_, _| {}),
         }
@@ -105,19 +111,15 @@ impl Node {
     pub fn run(mut self) -> Result<Status, NodeError> {
         loop {
             let wait = self.turn.as_ref().and_then(|turn| turn.wait(self.program.as_ref()));
-            let heard = self.mail.receive(wait.unwrap_or(LOOK).min(LOOK));
-            let is_quiet = heard.is_none();
-            if let Some(heard) = heard
-                && self.hear(heard)?
-            {
+            let Some(heard) = self.hear_all(wait.unwrap_or(LOOK).min(LOOK))? else {
                 self.leave();
                 return Ok(self.status);
-            }
+            };
             self.go_on();
             self.report();
             let silent = self.mail.silent_for(Party::Server);
             // What has come while this process stood still is heard first.
-            if is_quiet && silent.is_some_and(|silent| silent > self.lease) {
+            if heard == 0 && silent.is_some_and(|silent| silent > self.lease) {
                 return Err(NodeError::Silence(self.lease.as_secs()));
             }
         }
@@ -137,6 +139,22 @@ impl Node {
         }
     }
 
+    /// Takes the words that have come, and waits for the first of them as long as is said. Nothing is answered before
+    /// all are taken: so there is less to do, and less to send. Returns their number; none when the fleet has ended.
+    fn hear_all(&mut self, within: Duration) -> Result<Option<usize>, NodeError> {
+        let mut count = 0;
+        let mut wait = within;
+        while count < MOST_AT_ONCE
+            && let Some(heard) = self.mail.receive(wait)
+        {
+            if self.hear(heard)? {
+                return Ok(None);
+            }
+            (count, wait) = (count + 1, Duration::ZERO);
+        }
+        Ok(Some(count))
+    }
+
     /// Takes a word. Returns whether the fleet has ended.
     fn hear(&mut self, Heard { from, word, .. }: Heard) -> Result<bool, NodeError> {
         match (from, word) {
@@ -153,7 +171,9 @@ impl Node {
                     turn.close();
                 }
             }
-            (Party::Node(from), Word::Packet(packet)) => self.on_packet(from, packet),
+            (Party::Node(from), Word::Packets(packets)) => {
+                packets.into_iter().for_each(|packet| self.on_packet(from, packet));
+            }
             // `Hello` has come, which was all that it was for; others say only what is above.
             _ => {}
         }
@@ -221,6 +241,16 @@ impl Node {
             let sent = turn.take_sent();
             self.status.packets += sent.packets;
             self.status.bytes += sent.bytes;
+            self.log_part();
+        }
+    }
+
+    /// Logs it when the agent has come to another part of a cycle.
+    fn log_part(&mut self) {
+        let Doing { word, round, epoch } = self.program.doing();
+        let (airplane, cycle) = (self.agent, self.status.cycle);
+        if std::mem::replace(&mut self.part, (cycle, word)) != (cycle, word) {
+            tracing::debug!(airplane, cycle, talk = word, round, epoch, "the talk goes on");
         }
     }
 

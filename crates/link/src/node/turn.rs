@@ -46,6 +46,8 @@ pub(super) struct Turn {
     granted: Option<Tick>,
     /// Packets that are delayed: by the time at which they leave, and in their order.
     leaving: BTreeMap<(Instant, EntityId, u32), Packet>,
+    /// Packets that leave at the end of the step, by receiver.
+    outgoing: BTreeMap<EntityId, Vec<Packet>>,
     has_begun: bool,
     is_closed: bool,
     has_told: bool,
@@ -81,6 +83,7 @@ impl Turn {
             taken: 0,
             granted: None,
             leaving: BTreeMap::new(),
+            outgoing: BTreeMap::new(),
             has_begun: false,
             is_closed: false,
             has_told: false,
@@ -97,7 +100,7 @@ impl Turn {
     /// Hands over what was sent since the last call.
     pub(super) fn hand_over_log(&mut self, mail: &mut Mail) {
         if let Some(log) = self.log.as_mut().filter(|log| !log.is_empty()) {
-            mail.letter(Party::Server, Word::Packets(std::mem::take(log)));
+            mail.letter(Party::Server, Word::Log(std::mem::take(log)));
         }
     }
 
@@ -154,9 +157,10 @@ impl Turn {
             Time::Running(speed) => {
                 self.tick = self.tick_now(speed).max(self.tick);
                 self.step(u64::MAX, ends);
-                self.let_leave(ends.mail);
+                self.let_leave();
             }
         }
+        self.post(ends.mail);
         // Where time is counted, messages are, too: until nobody has any more to say.
         let may_tell = self.time != Time::Counted || self.is_closed;
         if may_tell
@@ -238,7 +242,7 @@ impl Turn {
                 let [left, arrives] = [leaves, arrives].map(|at| self.tick + (at - tick));
                 sent.push((to, arrives));
                 let packet = Packet { cycle, left, sequence, arrives, payload };
-                self.part(to, packet, ends.mail);
+                self.part(to, packet);
             }
         }
     }
@@ -262,28 +266,44 @@ impl Turn {
         });
     }
 
-    /// Lets a packet leave: at once, or after its delay.
-    fn part(&mut self, to: EntityId, packet: Packet, mail: &mut Mail) {
-        let Time::Running(speed) = self.time else {
-            // Nothing is lost here but what the scenario loses.
-            mail.letter(Party::Node(to), Word::Packet(packet));
-            return;
-        };
+    /// Lets a packet leave: at the end of the step, or after its delay.
+    fn part(&mut self, to: EntityId, packet: Packet) {
         // A tick is what the real network takes.
         let delay = packet.arrives.saturating_sub(self.tick + 1);
-        if delay == 0 {
-            mail.note(Party::Node(to), Word::Packet(packet));
-            return;
+        match self.time {
+            Time::Running(speed) if delay > 0 => {
+                let delay = Duration::from_secs_f64(delay as f64 * self.tick_s / speed);
+                self.leaving.insert((Instant::now() + delay, to, packet.sequence), packet);
+            }
+            _ => self.outgoing.entry(to).or_default().push(packet),
         }
-        let leaves = Instant::now() + Duration::from_secs_f64(delay as f64 * self.tick_s / speed);
-        self.leaving.insert((leaves, to, packet.sequence), packet);
     }
 
-    fn let_leave(&mut self, mail: &mut Mail) {
+    fn let_leave(&mut self) {
         let now = Instant::now();
         while let Some(entry) = self.leaving.first_entry().filter(|entry| entry.key().0 <= now) {
             let ((_, to, _), packet) = entry.remove_entry();
-            mail.note(Party::Node(to), Word::Packet(packet));
+            self.outgoing.entry(to).or_default().push(packet);
+        }
+    }
+
+    /// Sends the packets of a step: one word to all who get the same.
+    fn post(&mut self, mail: &mut Mail) {
+        let mut words: Vec<(Vec<Packet>, Vec<Party>)> = Vec::new();
+        for (to, packets) in std::mem::take(&mut self.outgoing) {
+            let to = Party::Node(to);
+            match words.iter_mut().find(|(same, _)| *same == packets) {
+                Some((_, others)) => others.push(to),
+                None => words.push((packets, vec![to])),
+            }
+        }
+        for (packets, to) in words {
+            let word = Word::Packets(packets);
+            match self.time {
+                Time::Running(_) => mail.notes(&to, &word),
+                // Nothing is lost here but what the scenario loses.
+                Time::Still | Time::Counted => mail.letters(&to, word),
+            }
         }
     }
 }

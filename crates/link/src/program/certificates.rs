@@ -23,6 +23,31 @@ pub(super) fn check(tls: &Tls) -> Result<(), InputError> {
     Ok(())
 }
 
+/// Checks that all links are encrypted if there are certificates, and none is without.
+///
+/// # Errors
+/// With the first endpoint at which it is otherwise.
+pub(super) fn check_endpoints<'a>(
+    endpoints: impl IntoIterator<Item = &'a String>,
+    tls: Option<&Tls>,
+) -> Result<(), InputError> {
+    for endpoint in endpoints {
+        match (tls.is_some(), endpoint.starts_with("tls/")) {
+            (false, true) => {
+                let cause = "links to it are encrypted, and there is no certificate to show";
+                let remedy = "give --tls-ca, --tls-cert and --tls-key, or tcp/HOST:PORT";
+                return Err(InputError::new(endpoint, cause, remedy));
+            }
+            (true, false) if endpoint.starts_with("tcp/") => {
+                let cause = "links to it are not encrypted, although there are certificates";
+                return Err(InputError::new(endpoint, cause, "write it as tls/HOST:PORT"));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
 fn read(place: &str, file: &Path) -> Result<Vec<u8>, InputError> {
     let unreadable =
         |e: std::io::Error| InputError::new(place, e.to_string(), "name a file that can be read");

@@ -57,13 +57,14 @@ fn version() -> String {
 }
 
 fn do_job(job: Job) -> Result<(), Error> {
-    let common = match &job {
-        Job::Fleet(job) => &job.common,
-        Job::Node(job) => &job.common,
+    let (common, [listen, connect]) = match &job {
+        Job::Fleet(job) => (&job.common, [&*job.listen, &[]]),
+        Job::Node(job) => (&job.common, [&*job.listen, &*job.connect]),
     };
     log::start(common.json_log, &common.log)?;
     check_build(&common.flown)?;
     common.tls.as_ref().map_or(Ok(()), certificates::check)?;
+    certificates::check_endpoints(listen.iter().chain(connect), common.tls.as_ref())?;
     match job {
         Job::Fleet(job) => fleet::fly(&job, &Lifeline::watch()),
         Job::Node(job) => {

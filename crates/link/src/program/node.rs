@@ -80,6 +80,11 @@ pub(super) fn wrong_endpoint(error: WireError) -> Error {
             let remedy = "end what listens there, or give another port; 0 stands for any free one";
             InputError::new(endpoint, cause, remedy).into()
         }
+        WireError::Distrust { endpoint, .. } => {
+            let remedy = "have the certificates of all parties made by one authority, for the names or addresses at \
+                          which they are reached, and give them by --tls-ca, --tls-cert and --tls-key";
+            InputError::new(endpoint, cause, remedy).into()
+        }
         WireError::NoAnswer { .. } => {
             let remedy = "start the fleet first, and see whether its address can be reached; where it asks for \
                           certificates, give --tls-ca, --tls-cert and --tls-key";

@@ -270,7 +270,7 @@ impl<'a> Server<'a> {
             Word::Status(status) => seat.status = status,
             Word::Control(control) => self.on_control(agent, control),
             Word::Ticked(ticked) => self.ticked.push((agent, ticked)),
-            Word::Packets(sent) => {
+            Word::Log(sent) => {
                 self.packets.extend(sent.into_iter().map(|logged| (agent, logged)));
             }
             Word::Left => seat.has_left = true,
@@ -310,6 +310,8 @@ impl<'a> Server<'a> {
                     controls.push((*agent, control));
                 }
                 None => {
+                    let (cycle, talk) = (self.stage.cycle(), &*seat.status.doing);
+                    tracing::info!(airplane = agent, cycle, talk, "a control is late");
                     seat.late += 1;
                     self.tally.late_controls += 1;
                 }

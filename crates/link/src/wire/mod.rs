@@ -1,8 +1,14 @@
 //! The wire: frames from one party of a fleet to another, of which some may be lost.
 //!
 //! Everything that must arrive is numbered, acknowledged and repeated above it (`post.rs`).
+//!
+//! ```text
+//! zenoh.rs   between processes      handshake.rs  whose certificate is not taken, and why
+//! memory.rs  between threads        board.rs      a text for whoever asks, by HTTP
+//! ```
 
 pub mod board;
+mod handshake;
 pub mod memory;
 pub mod zenoh;
 
@@ -14,13 +20,13 @@ pub use zenoh::WireError;
 
 /// Carries frames between parties. A frame may be lost, and nobody is told.
 pub trait Wire: Send {
-    /// Sends a frame to another party, without waiting for it.
-    fn send(&mut self, to: Party, frame: &[u8]);
+    /// Sends a frame to other parties, without waiting for them. More may hear it than those.
+    fn send(&mut self, to: &[Party], frame: &[u8]);
 
     /// Returns the next frame that has arrived; waits for one as long as is said. `None` when none came.
     fn receive(&mut self, within: Duration) -> Option<Vec<u8>>;
 
-    /// Makes the straight ways from a node to all others, where there are any.
+    /// Learns of all nodes of the fleet, and makes the straight ways from this one to the others, where there are any.
     ///
     /// # Errors
     /// When an endpoint cannot be had.
@@ -30,7 +36,7 @@ pub trait Wire: Send {
 }
 
 impl<W: Wire + ?Sized> Wire for Box<W> {
-    fn send(&mut self, to: Party, frame: &[u8]) {
+    fn send(&mut self, to: &[Party], frame: &[u8]) {
         (**self).send(to, frame);
     }
 

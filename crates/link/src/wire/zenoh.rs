@@ -1,11 +1,10 @@
 //! The wire between processes and machines: Zenoh sessions on endpoints that are all named, with its scouting off.
-//! The one file that names sockets.
 //!
 //! A node has a session as a *client* of the server's, which relays (a *router* in Zenoh's words, for peers do not).
 //! In a mesh it has another one as a *peer*, connected with every other node: packets go the straight way there.
 //! A frame that cannot be sent soon is dropped rather than waited for, so that nobody who has stopped stops others.
 
-use super::{Party, Wire};
+use super::{Party, Wire, handshake};
 use crate::words::Member;
 use sidestep::kernel::EntityId;
 use sidestep_session::fleet::Tls;
@@ -18,6 +17,7 @@ use std::time::Duration;
 use zenoh::key_expr::KeyExpr;
 use zenoh::pubsub::Subscriber;
 use zenoh::qos::CongestionControl;
+use zenoh::sample::Locality;
 use zenoh::{Config, Session, Wait};
 
 /// Time without a sign of life after which Zenoh takes a link for broken, in milliseconds.
@@ -49,6 +49,14 @@ pub enum WireError {
         /// The reason.
         reason: String,
     },
+    /// Somebody answers, and one of both does not take the other's certificate.
+    #[error("{endpoint} and this party do not trust each other: {reason}")]
+    Distrust {
+        /// The address.
+        endpoint: String,
+        /// The reason.
+        reason: String,
+    },
 }
 
 /// Settings of a Zenoh session.
@@ -74,6 +82,8 @@ impl Settings<'_> {
             ("scouting/gossip/enabled", "false".into()),
             // A router sleeps that long before it is open, in order to be found.
             ("scouting/delay", "0".into()),
+            // A router would put the time of its wall clock on what it relays, which nobody reads.
+            ("timestamping/enabled", "false".into()),
             // Without the empty list a party that only connects would listen at every interface.
             ("listen/endpoints", list(self.listen)),
             ("listen/exit_on_failure", "true".into()),
@@ -129,14 +139,19 @@ pub struct ZenohWire {
     /// and their ports, until it listens.
     ports: Vec<Held>,
     tls: Option<Tls>,
+    /// All other nodes, rising.
+    others: Vec<Party>,
 }
 
 /// A session, and who is sent to over it.
 struct Line {
     keys: BTreeMap<Party, KeyExpr<'static>>,
-    _heard: Subscriber<()>,
+    _heard: [Subscriber<()>; 2],
     session: Session,
 }
+
+/// The key under which frames for most nodes are published. No party has that name.
+const ALL: &str = "sidestep/all";
 
 impl fmt::Debug for ZenohWire {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -151,13 +166,16 @@ fn key(to: Party) -> String {
 
 impl Line {
     fn new(session: Session, me: Party, arrives: &Sender<Vec<u8>>) -> Result<Self, String> {
-        let arrives = arrives.clone();
-        // The receiver is gone when the wire is.
-        let took = move |sample: zenoh::sample::Sample| {
-            let _ = arrives.send(sample.payload().to_bytes().into_owned());
+        let hear = |key: &str| {
+            let arrives = arrives.clone();
+            // The receiver is gone when the wire is.
+            let took = move |sample: zenoh::sample::Sample| {
+                let _ = arrives.send(sample.payload().to_bytes().into_owned());
+            };
+            session.declare_subscriber(key).callback(took).wait().map_err(|e| e.to_string())
         };
-        let heard = session.declare_subscriber(key(me)).callback(took).wait();
-        let heard = heard.map_err(|e| e.to_string())?;
+        // Others see them in this order: whoever can reach this party reaches it with what is for most, too.
+        let heard = [hear(ALL)?, hear(&key(me))?];
         Ok(Self { keys: BTreeMap::new(), _heard: heard, session })
     }
 
@@ -165,11 +183,21 @@ impl Line {
         let key = self.keys.entry(to).or_insert_with(|| {
             KeyExpr::try_from(key(to)).expect("a path of letters and digits is a key")
         });
-        // Not by a publisher: the first thing that one does in a client is to wait for the other end.
-        let put = self.session.put(&*key, frame);
-        // Lost where it cannot be sent, as on the way.
-        let _ = put.congestion_control(CongestionControl::Drop).express(true).wait();
+        put(&self.session, key, frame);
     }
+
+    /// Sends a frame to all who hear this session but for itself.
+    fn send_to_all(&self, frame: &[u8]) {
+        let key = KeyExpr::try_from(ALL).expect("a path of letters is a key");
+        put(&self.session, &key, frame);
+    }
+}
+
+fn put(session: &Session, key: &KeyExpr<'_>, frame: &[u8]) {
+    // Not by a publisher: the first thing that one does in a client is to wait for the other end.
+    let put = session.put(key, frame).allowed_destination(Locality::Remote);
+    // Lost where it cannot be sent, as on the way.
+    let _ = put.congestion_control(CongestionControl::Drop).wait();
 }
 
 impl ZenohWire {
@@ -186,24 +214,28 @@ impl ZenohWire {
     /// Returns the wire of a node to its server, at one of some endpoints.
     ///
     /// # Errors
-    /// When none of them answers within some time.
+    /// When none of them answers within some time, or a certificate is not taken.
     pub fn node(
         me: Party,
         connect: &[String],
         tls: Option<&Tls>,
         within: Duration,
     ) -> Result<Self, WireError> {
+        trusted(connect, tls)?;
         let connected_within = Some(within);
         let settings = Settings { mode: "client", connect, tls, connected_within, listen: &[] };
-        Self::over(me, &settings)
-            .map_err(|reason| WireError::NoAnswer { endpoint: connect.join(", "), reason })
+        Self::over(me, &settings).map_err(|reason| {
+            // The other end may have begun to listen meanwhile.
+            let endpoint = connect.join(", ");
+            trusted(connect, tls).err().unwrap_or(WireError::NoAnswer { endpoint, reason })
+        })
     }
 
     fn over(me: Party, settings: &Settings<'_>) -> Result<Self, String> {
         let (arrives, arrived) = channel();
         let hub = Line::new(settings.open()?, me, &arrives)?;
         let (listens, ports, tls) = (Vec::new(), Vec::new(), settings.tls.cloned());
-        Ok(Self { me, arrived, arrives, hub, mesh: None, listens, ports, tls })
+        Ok(Self { me, arrived, arrives, hub, mesh: None, listens, ports, tls, others: Vec::new() })
     }
 
     /// Lets this node be reached by others at endpoints of its own, once it joins them.
@@ -224,10 +256,17 @@ impl ZenohWire {
 }
 
 impl Wire for ZenohWire {
-    fn send(&mut self, to: Party, frame: &[u8]) {
-        match (&mut self.mesh, to) {
-            (Some(mesh), Party::Node(_)) => mesh.send(to, frame),
-            _ => self.hub.send(to, frame),
+    fn send(&mut self, to: &[Party], frame: &[u8]) {
+        let line = match &mut self.mesh {
+            Some(mesh) if !to.contains(&Party::Server) => mesh,
+            _ => &mut self.hub,
+        };
+        // One frame for all is worth it although some of them have no use for it.
+        let are_most = to.len() > 1 && 2 * to.len() > self.others.len();
+        if are_most && to.iter().all(|party| self.others.binary_search(party).is_ok()) {
+            line.send_to_all(frame);
+        } else {
+            to.iter().for_each(|&party| line.send(party, frame));
         }
     }
 
@@ -236,6 +275,9 @@ impl Wire for ZenohWire {
     }
 
     fn join(&mut self, me: EntityId, members: &[Member]) -> Result<(), WireError> {
+        let others = members.iter().map(|member| Party::Node(member.agent));
+        self.others = others.filter(|&party| party != self.me).collect();
+        self.others.sort_unstable();
         // The session finds those again that were away.
         if self.listens.is_empty() || self.mesh.is_some() {
             return Ok(());
@@ -245,6 +287,23 @@ impl Wire for ZenohWire {
         let connect: Vec<String> = before.flat_map(|member| member.listens.clone()).collect();
         self.open_mesh(&connect)
     }
+}
+
+/// Finds out whether certificates are the reason why no endpoint can be reached: Zenoh tells none.
+fn trusted(connect: &[String], tls: Option<&Tls>) -> Result<(), WireError> {
+    let Some(tls) = tls else { return Ok(()) };
+    let mut first = Ok(());
+    for endpoint in connect {
+        match handshake::distrust(endpoint, tls) {
+            // One that can be reached is enough.
+            None => return Ok(()),
+            Some(reason) if first.is_ok() => {
+                first = Err(WireError::Distrust { endpoint: endpoint.clone(), reason });
+            }
+            Some(_) => {}
+        }
+    }
+    first
 }
 
 /// Returns an endpoint's host and port, e.g. of `tcp/127.0.0.1:7600`.

@@ -1,9 +1,12 @@
 //! Fleets: in threads, over sockets, and as processes.
 
+mod clocks;
 mod faults;
 mod input;
 mod namespaces;
 mod processes;
+mod soak;
 mod support;
 mod threads;
 mod tls;
+mod told;

@@ -42,6 +42,27 @@ impl Machines {
         Some(made)
     }
 
+    /// Runs a command on one of them; returns whether it could.
+    fn run(&self, machine: usize, words: &str) -> bool {
+        let name = &self.names[machine];
+        let words = words.replace("{cable}", name);
+        let mut command = Command::new("ip");
+        command.args(["netns", "exec", name]).args(words.split_whitespace());
+        command.output().is_ok_and(|output| output.status.success())
+    }
+
+    /// Adds a rule to the packet filter of the second one, or takes it away. Returns whether there is one; where
+    /// there is none, the reason is printed.
+    fn filter(&self, is_on: bool, rule: &str) -> bool {
+        let verb = if is_on { "-A" } else { "-D" };
+        let programs = ["iptables-legacy", "iptables"];
+        let is_there = programs.iter().any(|name| self.run(1, &format!("{name} {verb} {rule}")));
+        if !is_there {
+            sidestep_testing::skip("there is no packet filter here (iptables)");
+        }
+        is_there
+    }
+
     /// Pulls the cable between them, or puts it in again.
     fn cable(&self, is_in: bool) {
         let name = &self.names[1];
@@ -92,24 +113,85 @@ fn two_machines_come_out_as_one_process_does() {
     }
 }
 
-/// Both halves fly toward each other meanwhile, and none of them hears the other.
+/// TCP sends again what the cable loses, so that all comes, and late.
+#[test]
+fn a_cable_that_loses_packets_costs_time_and_no_bit() {
+    let Some(machines) = Machines::new() else { return };
+    let rule = "INPUT -i {cable} -m statistic --mode random --probability 0.03 -j DROP";
+    if !machines.filter(true, rule) {
+        return;
+    }
+    let text = superconflict(4, "compact-team", 6, "");
+    let folder = folder(&text);
+    let (server, _nodes) = start(&machines, job(folder.path(), Topology::Mesh, Clock::Lockstep));
+    let digest = server.until("the end", |told| match told {
+        Told::Ended { summary, .. } => Some(summary["digest"].clone()),
+        Told::Failed(failed) => panic!("{failed:?}"),
+        _ => None,
+    });
+    assert_eq!(digest, alone(&text).digest);
+}
+
+const FAST: Clock = Clock::Realtime { speed: 20.0 };
+
+/// Ends a fleet, and returns the losses of separation.
+fn losses(mut server: Program) -> u64 {
+    drop(server.stdin.take());
+    let losses = |summary: &serde_json::Value| summary["metrics"]["losses_of_separation"].as_u64();
+    server.until("the end", |told| match told {
+        Told::Ended { summary, .. } => losses(&summary),
+        _ => None,
+    })
+}
+
+/// A cable on which a packet takes a hundredth of a second, or on which packets queue where that cannot be had.
+#[test]
+fn a_slow_cable_costs_no_separation() {
+    let Some(machines) = Machines::new() else { return };
+    let slow = [
+        "tc qdisc add dev {cable} root netem delay 10ms 5ms",
+        "tc qdisc add dev {cable} root tbf rate 2mbit burst 4kb latency 300ms",
+    ];
+    if !slow.iter().any(|words| machines.run(1, words)) {
+        sidestep_testing::skip("cables cannot be slowed down here (tc)");
+        return;
+    }
+    let folder = folder(&wide(&superconflict(4, "compact-team", 1_000_000, ""), 8_000));
+    let (server, _nodes) = start(&machines, job(folder.path(), Topology::Mesh, FAST));
+    let now = server.fleet("all fly", |now| now.nodes.iter().all(|node| node.flown > 6));
+    assert!(now.nodes.iter().all(|node| node.lives == 1), "{now:?}");
+    assert_eq!(losses(server), 0);
+}
+
+/// Cuts the second machine off in some way, and lets it in again: its airplanes are late, the others fly on, and all do
+/// afterwards. Both halves fly toward each other meanwhile.
+fn cut_off(machines: &Machines, cut: impl Fn(bool) -> bool) {
+    let folder = folder(&wide(&superconflict(4, "compact-team", 1_000_000, ""), 8_000));
+    let (server, _nodes) = start(machines, job(folder.path(), Topology::Mesh, FAST));
+    server.fleet("some cycles", |now| now.cycle > 4);
+    if !cut(true) {
+        return;
+    }
+    let now = server.fleet("the far ones are late", |now| now.nodes[3].late > 3);
+    assert!(now.nodes[0].late <= 1, "the near ones fly on: {now:?}");
+    cut(false);
+    let flown = now.nodes[3].flown;
+    server.fleet("they fly again", |now| now.nodes[3].flown > flown + 3);
+    assert_eq!(losses(server), 0);
+}
+
 #[test]
 fn a_pulled_cable_costs_delay_and_no_separation_and_all_fly_on_afterwards() {
     let Some(machines) = Machines::new() else { return };
-    let folder = folder(&wide(&superconflict(4, "compact-team", 1_000_000, ""), 8_000));
-    let clock = Clock::Realtime { speed: 20.0 };
-    let (mut server, _nodes) = start(&machines, job(folder.path(), Topology::Mesh, clock));
-    server.fleet("some cycles", |now| now.cycle > 4);
-    machines.cable(false);
-    let cut = server.fleet("the far ones are late", |now| now.nodes[3].late > 3);
-    assert!(cut.nodes[0].late <= 1, "the near ones fly on: {cut:?}");
-    machines.cable(true);
-    let flown = cut.nodes[3].flown;
-    server.fleet("they fly again", |now| now.nodes[3].flown > flown + 3);
-    drop(server.stdin.take());
-    let losses = server.until("the end", |told| match told {
-        Told::Ended { summary, .. } => Some(summary["metrics"]["losses_of_separation"].clone()),
-        _ => None,
+    cut_off(&machines, |is_cut| {
+        machines.cable(!is_cut);
+        true
     });
-    assert_eq!(losses, 0);
+}
+
+/// The second machine hears what it is told until the first one misses its answers.
+#[test]
+fn a_cable_that_carries_one_way_costs_delay_and_no_separation_and_all_fly_on_afterwards() {
+    let Some(machines) = Machines::new() else { return };
+    cut_off(&machines, |is_cut| machines.filter(is_cut, "OUTPUT -o {cable} -j DROP"));
 }

@@ -10,6 +10,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Time that nothing here takes.
@@ -40,6 +41,8 @@ pub(crate) struct Program {
     pub(crate) child: Child,
     pub(crate) stdin: Option<ChildStdin>,
     told: Receiver<Told>,
+    /// The lines that it, and the nodes that it starts, have logged so far.
+    logged: Arc<Mutex<Vec<String>>>,
 }
 
 impl Program {
@@ -54,9 +57,17 @@ impl Program {
         Self::start_by(command, job)
     }
 
-    fn start_by(mut command: Command, job: &Job) -> Self {
-        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
+    pub(crate) fn start_by(mut command: Command, job: &Job) -> Self {
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn().expect("the program starts");
+        let errors = BufReader::new(child.stderr.take().expect("a pipe"));
+        let logged = Arc::new(Mutex::new(Vec::new()));
+        let log = logged.clone();
+        std::thread::spawn(move || {
+            for line in errors.lines().map_while(Result::ok) {
+                log.lock().expect("no panic").push(line);
+            }
+        });
         let mut stdin = child.stdin.take().expect("a pipe");
         let line = serde_json::to_string(job).expect("plain data");
         writeln!(stdin, "{line}").expect("it reads its job");
@@ -67,7 +78,12 @@ impl Program {
                 let _ = sender.send(serde_json::from_str(&line).expect("a line that is known"));
             }
         });
-        Self { child, stdin: Some(stdin), told }
+        Self { child, stdin: Some(stdin), told, logged }
+    }
+
+    /// Returns the lines that were logged so far.
+    pub(crate) fn logged(&self) -> Vec<String> {
+        self.logged.lock().expect("no panic").clone()
     }
 
     /// Returns the next line for which something holds.
@@ -133,7 +149,7 @@ fn is_alive(process: u32) -> bool {
         .is_some_and(|rest| !rest.is_empty() && !rest.trim_start().starts_with('Z'))
 }
 
-fn wait_until_gone(fleet: &FleetNow, within: Duration) {
+pub(crate) fn wait_until_gone(fleet: &FleetNow, within: Duration) {
     let until = Instant::now() + within;
     let processes: Vec<u32> = fleet.nodes.iter().filter_map(|node| node.process).collect();
     while let Some(left) = processes.iter().find(|&&process| is_alive(process)) {
@@ -143,8 +159,15 @@ fn wait_until_gone(fleet: &FleetNow, within: Duration) {
 }
 
 pub(crate) fn signal(process: u32, name: &str) {
-    let sent = Command::new("kill").args([&format!("-{name}"), &process.to_string()]).status();
-    assert!(sent.expect("kill is there").success());
+    assert!(try_signal(process, name), "{name} to {process}");
+}
+
+/// Sends a signal to a process that may have ended meanwhile; returns whether it had not.
+pub(crate) fn try_signal(process: u32, name: &str) -> bool {
+    let mut kill = Command::new("kill");
+    let sent =
+        kill.args([&format!("-{name}"), &process.to_string()]).stderr(Stdio::null()).status();
+    sent.expect("kill is there").success()
 }
 
 #[test]

@@ -2,40 +2,48 @@
 
 use crate::processes::{Program, folder, job};
 use crate::support::{alone, superconflict};
+use sidestep_link::wire::zenoh::{ZenohWire, hold};
+use sidestep_link::wire::{Party, WireError};
 use sidestep_session::fleet::{Clock, FleetJob, Job, NodeJob, Tls, Told, Topology};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Duration;
 
 fn openssl(folder: &Path, words: &str) -> bool {
     let made = Command::new("openssl").args(words.split_whitespace()).current_dir(folder).output();
     made.is_ok_and(|made| made.status.success())
 }
 
-/// Makes an authority, and a certificate that holds so many days for this machine.
+/// Makes an authority, and a certificate of it that holds so many days for this machine.
 fn authority(folder: &Path, name: &str, days: i32) -> Option<Tls> {
-    let file = |end: &str| folder.join(format!("{name}{end}"));
-    std::fs::write(file(".ext"), "subjectAltName=IP:127.0.0.1\n").expect("written");
-    let key = "-newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes";
-    let made = openssl(
-        folder,
-        &format!(
-            "req -x509 {key} -keyout {name}-ca.key -out {name}-ca.pem -subj /CN={name}-ca -days 2"
-        ),
-    ) && openssl(
-        folder,
-        &format!("req {key} -keyout {name}.key -out {name}.csr -subj /CN={name}"),
-    ) && openssl(
-        folder,
-        &format!(
-            "x509 -req -in {name}.csr -CA {name}-ca.pem -CAkey {name}-ca.key -CAcreateserial -extfile {name}.ext -out {name}.pem -days {days}"
-        ),
+    let ca = format!(
+        "req -x509 {KEY} -keyout {name}-ca.key -out {name}-ca.pem -subj /CN={name}-ca -days 2"
     );
-    if !made {
+    if !openssl(folder, &ca) {
+        sidestep_testing::skip(format!("openssl does not make the authority `{name}` here"));
+        return None;
+    }
+    certificate(folder, name, name, days)
+}
+
+/// Words for a new key.
+const KEY: &str = "-newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes";
+
+/// Makes a certificate of an authority.
+fn certificate(folder: &Path, authority: &str, name: &str, days: i32) -> Option<Tls> {
+    let file = |name: &str, end: &str| folder.join(format!("{name}{end}"));
+    std::fs::write(file(name, ".ext"), "subjectAltName=IP:127.0.0.1\n").expect("written");
+    let request = format!("req {KEY} -keyout {name}.key -out {name}.csr -subj /CN={name}");
+    let sign = format!(
+        "x509 -req -in {name}.csr -CA {authority}-ca.pem -CAkey {authority}-ca.key -CAcreateserial \
+         -extfile {name}.ext -out {name}.pem -days {days}"
+    );
+    if !(openssl(folder, &request) && openssl(folder, &sign)) {
         sidestep_testing::skip(format!("openssl does not make the certificate `{name}` here"));
         return None;
     }
-    let (authority, certificate, key) = (file("-ca.pem"), file(".pem"), file(".key"));
-    Some(Tls { authority, certificate, key })
+    let (authority, key) = (file(authority, "-ca.pem"), file(name, ".key"));
+    Some(Tls { authority, certificate: file(name, ".pem"), key })
 }
 
 fn fleet(folder: &Path, tls: Option<Tls>) -> FleetJob {
@@ -46,15 +54,15 @@ fn fleet(folder: &Path, tls: Option<Tls>) -> FleetJob {
 }
 
 #[test]
-fn with_certificates_a_fleet_flies_as_ever_and_whoever_has_none_of_its_authority_does_not_get_in() {
+fn with_certificates_a_fleet_flies_as_ever_and_whoever_has_none_of_its_authority_is_refused_by_name()
+ {
     let text = superconflict(2, "compact-team", 10, "");
     let folder = folder(&text);
     let Some(ours) = authority(folder.path(), "ours", 2) else { return };
     let Some(others) = authority(folder.path(), "others", 2) else { return };
-    let server = Program::start(&Job::Fleet(FleetJob {
-        nodes: Some(1),
-        ..fleet(folder.path(), Some(ours.clone()))
-    }));
+    let mut job = FleetJob { nodes: Some(1), ..fleet(folder.path(), Some(ours.clone())) };
+    job.common.log = "warn".into();
+    let server = Program::start(&Job::Fleet(job));
     let connect = server.until("its endpoints", |told| match told {
         Told::Listens(endpoints) => Some(endpoints),
         Told::Failed(failed) => panic!("{failed:?}"),
@@ -66,15 +74,21 @@ fn with_certificates_a_fleet_flies_as_ever_and_whoever_has_none_of_its_authority
         let (connect, listen) = (connect.clone(), vec!["tls/127.0.0.1:0".into()]);
         Program::start(&Job::Node(NodeJob { common, airplane: 1, connect, listen, patience_s }))
     };
-    for tls in [None, Some(others)] {
-        let (code, failed) = node(tls, 2.0).end();
+    let theirs = Tls { authority: ours.authority.clone(), ..others.clone() };
+    for (tls, cause) in [
+        (None, "there is no certificate to show"),
+        (Some(theirs), "it does not take the certificate"),
+        (Some(others), "its certificate does not hold by"),
+    ] {
+        let (code, failed) = node(tls, 30.0).end();
         let failed = failed.expect("it says why");
-        assert_eq!(code, Some(1), "{failed:?}");
-        assert!(
-            failed.cause.contains("nobody answers") && failed.remedy.contains("--tls-ca"),
-            "{failed:?}"
-        );
+        assert_eq!(code, Some(2), "{failed:?}");
+        assert!(failed.cause.contains(cause) && failed.remedy.contains("--tls-ca"), "{failed:?}");
+        assert_eq!(failed.place, connect[0], "{failed:?}");
     }
+    // Zenoh's words, as it alone sees them.
+    let says = |line: &String| line.contains("UnknownIssuer");
+    assert!(server.logged().iter().any(says), "{:?}", server.logged());
     let last = node(Some(ours), 30.0);
     let digest = server.until("the end", |told| match told {
         Told::Ended { summary, .. } => Some(summary["digest"].clone()),
@@ -100,6 +114,31 @@ fn certificates_that_are_none_or_out_of_date_are_refused_before_anything_starts(
     );
     refused(Tls { certificate: folder.path().join("s.toml"), ..ours.clone() }, "no certificate");
     refused(Tls { key: ours.certificate.clone(), ..ours.clone() }, "no private key");
-    let Some(old) = authority(folder.path(), "old", -1) else { return };
-    refused(Tls { authority: ours.authority.clone(), ..old }, "it holds from");
+    let Some(old) = certificate(folder.path(), "ours", "old", -1) else { return };
+    refused(old, "it holds from");
+    let mut open = fleet(folder.path(), Some(ours));
+    open.listen = vec!["tcp/127.0.0.1:0".into()];
+    let (code, failed) = Program::start(&Job::Fleet(open)).end();
+    let failed = failed.expect("it says why");
+    assert_eq!(code, Some(2), "{failed:?}");
+    assert!(failed.remedy.contains("tls/HOST:PORT"), "{failed:?}");
+}
+
+/// A node looks at its own certificate first; here one that does not.
+#[test]
+fn a_certificate_that_is_out_of_date_is_refused_by_the_server_which_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let Some(ours) = authority(folder.path(), "ours", 2) else { return };
+    let Some(old) = certificate(folder.path(), "ours", "old", -1) else { return };
+    let at = [hold("tls/127.0.0.1:0").expect("a free port").endpoint];
+    let _server = ZenohWire::server(&at, Some(&ours)).expect("a server");
+    let node = |tls: &Tls| ZenohWire::node(Party::Node(0), &at, Some(tls), Duration::from_secs(30));
+    match node(&old).map(drop) {
+        Err(WireError::Distrust { endpoint, reason }) => {
+            assert_eq!(endpoint, at[0]);
+            assert!(reason.contains("old.pem") && reason.contains("Expired"), "{reason}");
+        }
+        other => panic!("{other:?}"),
+    }
+    node(&ours).expect("with one that holds it gets in");
 }

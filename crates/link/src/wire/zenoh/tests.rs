@@ -64,6 +64,51 @@ fn a_peer_does_not_relay_and_a_router_does() {
     }
 }
 
+/// Three nodes, in a mesh or a star.
+fn three(is_mesh: bool) -> (ZenohWire, Vec<ZenohWire>) {
+    let at = [free()];
+    let hub = ZenohWire::server(&at, None).expect("a server");
+    let held: Vec<Held> = (0..3).map(|_| hold("tcp/127.0.0.1:0").expect("a free port")).collect();
+    let listens = |held: &Held| if is_mesh { vec![held.endpoint.clone()] } else { Vec::new() };
+    let members: Vec<Member> = (0..)
+        .zip(&held)
+        .map(|(agent, held)| Member { agent, life: crate::words::Life(0), listens: listens(held) })
+        .collect();
+    let node = |(agent, held): (EntityId, Held)| {
+        let wire = ZenohWire::node(Party::Node(agent), &at, None, LONG).expect("it answers");
+        let mut wire = if is_mesh { wire.listening(vec![held]) } else { wire };
+        wire.join(agent, &members).expect("a mesh");
+        wire
+    };
+    let nodes = (0..).zip(held).map(node).collect();
+    (hub, nodes)
+}
+
+#[test]
+fn a_frame_for_all_others_comes_once_to_each_of_them_and_to_nobody_else() {
+    for is_mesh in [true, false] {
+        let (mut hub, mut nodes) = three(is_mesh);
+        let others = [0, 2].map(Party::Node);
+        for k in [0, 2] {
+            let until = Instant::now() + LONG;
+            while nodes[k].receive(Duration::from_millis(20)).is_none() {
+                assert!(Instant::now() < until, "no frame has come to {k}, mesh {is_mesh}");
+                nodes[1].send(&[Party::Node(k as EntityId)], b"there");
+            }
+        }
+        for k in [0, 2] {
+            while nodes[k].receive(SOON).is_some() {}
+        }
+        nodes[1].send(&others, b"all");
+        for k in [0, 2] {
+            assert_eq!(nodes[k].receive(LONG).as_deref(), Some(&b"all"[..]), "mesh {is_mesh}");
+            assert_eq!(nodes[k].receive(SOON), None, "it comes once");
+        }
+        assert_eq!(nodes[1].receive(SOON), None, "not to the sender");
+        assert_eq!(hub.receive(SOON), None, "not to the server");
+    }
+}
+
 /// A way between two ends that can be cut: then it takes what is sent, as a network without a cable does, and
 /// nothing arrives.
 struct Cable {

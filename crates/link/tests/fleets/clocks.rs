@@ -1,0 +1,122 @@
+//! Clocks: nobody compares them, so it changes nothing that one is wrong, or jumps.
+
+use crate::processes::{Program, folder, job};
+use crate::support::{alone, superconflict, wide};
+use serde_json::Value;
+use sidestep_session::fleet::{Clock, FleetJob, Job, NodeJob, Told, Topology};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const FAST: Clock = Clock::Realtime { speed: 20.0 };
+
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).expect("a folder");
+    let paths = entries.map(|entry| entry.expect("an entry").path());
+    paths.flat_map(|path| if path.is_dir() { sources(&path) } else { vec![path] }).collect()
+}
+
+/// Certificates and logs have dates; their libraries know them.
+#[test]
+fn no_code_of_fleets_names_the_wall_clock() {
+    let all = sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"));
+    assert!(all.len() > 20, "{all:?}");
+    for path in all {
+        let text = std::fs::read_to_string(&path).expect("text");
+        for name in ["SystemTime", "UNIX_EPOCH"] {
+            assert!(!text.contains(name), "{name} in {}", path.display());
+        }
+    }
+}
+
+/// Code that takes the place of the system's: a wall clock that is an hour ahead in every other second.
+const JUMPS: &str = r#"
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <time.h>
+int clock_gettime(clockid_t id, struct timespec *at) {
+  static int (*next)(clockid_t, struct timespec *);
+  if (!next) next = (int (*)(clockid_t, struct timespec *))dlsym(RTLD_NEXT, "clock_gettime");
+  int answer = next(id, at);
+  if (id == CLOCK_REALTIME && at->tv_sec % 2) at->tv_sec += 3600;
+  return answer;
+}
+"#;
+
+/// Builds it; `None` where that cannot be done, with a printed reason.
+fn jumping_clock(folder: &Path) -> Option<PathBuf> {
+    let [source, library] = ["jumps.c", "jumps.so"].map(|name| folder.join(name));
+    std::fs::write(&source, JUMPS).expect("written");
+    let mut command = Command::new("cc");
+    command.args(["-shared", "-fPIC", "-o"]).args([&library, &source]).arg("-ldl");
+    let is_built = command.output().is_ok_and(|output| output.status.success());
+    if !is_built || !cfg!(target_os = "linux") {
+        sidestep_testing::skip(
+            "no clock can be made to jump here: that takes Linux and a C compiler",
+        );
+        return None;
+    }
+    Some(library)
+}
+
+fn start(job: &FleetJob, clock: &Path) -> Program {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sidestep-link"));
+    command.env("LD_PRELOAD", clock);
+    Program::start_by(command, &Job::Fleet(job.clone()))
+}
+
+#[test]
+fn a_wall_clock_that_jumps_makes_nobody_late_or_lost() {
+    let folder = folder(&wide(&superconflict(3, "compact-team", 1_000_000, ""), 8_000));
+    let Some(clock) = jumping_clock(folder.path()) else { return };
+    let mut job = job(folder.path(), Topology::Mesh, FAST);
+    (job.common.lease_s, job.common.json_log, job.common.log) = (3.0, true, "debug".into());
+    let mut program = start(&job, &clock);
+    let now = program.fleet("jumps", |now| now.nodes.iter().all(|node| node.flown > 16));
+    assert!(now.nodes.iter().all(|node| node.lives == 1 && node.late < 4), "{now:?}");
+    let lines = program.logged();
+    let hour = |line: &String| -> Option<String> {
+        let line: Value = serde_json::from_str(line).ok()?;
+        Some(line["timestamp"].as_str()?.get(..13)?.to_string())
+    };
+    let hours: BTreeSet<String> = lines.iter().filter_map(hour).collect();
+    assert!(hours.len() > 1, "the clock has jumped: {hours:?}");
+    drop(program.stdin.take());
+    let losses = program.until("the end", |told| match told {
+        Told::Ended { summary, .. } => Some(summary["metrics"]["losses_of_separation"].clone()),
+        _ => None,
+    });
+    assert_eq!(losses, 0);
+}
+
+/// Two machines whose monotonic clocks, too, have nothing to do with each other: one has run for a day longer.
+#[test]
+fn a_node_whose_machine_runs_since_another_day_flies_with_the_rest() {
+    let text = superconflict(3, "compact-team", 20, "");
+    let folder = folder(&text);
+    let shifted = ["-T", "--monotonic", "86400", "--boottime", "86400", "--fork", "--kill-child"];
+    let can = Command::new("unshare").args(shifted).arg("true").status();
+    if !can.is_ok_and(|status| status.success()) {
+        sidestep_testing::skip("time namespaces need privileges that this user does not have");
+        return;
+    }
+    let fleet = FleetJob { nodes: Some(2), ..job(folder.path(), Topology::Mesh, Clock::Lockstep) };
+    let common = fleet.common.clone();
+    let server = Program::start(&Job::Fleet(fleet));
+    let connect = server.until("its endpoints", |told| match told {
+        Told::Listens(endpoints) => Some(endpoints),
+        _ => None,
+    });
+    let (airplane, listen, patience_s) = (2, vec!["tcp/127.0.0.1:0".into()], 30.0);
+    let node = Job::Node(NodeJob { common, airplane, connect, listen, patience_s });
+    let mut command = Command::new("unshare");
+    command.args(shifted).arg(env!("CARGO_BIN_EXE_sidestep-link"));
+    let node = Program::start_by(command, &node);
+    let digest = server.until("the end", |told| match told {
+        Told::Ended { summary, .. } => Some(summary["digest"].clone()),
+        Told::Failed(failed) => panic!("{failed:?}"),
+        _ => None,
+    });
+    assert_eq!(digest, alone(&text).digest);
+    assert_eq!((server.end(), node.end()), ((Some(0), None), (Some(0), None)));
+}

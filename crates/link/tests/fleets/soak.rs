@@ -1,0 +1,230 @@
+//! Fleets for an hour, or as long as is said, with random kills, stops and partitions from a seed.
+//!
+//! `SIDESTEP_SOAK_S` says how many seconds (60 if it does not), `PROPTEST_RNG_SEED` the seed. The same seed gives the
+//! same faults at the same times; what happens between them is up to the machine.
+
+use crate::processes::{Program, folder, job, try_signal, wait_until_gone};
+use sidestep::kernel::stream::{Purpose, Streams};
+use sidestep::kernel::{EntityId, Seed};
+use sidestep_session::fleet::{Clock, FleetNow, Job, NodeNow, Told, Topology};
+use std::fmt::Write;
+use std::time::{Duration, Instant};
+
+const AIRPLANES: EntityId = 6;
+
+/// Seconds of the scenario in a second: four cycles.
+const SPEED: f64 = 20.0;
+
+/// Longest time in which a node does not fly: a stop, the lease, the longest wait before it is started again, and joining.
+const MOST_AWAY: Duration = Duration::from_secs(60);
+
+/// What happens to a node.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Fault {
+    Kill,
+    Stop(Duration),
+}
+
+/// All faults, from a seed.
+#[derive(Debug, PartialEq)]
+struct Plan {
+    seed: u64,
+    deployment: &'static str,
+    topology: Topology,
+    /// Time since the beginning, airplane and fault, by rising time.
+    faults: Vec<(Duration, EntityId, Fault)>,
+    /// Partitions and losses, as the scenario has them.
+    network: String,
+}
+
+impl Plan {
+    fn new(seed: u64, lasts: Duration) -> Self {
+        let streams = Streams::new(Seed(seed));
+        let draw = |k: u64, purpose| streams.block(0, k, Purpose(purpose), 0);
+        let [deployment, topology, ..] = draw(0, 1);
+        let deployments = ["pim", "compact-team", "hierarchical-pim", "team"];
+        let mut faults = Vec::new();
+        let mut at = Duration::from_secs(5);
+        for k in 0.. {
+            let [gap, who, what, how_long] = draw(k, 2);
+            at += Duration::from_millis(1_000 + u64::from(gap % 9_000));
+            if at >= lasts {
+                break;
+            }
+            let stop = Fault::Stop(Duration::from_millis(100 + u64::from(how_long % 4_900)));
+            let fault = if what % 2 == 0 { Fault::Kill } else { stop };
+            faults.push((at, who % AIRPLANES, fault));
+        }
+        let seconds = (lasts.as_secs_f64() * SPEED) as u64;
+        Self {
+            seed,
+            deployment: deployments[deployment as usize % deployments.len()],
+            topology: if topology % 2 == 0 { Topology::Mesh } else { Topology::Star },
+            faults,
+            network: network(seconds, |k| draw(k, 3)),
+        }
+    }
+
+    /// Returns a scenario that lasts longer than all faults: airplanes that fly to and fro through one point.
+    fn scenario(&self, lasts: Duration) -> String {
+        let Self { seed, deployment, network, .. } = self;
+        let mut text = format!(
+            "format = 1\nworld = \"airspace\"\nseed = {seed}\ncycles = 1000000\n[airspace]\n\
+             deployment = \"{deployment}\"\nmax_rounds = 20\n{network}\n"
+        );
+        let crossings = 2 + (lasts.as_secs_f64() * SPEED * 35.0 / 5_000.0) as usize;
+        for airplane in 0..AIRPLANES {
+            let angle = std::f64::consts::TAU * f64::from(airplane) / f64::from(AIRPLANES);
+            let end = [2_500.0 * angle.cos(), 2_500.0 * angle.sin()].map(f64::round);
+            let ends = [end, end.map(|coordinate| -coordinate)];
+            let way = |k: usize| format!("{:?}", ends[k % 2]);
+            let ways: Vec<String> = (1..=crossings).map(way).collect();
+            let _ = writeln!(
+                text,
+                "[[airplanes]]\nat_m = {}\nheading_deg = {}\nway_points_m = [{}]",
+                way(0),
+                (angle.to_degrees() + 180.0) % 360.0,
+                ways.join(", ")
+            );
+        }
+        text
+    }
+}
+
+/// Returns a network that loses some messages, and is parted now and then.
+fn network(seconds: u64, draw: impl Fn(u64) -> [u32; 4]) -> String {
+    let mut partitions = Vec::new();
+    let mut at = 60;
+    for k in 0.. {
+        let [gap, lasts, sides, _] = draw(k);
+        let (from, until) =
+            (at + u64::from(gap % 200), at + u64::from(gap % 200 + lasts % 60) + 10);
+        if until >= seconds {
+            break;
+        }
+        // Never all on one side.
+        let sides = 1 + sides % ((1 << AIRPLANES) - 2);
+        let side = |is_left: bool| {
+            let on_it = (0..AIRPLANES).filter(|airplane| (sides >> airplane & 1 == 1) == is_left);
+            on_it.collect::<Vec<EntityId>>()
+        };
+        let (left, right) = (side(true), side(false));
+        partitions.push(format!(
+            "{{ from_s = {from}, until_s = {until}, sides = [{left:?}, {right:?}] }}"
+        ));
+        at = until;
+    }
+    format!(
+        "network = {{ loss = 0.02, duplication = 0.02, max_delay_s = 0.05, patience_s = 0.25, partitions = [{}] }}",
+        partitions.join(", ")
+    )
+}
+
+/// What is watched while a fleet flies.
+struct Watch {
+    /// Controls that each node has flown, and when that was last seen to rise.
+    flown: Vec<(u64, Instant)>,
+}
+
+impl Watch {
+    fn new() -> Self {
+        Self { flown: vec![(0, Instant::now()); AIRPLANES as usize] }
+    }
+
+    fn look(&mut self, now: &FleetNow) {
+        for (node, (flown, since)) in now.nodes.iter().zip(&mut self.flown) {
+            if node.flown > *flown {
+                (*flown, *since) = (node.flown, Instant::now());
+            }
+            assert!(since.elapsed() < MOST_AWAY, "airplane {} hangs: {now:?}", node.airplane);
+        }
+    }
+}
+
+/// Returns the memory of a process that nobody else has, in kB.
+fn own_memory_kb(process: u32) -> Option<u64> {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    let line = status.lines().find(|line| line.starts_with("RssAnon:"))?;
+    line.split_whitespace().nth(1)?.parse().ok()
+}
+
+/// Lets the faults happen, and returns the fleet as it is at the end of time.
+fn fly(program: &Program, plan: &Plan, lasts: Duration) -> FleetNow {
+    let mut faults = plan.faults.iter().peekable();
+    let mut stopped: Vec<(Instant, u32)> = Vec::new();
+    let mut watch = Watch::new();
+    let began = Instant::now();
+    let mut early = None;
+    loop {
+        let now = program.fleet("news of the fleet", |now| now.has_begun);
+        watch.look(&now);
+        // A twelfth of the time: five minutes of an hour.
+        if early.is_none() && began.elapsed() > lasts / 12 {
+            early = own_memory_kb(program.child.id());
+        }
+        stopped.retain(|&(until, process)| {
+            let is_over = until <= Instant::now();
+            if is_over {
+                try_signal(process, "CONT");
+            }
+            !is_over
+        });
+        while let Some((_, airplane, fault)) = faults.next_if(|(at, ..)| *at <= began.elapsed()) {
+            let node = &now.nodes[*airplane as usize];
+            let Some(process) = node.process.filter(|_| node.state != "gone") else { continue };
+            let is_there = match fault {
+                Fault::Kill => try_signal(process, "KILL"),
+                Fault::Stop(_) => try_signal(process, "STOP"),
+            };
+            if let (Fault::Stop(time), true) = (fault, is_there) {
+                stopped.push((Instant::now() + *time, process));
+            }
+        }
+        if began.elapsed() > lasts {
+            for (_, process) in stopped {
+                try_signal(process, "CONT");
+            }
+            let late = own_memory_kb(program.child.id());
+            if let (Some(early), Some(late)) = (early, late) {
+                println!("memory of the server: {early} kB early, {late} kB at the end");
+                let most = early as f64 * 1.1 + 1024.0;
+                assert!((late as f64) <= most, "the server grows: {early} kB, then {late} kB");
+            }
+            return now;
+        }
+    }
+}
+
+fn variable(name: &str) -> Option<u64> {
+    std::env::var(name).ok()?.parse().ok()
+}
+
+#[test]
+#[ignore = "a minute, or as long as SIDESTEP_SOAK_S says: see .ci/soak"]
+fn a_fleet_whose_nodes_are_killed_stopped_and_parted_flies_on_and_stays_apart() {
+    let lasts = Duration::from_secs(variable("SIDESTEP_SOAK_S").unwrap_or(60));
+    let seed = variable("PROPTEST_RNG_SEED").unwrap_or(1);
+    let plan = Plan::new(seed, lasts);
+    assert_eq!(plan, Plan::new(seed, lasts), "the same faults again");
+    println!("seed {seed}, {} s: {} in a {:?}", lasts.as_secs(), plan.deployment, plan.topology);
+    let folder = folder(&plan.scenario(lasts));
+    let mut job = job(folder.path(), plan.topology, Clock::Realtime { speed: SPEED });
+    job.common.lease_s = 3.0;
+    let mut program = Program::start(&Job::Fleet(job));
+    let now = fly(&program, &plan, lasts);
+    drop(program.stdin.take());
+    let losses = program.until("the end", |told| match told {
+        Told::Ended { summary, .. } => Some(summary["metrics"]["losses_of_separation"].clone()),
+        _ => None,
+    });
+    assert_eq!(losses, 0);
+    assert_eq!(program.end().0, Some(130), "it was told to end");
+    wait_until_gone(&now, Duration::from_secs(5));
+    let sum = |count: fn(&NodeNow) -> u64| now.nodes.iter().map(count).sum::<u64>();
+    let (flown, late, lives) = (sum(|n| n.flown), sum(|n| n.late), sum(|n| n.lives));
+    let faults = plan.faults.len();
+    println!(
+        "{faults} faults, {} cycles: {flown} controls flown, {late} late; {lives} lives",
+        now.cycle
+    );
+}
