@@ -24,12 +24,12 @@ pub mod exchange;
 pub mod informed;
 pub mod intent;
 mod link;
-pub mod network;
 mod own_ship;
 pub mod packet;
 mod party;
 pub mod sampling;
 mod talk;
+pub mod traffic;
 
 use contact::Beacon;
 pub use link::{Agent, Endpoint, Most, Radio};
