@@ -19,6 +19,7 @@
 //! - [`interrupt`]: a cycle that takes long can be left half done.
 //! - [`view`]: the scenery and the frames of any world; looking at them changes nothing.
 //! - [`math`], [`distr`], [`geometry`]: numbers that are the same on every platform.
+//! - [`network`]: what agents say to each other, and the faults that happen to it.
 //! - [`ports`]: recorder, transport and clock, each with an in-memory version.
 
 pub mod batch;
@@ -34,6 +35,7 @@ pub mod error;
 pub mod geometry;
 pub mod interrupt;
 pub mod math;
+pub mod network;
 pub mod plan;
 pub mod ports;
 pub mod run;

@@ -5,7 +5,8 @@ use crate::words::{Begin, Fingerprint};
 use sidestep::kernel::ports::Envelope;
 use sidestep::kernel::{Cycle, Digest, EntityId, InputError};
 use sidestep::scenario::{Compiled, Source};
-use sidestep::worlds::airspace::deploy::{Deployment, Ether};
+use sidestep::kernel::network::Ether;
+use sidestep::worlds::airspace::deploy::Deployment;
 use sidestep::worlds::airspace::pilot::{Fleet, Packet, Pilot, Refusal, Sight as Percept};
 use sidestep::worlds::airspace::{AirspaceRun, AirspaceWorld};
 use sidestep_session::{Error, Journey, Watcher};
@@ -156,7 +157,7 @@ impl Program for Aboard {
         }
         percept.check(&self.world).map_err(|why| format!("it cannot be: {why:?}"))?;
         self.heard_before = std::mem::take(&mut self.heard);
-        let tick = self.world.first_tick(cycle);
+        let tick = self.world.talks_of(cycle)[0].0;
         self.pilot.begin(percept, tick);
         Ok(tick)
     }
@@ -214,6 +215,7 @@ impl Program for Aboard {
 
 /// The faults of the scenario's network, for what one airplane sends.
 pub struct Faults {
+    world: Arc<AirspaceWorld>,
     ether: Ether,
     sender: EntityId,
 }
@@ -221,7 +223,7 @@ pub struct Faults {
 impl Faults {
     /// Returns the faults of a world's network for an airplane; none of a world whose network is reliable.
     pub fn new(world: Arc<AirspaceWorld>, sender: EntityId) -> Option<Self> {
-        Some(Self { ether: Ether::new(world)?, sender })
+        Some(Self { ether: world.ether()?, world, sender })
     }
 }
 
@@ -240,6 +242,6 @@ impl Channel for Faults {
     }
 
     fn begin(&mut self, cycle: Cycle) {
-        self.ether.begin(cycle);
+        self.ether.begin(self.world.talks_of(cycle).to_vec());
     }
 }

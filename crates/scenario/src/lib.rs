@@ -17,6 +17,7 @@ mod keys;
 pub mod kind;
 mod locate;
 mod meaning;
+pub mod network;
 mod overrides;
 mod remark;
 pub mod schema;

@@ -6,7 +6,7 @@ mod wishes;
 
 use super::Turn;
 use super::agents::Decided;
-use super::agents::network::Traffic;
+use super::agents::traffic::Traffic;
 use super::baseline::mvp::Resolving;
 use super::flight::{Action, Known};
 use super::intruder::Intruder;

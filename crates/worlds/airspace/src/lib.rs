@@ -50,7 +50,7 @@ pub mod wish;
 mod words;
 pub mod world;
 
-use agents::network::Traffic;
+use agents::traffic::Traffic;
 pub use decide::{Effort, Optimization};
 use events::Event;
 pub use kind::Airspace;

@@ -2,7 +2,7 @@
 
 use crate::agents::Decided;
 use crate::agents::contact::Contacts;
-use crate::agents::network::Traffic;
+use crate::agents::traffic::Traffic;
 use crate::decide::Considered;
 use crate::events::Event;
 use crate::flight::{Action, Known};

@@ -1,5 +1,6 @@
 //! Purposes of random draws of this world.
 
+use sidestep_kernel::network::FaultStreams;
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{Cycle, Slot};
 
@@ -17,6 +18,11 @@ pub(crate) const NETWORK: Purpose = Purpose(5);
 pub(crate) const BURST: Purpose = Purpose(6);
 /// Messages lost in a burst.
 pub(crate) const BURST_LOSS: Purpose = Purpose(7);
+
+/// Returns the streams and purposes from which a network's faults are drawn.
+pub(crate) fn of_network(streams: Streams) -> FaultStreams {
+    FaultStreams { streams, network: NETWORK, burst: BURST, burst_loss: BURST_LOSS }
+}
 
 /// Returns the `k`-th uniform number in [0, 1) of an airplane's samples in a cycle.
 pub(crate) fn sample(streams: &Streams, slot: Slot, now: Cycle, k: u64) -> f64 {

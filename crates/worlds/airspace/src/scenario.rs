@@ -6,7 +6,6 @@ mod network;
 mod settings;
 mod values;
 
-use super::agents::packet::fingerprint;
 use super::deploy::Deployment;
 use super::flight::Airplane;
 use super::flight_plan::AirplaneSection;
@@ -21,6 +20,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use settings::{LegsSection, ReactiveSection, Switch, Times};
 use sidestep_collectives::{Choice, Estimator, Order, Update, Utility};
+use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
 use sidestep_scenario::{

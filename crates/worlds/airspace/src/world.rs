@@ -3,7 +3,6 @@
 #[cfg(test)]
 mod tests;
 
-use super::agents::network::Network;
 use super::baseline::Reactive;
 use super::deploy::Deployment;
 use super::flight::{
@@ -17,6 +16,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, Order, Settings};
 use sidestep_kernel::control::Teams;
+use sidestep_kernel::network::Network;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId, Slot, interrupt};
 use std::sync::Arc;

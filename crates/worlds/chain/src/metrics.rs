@@ -1,6 +1,6 @@
 //! Metrics of a run.
 
-use super::agents::network::Traffic;
+use super::agents::traffic::Traffic;
 use super::motion::escape::Escaped;
 use super::motion::replan::Climbed;
 use super::rods::veto::{Moved, Reason};

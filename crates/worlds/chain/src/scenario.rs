@@ -27,6 +27,7 @@ pub(crate) use recipe::Recipe;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
 use serde_json::{Value, json};
+use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
 use sidestep_scenario::{
@@ -389,6 +390,7 @@ impl<const D: usize> Compiler<'_, D> {
             teams: Arc::default(),
             deployment: section.deployment,
             network,
+            fingerprint: fingerprint(&self.source.text, self.head.seed),
         };
         let teams = match self.known {
             Some(known) => Arc::clone(&known.teams),

@@ -1,6 +1,5 @@
 //! A compiled world of chains: everything that never changes during a run.
 
-use super::agents::network::Network;
 use super::arms::arm::Arm;
 use super::deploy::kind::Deployment;
 use super::driver::{Driver, Driving, Task};
@@ -17,6 +16,7 @@ use super::script::Motion;
 use super::swarm::drive::Pose;
 use sidestep_kernel::control::Teams;
 use sidestep_kernel::math::atan2;
+use sidestep_kernel::network::Network;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, InputError, Slot};
 use std::ops::RangeInclusive;
@@ -38,6 +38,10 @@ pub(crate) mod purpose {
     pub(crate) const LASER: Purpose = Purpose(4);
     /// Faults of messages.
     pub(crate) const NETWORK: Purpose = Purpose(7);
+    /// States of links: in a burst of losses or not.
+    pub(crate) const BURST: Purpose = Purpose(8);
+    /// Messages lost in a burst.
+    pub(crate) const BURST_LOSS: Purpose = Purpose(9);
 }
 
 /// Cutoff of a random throw, in standard deviations.
@@ -74,6 +78,8 @@ pub struct ChainWorld<const D: usize> {
     pub(crate) deployment: Deployment,
     /// The network that carries the agents' messages, if it is unreliable.
     pub(crate) network: Option<Network>,
+    /// Digest of the scenario's text and seed, by which agents know each other's packets.
+    pub fingerprint: u64,
 }
 
 /// One chain and its tasks.

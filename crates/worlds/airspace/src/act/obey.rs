@@ -2,7 +2,7 @@
 
 use super::protect::{name_intruders, note};
 use crate::Turn;
-use crate::agents::network::Traffic;
+use crate::agents::traffic::Traffic;
 use crate::decide::Optimization;
 use crate::events::{Event, EventKind};
 use crate::intruder::Intruder;

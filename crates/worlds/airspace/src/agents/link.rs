@@ -10,13 +10,13 @@
 //! Endpoints and agents are state machines without a clock or a network of their own: ticks and
 //! messages are handed in, and messages are taken out.
 
-use super::network::Patience;
-use super::packet::{Draft, HEADER_BYTES};
 pub(crate) use super::party::Ended;
 use super::party::{Concludes, Outgoing, Party, Progress, Unsound};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
+use sidestep_kernel::network::Patience;
+use sidestep_kernel::network::{Draft, HEADER_BYTES};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 

@@ -26,12 +26,12 @@ pub mod grouping;
 pub mod informed;
 pub mod intent;
 mod link;
-pub mod network;
 mod own_ship;
 pub mod packet;
 mod party;
 pub mod sampling;
 mod talk;
+pub mod traffic;
 
 use contact::Beacon;
 pub use link::{Agent, Endpoint, Most, Radio};

@@ -1,27 +1,8 @@
-//! Packets: what goes over the network, around every message.
-//!
-//! ```text
-//! magic  version  topic  fingerprint  cycle  members  sender  sequence  checksum  message ...
-//! 2      1        1      8            8      8        4       4         8         bytes, little-endian
-//! ```
-//!
-//! Bytes from a network may be anything. [`open`] lets through only those that another airplane of
-//! the same scenario and build has sent in this form, for a talk; the message itself is checked by
-//! the agent that takes it ([`Unsound`](super::Unsound)). The checksum finds what was damaged on the way, not
-//! what was forged: who may send at all is the business of the network below.
+//! Packets of airplanes: their topics, and how they leave.
 
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::{Cycle, EntityId};
+use sidestep_kernel::{EntityId, network};
 use std::sync::Arc;
-
-const MAGIC: [u8; 2] = *b"Ss";
-const VERSION: u8 = 2;
-/// Number of bytes before the message.
-pub const HEADER_BYTES: usize = 44;
-/// Place of the checksum among them.
-const CHECKSUM_AT: usize = HEADER_BYTES - 8;
-/// Number of bytes for which there is room in a new packet.
-const USUAL_BYTES: usize = 512;
 
 /// The subject of a talk: each cycle has one talk of each at most, in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -34,30 +15,26 @@ pub enum Topic {
     Shield,
 }
 
-/// The identity of a talk: what is said in one is meant for no other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub struct TalkId {
-    /// The cycle for which is decided.
-    pub cycle: Cycle,
-    /// The subject.
-    pub topic: Topic,
-    /// A digest of the ids of all who take part: whoever takes others to be in the group is in another
-    /// talk.
-    pub members: u64,
-}
-
-impl TalkId {
-    /// Returns the identity of the talk of these airplanes, by rising id.
-    pub fn new(cycle: Cycle, topic: Topic, members: &[EntityId]) -> Self {
-        let bytes: Vec<u8> = members.iter().flat_map(|id| id.to_le_bytes()).collect();
-        Self { cycle, topic, members: digest([&bytes, &[]]) }
+impl network::Topic for Topic {
+    fn number(self) -> u8 {
+        self as u8
     }
 
-    /// Returns whether it comes before another one, whoever takes part in that.
-    pub fn is_before(&self, other: &Self) -> bool {
-        (self.cycle, self.topic) < (other.cycle, other.topic)
+    fn of_number(number: u8) -> Option<Self> {
+        match number {
+            0 => Some(Self::Group),
+            1 => Some(Self::Decision),
+            2 => Some(Self::Shield),
+            _ => None,
+        }
     }
 }
+
+/// The identity of a talk of airplanes.
+pub type TalkId = network::TalkId<Topic>;
+
+/// The statements of an airplane's packet about its message.
+pub type Seal = network::Seal<Topic>;
 
 /// A packet on its way out.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -68,259 +45,4 @@ pub struct Packet {
     pub sequence: u32,
     /// All of its bytes.
     pub payload: Vec<u8>,
-}
-
-/// A message in its serialized form, with room before it for what makes it a packet.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Draft(Vec<u8>);
-
-impl Draft {
-    /// Returns a message in the form in which it travels.
-    pub fn of<M: Serialize + ?Sized>(message: &M) -> Self {
-        let mut room = Vec::with_capacity(USUAL_BYTES);
-        room.resize(HEADER_BYTES, 0);
-        Self(postcard::to_extend(message, room).expect("messages are plain data"))
-    }
-
-    /// Returns a message that is serialized already.
-    pub fn of_bytes(message: &[u8]) -> Self {
-        Self([&[0; HEADER_BYTES], message].concat())
-    }
-
-    /// Returns a message that is followed by bytes in a form of their own.
-    pub fn with<M: Serialize + ?Sized>(message: &M, bytes: &[u8]) -> Self {
-        let Self(mut draft) = Self::of(message);
-        draft.extend_from_slice(bytes);
-        Self(draft)
-    }
-
-    /// The message.
-    pub fn message(&self) -> &[u8] {
-        &self.0[HEADER_BYTES..]
-    }
-
-    /// Number of bytes of the packet that it becomes.
-    #[expect(clippy::len_without_is_empty, reason = "it always has a header")]
-    pub fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    /// Returns the bytes of the packet.
-    pub fn sealed(mut self, seal: &Seal) -> Vec<u8> {
-        seal.write(&mut self.0[..CHECKSUM_AT]);
-        let (head, message) = self.0.split_at(HEADER_BYTES);
-        let checksum = digest([&head[..CHECKSUM_AT], message]).to_le_bytes();
-        self.0[CHECKSUM_AT..HEADER_BYTES].copy_from_slice(&checksum);
-        self.0
-    }
-}
-
-/// The statements of a packet about its message.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Seal {
-    /// Digest of scenario and build: airplanes of others are not understood.
-    pub fingerprint: u64,
-    /// The talk.
-    pub talk: TalkId,
-    /// The sender.
-    pub sender: EntityId,
-    /// Number among the sender's packets of the talk.
-    pub sequence: u32,
-}
-
-impl Seal {
-    /// Writes the bytes before the checksum.
-    fn write(&self, room: &mut [u8]) {
-        let Self { fingerprint, talk: TalkId { cycle, topic, members }, sender, sequence } = *self;
-        let [m, a] = MAGIC;
-        room[..4].copy_from_slice(&[m, a, VERSION, topic as u8]);
-        room[4..12].copy_from_slice(&fingerprint.to_le_bytes());
-        room[12..20].copy_from_slice(&cycle.to_le_bytes());
-        room[20..28].copy_from_slice(&members.to_le_bytes());
-        room[28..32].copy_from_slice(&sender.to_le_bytes());
-        room[32..36].copy_from_slice(&sequence.to_le_bytes());
-    }
-
-    /// Reads the bytes before the checksum.
-    fn read(bytes: &[u8]) -> Result<Self, Refusal> {
-        let word = |at: usize| u64::from_le_bytes(std::array::from_fn(|k| bytes[at + k]));
-        let half = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| bytes[at + k]));
-        if bytes[..2] != MAGIC {
-            return Err(Refusal::NoPacket);
-        }
-        if bytes[2] != VERSION {
-            return Err(Refusal::Version);
-        }
-        let topic = match bytes[3] {
-            0 => Topic::Group,
-            1 => Topic::Decision,
-            2 => Topic::Shield,
-            _ => return Err(Refusal::Damaged),
-        };
-        let talk = TalkId { cycle: word(12), topic, members: word(20) };
-        Ok(Self { fingerprint: word(4), talk, sender: half(28), sequence: half(32) })
-    }
-}
-
-/// Returns what a packet says, and its message.
-///
-/// # Errors
-/// When the bytes are none of a packet of `fingerprint`, or were damaged.
-pub fn open(bytes: &[u8], fingerprint: u64) -> Result<(Seal, &[u8]), Refusal> {
-    let Some((head, message)) = bytes.split_at_checked(HEADER_BYTES) else {
-        return Err(Refusal::NoPacket);
-    };
-    let (said, checksum) = head.split_at(CHECKSUM_AT);
-    let seal = Seal::read(said)?;
-    if digest([said, message]).to_le_bytes() != *checksum {
-        return Err(Refusal::Damaged);
-    }
-    if seal.fingerprint != fingerprint {
-        return Err(Refusal::Fingerprint);
-    }
-    Ok((seal, message))
-}
-
-/// A reason why a packet was dropped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum Refusal {
-    /// Too short, or without the first bytes of a packet.
-    NoPacket,
-    /// Of another version of this form.
-    Version,
-    /// Its checksum is wrong.
-    Damaged,
-    /// Of another scenario or build.
-    Fingerprint,
-    /// Larger than any message of its talk.
-    TooLarge,
-    /// From one that is not in the group, or in the name of another one.
-    Sender,
-    /// Of a talk that is over for all.
-    Stale,
-    /// Of a talk with other members.
-    OtherGroup,
-    /// Of a talk that comes later, of which nothing more can be kept.
-    NoRoom,
-    /// Its message cannot be read.
-    Unreadable,
-    /// Its message can be read, and says what cannot be.
-    Unsound,
-}
-
-impl Refusal {
-    /// All reasons.
-    pub const ALL: [Self; 11] = [
-        Self::NoPacket,
-        Self::Version,
-        Self::Damaged,
-        Self::Fingerprint,
-        Self::TooLarge,
-        Self::Sender,
-        Self::Stale,
-        Self::OtherGroup,
-        Self::NoRoom,
-        Self::Unreadable,
-        Self::Unsound,
-    ];
-
-    /// Returns its name in metrics and logs.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::NoPacket => "no-packet",
-            Self::Version => "version",
-            Self::Damaged => "damaged",
-            Self::Fingerprint => "fingerprint",
-            Self::TooLarge => "too-large",
-            Self::Sender => "sender",
-            Self::Stale => "stale",
-            Self::OtherGroup => "other-group",
-            Self::NoRoom => "no-room",
-            Self::Unreadable => "unreadable",
-            Self::Unsound => "unsound",
-        }
-    }
-}
-
-/// Packets that were dropped, by reason.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Refused([u64; Refusal::ALL.len()]);
-
-impl Refused {
-    pub(crate) fn count(&mut self, why: Refusal) {
-        self.0[why as usize] += 1;
-    }
-
-    /// Returns the number of packets that were dropped for a reason.
-    pub fn of(&self, why: Refusal) -> u64 {
-        self.0[why as usize]
-    }
-
-    /// Returns the number of all packets that were dropped.
-    pub fn total(&self) -> u64 {
-        self.0.iter().sum()
-    }
-}
-
-/// Returns a digest of two pieces of bytes, one after the other: fast, and no defense against forgery.
-pub(crate) fn digest(pieces: [&[u8]; 2]) -> u64 {
-    let add = |sum: u64, piece: &[u8]| mix(sum ^ digest_of(piece), FACTOR ^ piece.len() as u64);
-    pieces.into_iter().fold(FACTOR, add)
-}
-
-const FACTOR: u64 = 0x9E37_79B9_7F4A_7C15;
-const OTHER_FACTOR: u64 = 0xC2B2_AE3D_27D4_EB4F;
-
-/// Returns both halves of a product as one.
-fn mix(a: u64, b: u64) -> u64 {
-    let product = u128::from(a) * u128::from(b);
-    product as u64 ^ (product >> 64) as u64
-}
-
-/// Returns a digest of some bytes. Four sums go side by side, because each product has to wait for the one before
-/// it.
-fn digest_of(bytes: &[u8]) -> u64 {
-    const LANES: usize = 4;
-    let both = |sum: u64, bytes: &[u8; 16]| {
-        let (words, _) = bytes.as_chunks::<8>();
-        let [a, b] = [words[0], words[1]].map(u64::from_le_bytes);
-        mix(sum ^ a ^ FACTOR, b ^ OTHER_FACTOR)
-    };
-    let (pairs, rest) = bytes.as_chunks::<16>();
-    let (blocks, pairs) = pairs.as_chunks::<LANES>();
-    let mut sums: [u64; LANES] = [1, 2, 3, 4];
-    for block in blocks {
-        sums = std::array::from_fn(|lane| both(sums[lane], &block[lane]));
-    }
-    let sum = sums.into_iter().fold(0, |sum, lane| mix(sum ^ FACTOR, lane ^ OTHER_FACTOR));
-    let mut last = [0; 16];
-    last[..rest.len()].copy_from_slice(rest);
-    both(pairs.iter().fold(sum, both), &last)
-}
-
-/// Returns the digest of a scenario's text and seed.
-pub(crate) fn fingerprint(text: &str, seed: u64) -> u64 {
-    digest([text.as_bytes(), &seed.to_le_bytes()])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Whichever bit of a packet is turned, wherever it ends: the checksum finds it.
-    #[test]
-    fn a_packet_of_which_a_bit_was_turned_is_damaged() {
-        let talk = TalkId::new(7, Topic::Shield, &[1, 4, 9]);
-        let seal = Seal { fingerprint: 0x0123_4567_89AB_CDEF, talk, sender: 4, sequence: 3 };
-        for length in [0, 1, 7, 16, 63, 64, 65, 200] {
-            let message: Vec<u8> = (0..length).map(|k| (k * k) as u8).collect();
-            let packet = Draft::of_bytes(&message).sealed(&seal);
-            assert_eq!(open(&packet, seal.fingerprint), Ok((seal, &message[..])));
-            for bit in 0..8 * packet.len() {
-                let mut turned = packet.clone();
-                turned[bit / 8] ^= 1 << (bit % 8);
-                assert!(open(&turned, seal.fingerprint).is_err(), "bit {bit} of {length} bytes");
-            }
-        }
-    }
 }

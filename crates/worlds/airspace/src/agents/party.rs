@@ -1,9 +1,9 @@
 //! Parties to a talk: programs aboard that take messages and give messages, without a clock, a network, or
 //! the packets around what they say.
 
-use super::packet::{Draft, Refusal};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
+use sidestep_kernel::network::{Draft, Refusal};
 
 /// A party to a talk, as a state machine: messages and ticks in, messages out.
 ///

@@ -1,9 +1,10 @@
 //! One talk, as one airplane takes part in it: a party, and the packets around what it says and hears.
 
-use super::network::Traffic;
-use super::packet::{Packet, Refusal, Seal, TalkId};
+use super::packet::{Packet, Seal, TalkId};
 use super::party::{Concludes, Ended, Outgoing, Party, Progress};
+use super::traffic::Traffic;
 use sidestep_kernel::EntityId;
+use sidestep_kernel::network::Refusal;
 use std::sync::Arc;
 
 /// The identity of a talk, who takes part, and when.

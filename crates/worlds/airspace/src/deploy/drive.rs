@@ -91,15 +91,13 @@ fn send<S: Station>(transport: &mut impl Transport, station: &mut S, now: u64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::faulty::Faulty;
     use super::*;
-    use crate::agents::network::{Network, Silence};
     use crate::agents::{Agent, Concludes, Ended, Endpoint, Frame, Most, Radio, Talk, Unsound};
     use crate::pilot::{Schedule, TalkId, Topic, patience};
     use crate::purpose;
     use proptest::prelude::*;
     use sidestep_kernel::Seed;
-    use sidestep_kernel::ports::MemoryTransport;
+    use sidestep_kernel::network::{Carrier, Network, Silence, While};
     use sidestep_kernel::stream::Streams;
     use std::sync::Arc;
 
@@ -214,7 +212,8 @@ mod tests {
         fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
             self.settle(tick);
             if !self.talk.frame().is_silent {
-                let (_, message) = crate::agents::packet::open(bytes, 0).expect("a packet");
+                let (_, message) =
+                    sidestep_kernel::network::open::<Topic>(bytes, 0).expect("a packet");
                 self.talk.hear(from, message, tick, &mut self.out).expect("a message");
             }
             self.settle(tick);
@@ -281,9 +280,9 @@ mod tests {
             Alone { talk, out, ended: None }
         };
         let mut stations: Vec<Alone> = (0..group).map(station).collect();
-        let faults = network.map(Network::faults).unwrap_or_default();
-        let memory = MemoryTransport::new(streams, purpose::NETWORK, faults);
-        let mut faulty = Faulty::with(memory, (network, streams), None, (15.0, schedule));
+        let talks = [(schedule.begins, 15.0)];
+        let faults = (network, purpose::of_network(streams));
+        let mut faulty = Carrier::in_memory(faults, None, &talks);
         drive(&mut faulty, &mut stations, begins, |station| station.ended.is_some());
         stations.into_iter().map(|station| station.ended.expect("all end")).collect()
     }
@@ -308,7 +307,8 @@ mod tests {
 
     #[test]
     fn one_that_never_answers_is_given_up_and_named() {
-        let silences = vec![Silence { airplane: 6, from_s: 10.0, until_s: f64::INFINITY }];
+        let during = While { from_s: 10.0, until_s: f64::INFINITY };
+        let silences = vec![Silence { agent: 6, during }];
         let network = network(0.1, 0.0, silences);
         let ends = sums(Some(&network), 5, 4, 3);
         // Places 0, 1, 3 and 1000 for the silent one, in rounds 0 to 2.

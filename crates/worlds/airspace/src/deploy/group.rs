@@ -1,9 +1,7 @@
 //! The pilots of a group, on a network in memory.
 
 use super::drive::drive;
-use super::faulty::Faulty;
 use crate::Turn;
-use crate::agents::network::Network;
 use crate::decide::Considered;
 use crate::intruder::Intruder;
 use crate::join::Flown;
@@ -11,8 +9,9 @@ use crate::pilot::{Control, Memory, Pilot, Schedule, Sight};
 use crate::purpose;
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
+use sidestep_kernel::network::{Apart, Carrier, Ether, FaultStreams};
 use sidestep_kernel::ports::MemoryTransport;
-use sidestep_kernel::{Cycle, Slot};
+use sidestep_kernel::{Cycle, EntityId, Slot};
 use std::sync::Arc;
 
 /// Lets the pilots of a group decide. Returns what each does and what it has considered.
@@ -25,7 +24,8 @@ pub(crate) fn flown(
     let began_ns = clock.thread_cpu_ns();
     let schedule = Schedule::of_cycle(now, world.network.as_ref());
     let sights = Sight::all(turn, flown, intruders);
-    let mut transport = network(world, state, (now, schedule));
+    let talks = world.talks(now, schedule);
+    let mut transport = network(world, state, &talks);
     let mut pilots = pilots(world, &flown.ids, state.take_memories(&flown.ids));
     for (pilot, sight) in pilots.iter_mut().zip(sights) {
         pilot.begin_by(sight, schedule);
@@ -45,7 +45,8 @@ pub(crate) fn fly_all(
     (now, schedule): (Cycle, Schedule),
     pilots: &mut [Pilot],
 ) {
-    let mut transport = network(world, state, (now, schedule));
+    let talks = world.talks(now, schedule);
+    let mut transport = network(world, state, &talks);
     drive(&mut transport, pilots, schedule.begins, Pilot::is_done);
 }
 
@@ -53,11 +54,41 @@ pub(crate) fn fly_all(
 fn network<'a>(
     world: &'a AirspaceWorld,
     state: &'a AirspaceState,
-    (now, schedule): (Cycle, Schedule),
-) -> Faulty<'a, MemoryTransport> {
-    let faults = world.network.as_ref().map(Network::faults).unwrap_or_default();
-    let memory = MemoryTransport::new(world.streams, purpose::NETWORK, faults);
-    Faulty::new(memory, world, Some(state), (now, schedule))
+    talks: &'a [(u64, f64)],
+) -> Carrier<'a, MemoryTransport> {
+    Carrier::in_memory((world.network.as_ref(), world.draws()), Some(state), talks)
+}
+
+impl Apart for AirspaceState {
+    fn apart_m(&self, link: [EntityId; 2]) -> f64 {
+        AirspaceState::apart_m(self, link)
+    }
+}
+
+impl AirspaceWorld {
+    /// Returns the first tick of each talk of a cycle, and its time in seconds after the start of the run: the
+    /// first talk starts with the cycle, and the shield's exchange when that has to be over.
+    fn talks(&self, now: Cycle, schedule: Schedule) -> [(u64, f64); 2] {
+        let starts_s = self.starts_s(now);
+        let deadline_s = self.network.as_ref().map_or(0.0, |network| network.deadline_s);
+        [(schedule.begins, starts_s), (schedule.shield_from, starts_s + deadline_s)]
+    }
+
+    /// Returns the faults of what one airplane sends where each is flown by a process of its own; none where
+    /// the network is reliable.
+    pub fn ether(&self) -> Option<Ether> {
+        Some(Ether::new(self.network.clone()?, self.draws()))
+    }
+
+    /// Returns the first tick of each talk of a cycle, and its time in seconds after the start of the run.
+    pub fn talks_of(&self, now: Cycle) -> [(u64, f64); 2] {
+        self.talks(now, Schedule::of_cycle(now, self.network.as_ref()))
+    }
+
+    /// Returns the streams and purposes from which faults are drawn.
+    fn draws(&self) -> FaultStreams {
+        purpose::of_network(self.streams)
+    }
 }
 
 fn pilots(world: &AirspaceWorld, flown: &[Slot], memories: Vec<Memory>) -> Vec<Pilot> {

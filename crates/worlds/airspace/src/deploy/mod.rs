@@ -13,11 +13,9 @@
 //!
 //! The programs aboard are [`crate::agents`], and a [`Pilot`](crate::pilot::Pilot) goes with them through the
 //! talks of a cycle. Here those of a group are run over a network in memory (`group.rs`) that has the
-//! faults of the scenario (`faulty.rs`), by a loop that knows neither (`drive.rs`).
+//! faults of the scenario ([`sidestep_kernel::network`]), by a loop that knows neither (`drive.rs`).
 
 mod drive;
-mod ether;
-mod faulty;
 mod group;
 #[cfg(test)]
 mod heard;
@@ -25,7 +23,6 @@ mod kind;
 #[cfg(test)]
 mod silence;
 
-pub use ether::Ether;
 pub(crate) use group::flown;
 #[cfg(test)]
 pub(crate) use group::fly_all;

@@ -1,7 +1,7 @@
 //! Actions with what they would bring, the shield, the talk, and what comes of it.
 
 use super::{Looking, airplane};
-use crate::agents::network::Traffic;
+use crate::agents::traffic::Traffic;
 use crate::flight::{Point, Pose};
 use crate::shield::{Side, Way};
 use crate::world::Method;

@@ -2,7 +2,7 @@
 
 use crate::agents::Decided;
 use crate::agents::contact::Contacts;
-use crate::agents::network::Traffic;
+use crate::agents::traffic::Traffic;
 use crate::baseline::mvp::Resolving;
 use crate::events::Event;
 use crate::shield::{Decision, Side, Way};

@@ -1,7 +1,8 @@
 //! Packets of talks that an airplane has not come to yet: a faster neighbor is there already.
 
-use crate::agents::packet::{Refusal, TalkId};
+use crate::agents::packet::TalkId;
 use sidestep_kernel::EntityId;
+use sidestep_kernel::network::Refusal;
 
 /// Largest number of packets of one sender that are kept: an agent that has not heard another one says no more
 /// than a few things, and asks for them.

@@ -34,11 +34,12 @@ mod talks;
 #[cfg(test)]
 mod tests;
 
-pub use crate::agents::packet::{Packet, Refusal, Refused, TalkId, Topic};
+pub use crate::agents::packet::{Packet, TalkId, Topic};
 pub use aboard::Pilot;
 pub use control::{Control, Course, Memory, Optimized};
 pub use fleet::Fleet;
 pub(crate) use schedule::Schedule;
 #[cfg(test)]
 pub(crate) use schedule::patience;
+pub use sidestep_kernel::network::{Refusal, Refused};
 pub use sight::{Own, Sight, Sighted};

@@ -1,8 +1,8 @@
 //! The ticks in which the talks of a cycle start and end.
 
-use crate::agents::network::{Network, Patience};
 use crate::agents::packet::Topic;
 use sidestep_kernel::Cycle;
+use sidestep_kernel::network::{Network, Patience};
 
 /// Patience of agents that wait for each other as long as it takes.
 const FOR_EVER: Patience =

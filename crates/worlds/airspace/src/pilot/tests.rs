@@ -5,10 +5,10 @@ mod hostile;
 mod order;
 
 use super::*;
-use crate::agents::network::Network;
 use crate::deploy::fly_all;
 use crate::world::AirspaceWorld;
 use crate::{AirspaceRun, airspace_run};
+use sidestep_kernel::network::Network;
 use sidestep_kernel::{Cycle, EntityId, Simulation};
 use sidestep_scenario::Source;
 use std::sync::Arc;

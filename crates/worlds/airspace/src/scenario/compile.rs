@@ -1,7 +1,6 @@
 //! From a scenario's sections to an immutable world.
 
 use super::{AirspaceFile, Compiled, Preset, Recipe};
-use crate::agents::packet::fingerprint;
 use crate::baseline::Reactive;
 use crate::deploy::{Deployment, refuses};
 use crate::flight::Levels;
@@ -12,6 +11,7 @@ use crate::perceive::seen;
 use crate::shield::{Bounds, Flyer, Named, Side, first_fallbacks};
 use crate::state::AirspaceState;
 use crate::world::{AirspaceWorld, Disturbance, Grouping, Method};
+use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
 use sidestep_scenario::{Seeds, Source, Spanned};

@@ -7,10 +7,10 @@ mod lead;
 
 use super::control::{Ended, Led};
 use super::link::Link;
-use super::message::{Message, Packet};
-use super::network::{Patience, Traffic};
+use super::message::{Message, Motion, Packet};
 use super::side::{Both, Side};
 use super::sight::{Role, Sight};
+use super::traffic::Traffic;
 use crate::motion::replan::Rungs;
 use crate::rods::chain::{Chain, Rod};
 use crate::rods::geometry::Point;
@@ -21,6 +21,7 @@ use crate::world::ChainWorld;
 use climb::Climbing;
 use follow::Following;
 use lead::Leading;
+use sidestep_kernel::network::{Patience, Refusal, Refused, Seal, TalkId, digest, open};
 use sidestep_kernel::{Cycle, EntityId, InputError};
 
 /// Most packets that wait for the beginning of their cycle.
@@ -37,6 +38,9 @@ pub struct ConnectorAgent<const D: usize> {
     me: u32,
     n: u32,
     first_id: EntityId,
+    /// Digests of scenario and build, and of the ids of its chain's connectors.
+    fingerprint: u64,
+    members: u64,
     radio: Option<Radio>,
     rungs: Rungs,
     /// The rods to its neighbors.
@@ -53,7 +57,7 @@ pub struct ConnectorAgent<const D: usize> {
     links: Both<Option<Link<Message<D>>>>,
     missing: Both<Option<u32>>,
     /// Packets of a cycle that has not begun here yet.
-    held: Vec<(Side, Packet<D>)>,
+    held: Vec<(Side, Cycle, Packet<D>)>,
     following: Option<Following>,
     leading: Option<Leading<D>>,
     climbing: Option<Climbing<D>>,
@@ -67,6 +71,8 @@ pub struct ConnectorAgent<const D: usize> {
     is_closed: bool,
     is_late: bool,
     traffic: Traffic,
+    /// Packets that it has dropped since it was started.
+    refused: Refused,
 }
 
 /// The time that it waits for others, where messages may get lost.
@@ -82,6 +88,8 @@ struct Radio {
 pub struct Outgoing {
     /// Id of the neighbor that it is for.
     pub to: EntityId,
+    /// Its number among the sender's of the cycle.
+    pub sequence: u32,
     /// Its bytes.
     pub payload: Vec<u8>,
 }
@@ -133,11 +141,20 @@ impl<const D: usize> ConnectorAgent<D> {
         let spec = &world.chains[chain as usize];
         let mut agent = Self::of(&spec.start, connector, &world.rules, world.rungs);
         agent.first_id = world.first_id(chain);
+        agent.fingerprint = world.fingerprint;
+        agent.members = members(agent.first_id, agent.n);
         agent.radio = world
             .network
             .as_ref()
             .map(|network| Radio { patience: network.patience(), ticks: network.deadline_ticks() });
         agent
+    }
+
+    /// Returns the same agent, which talks with those of the same build alone.
+    #[must_use]
+    pub fn of_build(self, build: &str) -> Self {
+        let fingerprint = digest([build.as_bytes(), &self.fingerprint.to_le_bytes()]);
+        Self { fingerprint, ..self }
     }
 
     /// Returns the agent of connector `k` of a chain, on a network that loses nothing.
@@ -148,6 +165,8 @@ impl<const D: usize> ConnectorAgent<D> {
             me: k,
             n,
             first_id: 0,
+            fingerprint: 0,
+            members: members(0, n),
             radio: None,
             rungs,
             rods: Both::of(rod),
@@ -172,12 +191,13 @@ impl<const D: usize> ConnectorAgent<D> {
             is_closed: false,
             is_late: false,
             traffic: Traffic::default(),
+            refused: Refused::default(),
         }
     }
 
     /// Returns the same agent on a network that may lose messages.
     #[cfg(test)]
-    pub(crate) fn on(self, network: Option<&super::network::Network>) -> Self {
+    pub(crate) fn on(self, network: Option<&sidestep_kernel::network::Network>) -> Self {
         let radio = network
             .map(|network| Radio { patience: network.patience(), ticks: network.deadline_ticks() });
         Self { radio, ..self }
@@ -245,10 +265,10 @@ impl<const D: usize> ConnectorAgent<D> {
     /// Takes the packets that came before the cycle had begun here.
     fn take_held(&mut self, cycle: Cycle) {
         let held = std::mem::take(&mut self.held);
-        for (side, packet) in held {
-            match packet.cycle.checked_sub(cycle) {
+        for (side, its, packet) in held {
+            match its.checked_sub(cycle) {
                 Some(0) => self.take(side, packet),
-                Some(1) => self.held.push((side, packet)),
+                Some(1) => self.held.push((side, its, packet)),
                 _ => {}
             }
         }
@@ -258,20 +278,37 @@ impl<const D: usize> ConnectorAgent<D> {
     /// and dropped.
     pub fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
         self.now = self.now.max(tick);
+        let Err(why) = self.receive(from, bytes) else { return };
+        self.refused.count(why);
+        // What comes too late is of no use, and nobody's fault.
+        self.traffic.dropped += u64::from(why != Refusal::Stale);
+    }
+
+    fn receive(&mut self, from: EntityId, bytes: &[u8]) -> Result<(), Refusal> {
+        let (seal, message) = open::<Motion>(bytes, self.fingerprint)?;
+        let Seal { talk: TalkId { cycle, members, .. }, sender, .. } = seal;
         let neighbor = |side: &Side| side.of(self.me, self.n).map(|k| self.first_id + k);
         let side = Side::ALL.into_iter().find(|side| neighbor(side) == Some(from));
-        let packet = Packet::read(bytes, self.n);
-        let (Some(side), Some(packet)) = (side, packet) else {
-            self.traffic.dropped += 1;
-            return;
-        };
-        // Of later cycles only the next one may have begun elsewhere.
-        match self.cycle.map(|cycle| packet.cycle.checked_sub(cycle)) {
-            Some(Some(0)) => self.take(side, packet),
-            Some(None) => {}
-            None | Some(Some(1)) if self.held.len() < MOST_HELD => self.held.push((side, packet)),
-            _ => self.traffic.dropped += 1,
+        let side = side.filter(|_| sender == from).ok_or(Refusal::Sender)?;
+        if members != self.members {
+            return Err(Refusal::OtherGroup);
         }
+        let packet = Packet::read(message, self.n)?;
+        // Of later cycles only the next one may have begun elsewhere.
+        match self.cycle.map(|now| cycle.checked_sub(now)) {
+            Some(Some(0)) => self.take(side, packet),
+            Some(None) => return Err(Refusal::Stale),
+            None | Some(Some(1)) if self.held.len() < MOST_HELD => {
+                self.held.push((side, cycle, packet));
+            }
+            _ => return Err(Refusal::NoRoom),
+        }
+        Ok(())
+    }
+
+    /// Returns the counts of packets that it has dropped since it was started.
+    pub fn refused(&self) -> Refused {
+        self.refused
     }
 
     fn take(&mut self, side: Side, packet: Packet<D>) {
@@ -345,4 +382,10 @@ impl<const D: usize> ConnectorAgent<D> {
     fn run(&mut self) {
         while self.go_on_leading() || self.climb_on() {}
     }
+}
+
+/// Returns the digest of the ids of a chain's connectors.
+fn members(first_id: EntityId, n: u32) -> u64 {
+    let ids: Vec<EntityId> = (first_id..first_id + n).collect();
+    TalkId::new(0, Motion, &ids).members
 }

@@ -1,6 +1,6 @@
 //! Decision of an agent at the end of a cycle.
 
-use super::network::Traffic;
+use super::traffic::Traffic;
 use crate::motion::replan::{Climbed, Memory};
 use crate::rods::geometry::Point;
 use crate::rods::veto::Veto;

@@ -5,8 +5,8 @@
 //! time is sent again; a neighbor that does not confirm anything, although sent to so often that it
 //! can hardly be alive and in touch, counts as lost, until something comes from it.
 
-use super::network::Patience;
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::network::Patience;
 use std::collections::{BTreeMap, VecDeque};
 
 /// Most messages that are kept because an earlier one is missing.
@@ -39,6 +39,8 @@ pub(super) struct Link<M> {
     is_lost: bool,
     /// Whether anything has come in this cycle.
     is_heard: bool,
+    /// Size of the largest packet that went over it, in bytes.
+    largest: usize,
 }
 
 /// Messages on their way, with a confirmation.
@@ -71,6 +73,7 @@ impl<M: Clone> Link<M> {
             unanswered: 0,
             is_lost: false,
             is_heard: false,
+            largest: 0,
         }
     }
 
@@ -105,8 +108,13 @@ impl<M: Clone> Link<M> {
 
     /// Returns the tick in which its patience ends; none while it waits for nothing.
     pub(super) fn due(&self) -> Option<u64> {
-        let Patience { ticks, .. } = self.patience.filter(|_| self.sent > 0 && !self.is_lost)?;
-        Some(self.since.saturating_add(ticks))
+        let patience = self.patience.filter(|_| self.sent > 0 && !self.is_lost)?;
+        Some(self.since.saturating_add(patience.ticks_for(self.largest)))
+    }
+
+    /// Notes the size of a packet that goes over it: a large one takes its time on the way.
+    pub(super) fn note_size(&mut self, bytes: usize) {
+        self.largest = self.largest.max(bytes);
     }
 
     /// Looks at the clock; returns whether the neighbor is lost from now on.

@@ -7,19 +7,34 @@ use crate::rods::geometry::Point;
 use crate::rods::veto::{Outcome, Reason, Source, Veto};
 use crate::rods::wire::Place;
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::Cycle;
+use sidestep_kernel::network::{self, Draft, Refusal};
 use std::f64::consts::PI;
 
-/// First byte of every packet: another number is another protocol.
-const VERSION: u8 = 1;
 /// Largest packet that is read, bytes; the largest that is ever sent is a fraction of it.
 const MOST_BYTES: usize = 1 << 16;
 
-/// A packet: what an agent tells a neighbor in one go.
+/// The subject of all that connectors say to each other in a cycle: a motion of their chain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Motion;
+
+impl Motion {
+    // Those of other worlds are below.
+    const NUMBER: u8 = 2;
+}
+
+impl network::Topic for Motion {
+    fn number(self) -> u8 {
+        Self::NUMBER
+    }
+
+    fn of_number(number: u8) -> Option<Self> {
+        (number == Self::NUMBER).then_some(Self)
+    }
+}
+
+/// The message of a packet: what an agent tells a neighbor in one go.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Packet<const D: usize> {
-    /// The cycle that it belongs to.
-    pub(super) cycle: Cycle,
     /// The nearest lost connector beyond the sender, as the receiver sees it.
     pub(super) missing: Option<u32>,
     pub(super) parcel: Parcel<Message<D>>,
@@ -125,21 +140,23 @@ pub(super) struct Order<const D: usize> {
 
 impl<const D: usize> Packet<D> {
     /// Returns its form on the network.
-    pub(super) fn bytes(&self) -> Vec<u8> {
-        postcard::to_stdvec(&(VERSION, self)).expect("a packet is plain data")
+    pub(super) fn draft(&self) -> Draft {
+        Draft::of(self)
     }
 
-    /// Returns the packet that some bytes are, in a chain of `n` connectors; none if they are no
-    /// packet, or one that no agent sends.
-    pub(super) fn read(bytes: &[u8], n: u32) -> Option<Self> {
-        if bytes.len() > MOST_BYTES || bytes.first() != Some(&VERSION) {
-            return None;
+    /// Reads the message of a packet, in a chain of `n` connectors.
+    ///
+    /// # Errors
+    /// When it is none, or one that no agent sends.
+    pub(super) fn read(message: &[u8], n: u32) -> Result<Self, Refusal> {
+        if message.len() > MOST_BYTES {
+            return Err(Refusal::TooLarge);
         }
-        let (packet, rest) = postcard::take_from_bytes::<Self>(&bytes[1..]).ok()?;
-        let is_right = rest.is_empty()
-            && packet.missing.is_none_or(|k| k < n)
+        let read = postcard::take_from_bytes::<Self>(message).ok();
+        let (packet, _) = read.filter(|(_, rest)| rest.is_empty()).ok_or(Refusal::Unreadable)?;
+        let is_right = packet.missing.is_none_or(|k| k < n)
             && packet.parcel.messages.iter().all(|message| message.is_right(n));
-        is_right.then_some(packet)
+        if is_right { Ok(packet) } else { Err(Refusal::Unsound) }
     }
 }
 

@@ -13,7 +13,7 @@
 //!   connector/clock.rs     time, packets on their way out, and the end of a cycle
 //! link.rs                  makes messages between two neighbors arrive, once and in order
 //! message.rs               the messages, and the checks of what comes over the network
-//! network.rs               a network's faults, and the traffic on it
+//! traffic.rs               the traffic on their network
 //! side.rs                  below and above along the chain
 //! ```
 //!
@@ -27,11 +27,12 @@ mod connector;
 pub(crate) mod control;
 mod link;
 mod message;
-pub(crate) mod network;
 pub(crate) mod side;
 pub(crate) mod sight;
+pub(crate) mod traffic;
 
 pub use connector::{ConnectorAgent, Outgoing};
 pub use control::{Control, Ended, Goes, Led};
-pub use network::Traffic;
+pub use message::Motion;
 pub use sight::{Role, Seen, Shown, Sight, Wish};
+pub use traffic::Traffic;

@@ -273,6 +273,7 @@ impl Plan {
             teams: Arc::default(),
             deployment: Deployment::Direct,
             network: None,
+            fingerprint: 0,
         }
     }
 }

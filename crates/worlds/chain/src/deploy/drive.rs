@@ -1,13 +1,13 @@
 //! The agents of a chain on a network in memory, which can lose, delay, double and reorder packets,
 //! cut links, and silence a connector.
 //!
-//! Time on it passes in ticks: a packet takes one, or more when it is delayed. Every draw depends
-//! on sender, receiver and tick, never on the order in which agents are visited.
+//! Its faults are those of any network ([`sidestep_kernel::network`]).
 
-use crate::agents::network::Network;
 use crate::agents::{ConnectorAgent, Control, Outgoing, Sight};
+use crate::rods::geometry::distance;
 use crate::world::{ChainWorld, purpose};
 use sidestep_kernel::interrupt;
+use sidestep_kernel::network::{Apart, Carrier, Ether, FaultStreams, Network};
 use sidestep_kernel::ports::{Envelope, MemoryTransport, Transport};
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId};
@@ -18,10 +18,9 @@ pub(super) struct Talk<'a> {
     /// Faults of the network; with `None` it loses nothing, and agents wait as long as it takes.
     pub(super) network: Option<&'a Network>,
     pub(super) streams: Streams,
-    pub(super) chain: EntityId,
     pub(super) first_id: EntityId,
-    pub(super) now: Cycle,
-    pub(super) at_s: f64,
+    /// Its first tick, and the time of that in seconds after the start of the run.
+    pub(super) begins: (u64, f64),
 }
 
 impl<'a> Talk<'a> {
@@ -32,27 +31,47 @@ impl<'a> Talk<'a> {
         now: Cycle,
     ) -> Self {
         let (network, streams) = (world.network.as_ref(), world.streams);
-        let (first_id, at_s) = (world.first_id(chain), world.starts_s(now));
-        Self { network, streams, chain, first_id, now, at_s }
+        Self { network, streams, first_id: world.first_id(chain), begins: world.talk_of(now) }
+    }
+}
+
+impl<const D: usize> ChainWorld<D> {
+    /// Returns the first tick of a cycle's talk, and its time in seconds after the start of the run.
+    pub fn talk_of(&self, now: Cycle) -> (u64, f64) {
+        (first_tick(self.network.as_ref(), now), self.starts_s(now))
     }
 
-    /// Returns the tick in which the talk starts.
-    fn begins(&self) -> u64 {
-        self.network.map_or(0, |network| self.now * (network.deadline_ticks() + 1))
+    /// Returns the faults of what one connector sends where each has a process of its own; none where the
+    /// network is reliable.
+    pub fn ether(&self) -> Option<Ether> {
+        Some(Ether::new(self.network.clone()?, draws(self.streams)))
     }
+}
 
-    fn carries(&self, envelope: &Envelope) -> bool {
-        let Some(network) = self.network else { return true };
-        let at_s = self.at_s + (envelope.cycle - self.begins()) as f64 * network.latency_s;
-        let link = [envelope.sender, envelope.receiver].map(|id| id - self.first_id);
-        network.carries(self.chain, link, at_s)
+/// Returns the tick in which the talk of a cycle starts.
+pub(super) fn first_tick(network: Option<&Network>, now: Cycle) -> u64 {
+    network.map_or(0, |network| now * (network.deadline_ticks() + 1))
+}
+
+fn draws(streams: Streams) -> FaultStreams {
+    let (network, burst, burst_loss) = (purpose::NETWORK, purpose::BURST, purpose::BURST_LOSS);
+    FaultStreams { streams, network, burst, burst_loss }
+}
+
+/// Places of a chain's connectors at the start of a cycle, by connector, and the id of the first one.
+struct Places<'a, const D: usize>(EntityId, &'a [Sight<D>]);
+
+impl<const D: usize> Apart for Places<'_, D> {
+    fn apart_m(&self, link: [EntityId; 2]) -> f64 {
+        let [a, b] = link.map(|id| self.1[(id - self.0) as usize].at.0);
+        distance(a, b)
     }
 }
 
 /// The network, and until when something may still arrive at each agent.
 struct Air<'a> {
     talk: Talk<'a>,
-    memory: MemoryTransport,
+    carrier: Carrier<'a, MemoryTransport>,
     longest: u64,
     busy_until: Vec<u64>,
 }
@@ -61,12 +80,9 @@ impl Air<'_> {
     /// Hands an agent's packets to the network.
     fn send<const D: usize>(&mut self, agent: &mut ConnectorAgent<D>, tick: u64) {
         let sender = agent.id();
-        for (sequence, Outgoing { to, payload }) in (0..).zip(agent.take_packets()) {
-            let envelope = Envelope { cycle: tick, sender, sequence, receiver: to, payload };
-            if self.talk.carries(&envelope) {
-                self.busy_until[(to - self.talk.first_id) as usize] = tick + self.longest;
-                self.memory.send(envelope);
-            }
+        for Outgoing { to, sequence, payload } in agent.take_packets() {
+            self.busy_until[(to - self.talk.first_id) as usize] = tick.saturating_add(self.longest);
+            self.carrier.send(Envelope { cycle: tick, sender, sequence, receiver: to, payload });
         }
     }
 
@@ -74,8 +90,12 @@ impl Air<'_> {
     fn step<const D: usize>(&mut self, k: usize, agent: &mut ConnectorAgent<D>, tick: u64) {
         let is_due = agent.next_timer().is_some_and(|due| due <= tick);
         if self.busy_until[k] >= tick {
-            for envelope in self.memory.receive(agent.id(), tick) {
+            for envelope in self.carrier.receive(agent.id(), tick) {
                 agent.on_packet(envelope.sender, &envelope.payload, tick);
+                // Where no time is counted, a process answers each packet when it comes.
+                if self.talk.network.is_none() {
+                    self.send(agent, tick);
+                }
             }
         } else if !is_due {
             return;
@@ -95,21 +115,27 @@ pub(super) fn run<const D: usize>(
     agents: &mut [ConnectorAgent<D>],
     sights: Vec<Sight<D>>,
 ) -> Vec<Option<Control<D>>> {
-    let faults = talk.network.map(Network::faults).unwrap_or_default();
-    let memory = MemoryTransport::new(talk.streams, purpose::NETWORK, faults);
-    let longest = talk.network.map_or(1, Network::longest_ticks);
-    let mut air = Air { talk, memory, longest, busy_until: vec![0; agents.len()] };
-    let mut tick = talk.begins();
-    for (agent, sight) in agents.iter_mut().zip(sights) {
-        agent.begin(sight, tick).expect("a world shows its connectors what is there");
+    let (places, begins) = (Places(talk.first_id, &sights), [talk.begins]);
+    let carrier = Carrier::in_memory((talk.network, draws(talk.streams)), Some(&places), &begins);
+    let longest = talk.network.map_or(1, longest_ticks);
+    let mut air = Air { talk, carrier, longest, busy_until: vec![0; agents.len()] };
+    let mut tick = talk.begins.0;
+    for (agent, sight) in agents.iter_mut().zip(&sights) {
+        agent.begin(sight.clone(), tick).expect("a world shows its connectors what is there");
         air.send(agent, tick);
     }
     while !agents.iter().all(ConnectorAgent::is_done) {
         interrupt::look();
         let timers = agents.iter().filter_map(ConnectorAgent::next_timer);
-        let next = timers.chain(air.memory.next_arrival()).min();
+        let next = timers.chain(air.carrier.next_arrival()).min();
         tick = tick.max(next.expect("agents that are not done wait for something"));
         agents.iter_mut().enumerate().for_each(|(k, agent)| air.step(k, agent, tick));
     }
     agents.iter().map(ConnectorAgent::control).collect()
+}
+
+/// Returns the most ticks that a packet takes; no bound where large ones take their time on a link.
+fn longest_ticks(network: &Network) -> u64 {
+    let is_narrow = network.bandwidth_bit_s < f64::INFINITY;
+    if is_narrow { u64::MAX } else { 1 + u64::from(network.faults().max_delay_cycles) }
 }

@@ -1,6 +1,5 @@
 //! Perception of the connectors of a chain at the start of their talk.
 
-use crate::agents::network::Network;
 use crate::agents::side::Side;
 use crate::agents::{Role, Seen, Sight};
 use crate::driver::Task;
@@ -8,6 +7,7 @@ use crate::rods::obstacle::{Obstacles, around};
 use crate::rods::wire::Place;
 use crate::state::Body;
 use crate::world::{ChainSpec, ChainWorld};
+use sidestep_kernel::network::Network;
 use sidestep_kernel::{Cycle, EntityId};
 
 /// Distance beyond all that a motion needs, meters: far more than tolerances and rounding.
@@ -30,7 +30,7 @@ impl<const D: usize> ChainWorld<D> {
     ) -> Vec<Sight<D>> {
         let points = body.chain.points();
         let n = points.len() as u32;
-        let at_s = self.starts_s(now);
+        let (first_id, at_s) = (self.first_id(chain), self.starts_s(now));
         let sees_m = self.sees_m(&self.chains[chain as usize]);
         let sight = |k: u32| {
             let connector = body.chain.connectors()[k as usize];
@@ -39,7 +39,7 @@ impl<const D: usize> ChainWorld<D> {
             let half_m = sees_m + connector.radius_m;
             obstacles.visit(&around(at, half_m), |obstacle| seen.push(Seen::of(obstacle)));
             let neighbor = |side: Side| side.of(k, n).map(|j| Place(points[j as usize]));
-            let is_silent = |network: &Network| network.is_silent(chain, k, at_s);
+            let is_silent = |network: &Network| network.is_silent(first_id + k, at_s);
             Sight {
                 cycle: now,
                 at: Place(at),

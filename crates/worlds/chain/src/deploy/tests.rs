@@ -4,9 +4,8 @@ mod hostile;
 mod scenarios;
 mod silence;
 
-use super::drive::{Talk, run};
+use super::drive::{Talk, first_tick, run};
 use super::settled;
-use crate::agents::network::Network;
 use crate::agents::side::Side;
 use crate::agents::{ConnectorAgent, Control, Ended, Role, Seen, Sight, Wish};
 use crate::motion::replan::{Climbed, Memory, Rungs, Situation};
@@ -20,6 +19,7 @@ use crate::rods::veto::{Mode, Motion, Outcome, Request, Source};
 use crate::rods::wire::Place;
 use proptest::prelude::*;
 use sidestep_kernel::Seed;
+use sidestep_kernel::network::Network;
 use sidestep_kernel::stream::Streams;
 
 /// A network with some faults, whose talks have all the time they need.
@@ -28,10 +28,14 @@ fn network(loss: f64, delay: f64, duplication: f64, deadline: f64) -> Network {
         loss,
         duplication,
         latency_s: 1e-3,
+        bandwidth_bit_s: f64::INFINITY,
         max_delay_s: 1e-3 * delay,
         patience_s: 3e-3 * (1.0 + delay),
         deadline_s: 1e-3 * deadline,
+        range_m: f64::INFINITY,
+        bursts: None,
         silences: Vec::new(),
+        partitions: Vec::new(),
         one_ways: Vec::new(),
     }
 }
@@ -78,7 +82,7 @@ fn talked<const D: usize>(
     let agent = |k: usize| ConnectorAgent::of(chain, k as u32, rules, Rungs::default()).on(network);
     let mut agents: Vec<_> = (0..chain.points().len()).map(agent).collect();
     let streams = Streams::new(Seed(seed));
-    let talk = Talk { network, streams, chain: 0, first_id: 0, now: 5, at_s: 0.0 };
+    let talk = Talk { network, streams, first_id: 0, begins: (first_tick(network, 5), 0.0) };
     run(talk, &mut agents, sights(chain, obstacles, leader, &wish))
 }
 

@@ -1,39 +1,74 @@
 //! The section of a network that may lose and delay messages.
 
 use super::{ChainSpec, Compiler};
-use crate::agents::network::{Network, OneWay, Silence};
 use crate::deploy::kind::Deployment;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Value, json};
+use sidestep_kernel::network::{self, Network};
 use sidestep_kernel::{EntityId, InputError};
-use sidestep_scenario::{FromBelow, NonNegative, Number, Positive, Rule, Spanned};
-use std::ops::Range;
+use sidestep_scenario::Rule;
+use sidestep_scenario::network::{Names, Wrong, check_sides, during, for_ever};
 
-/// Time that a packet takes, unless it is given, s: that of a bus along the chain.
-const LATENCY_S: f64 = 1e-5;
-/// Share of a cycle in which its talk ends, unless it is given.
-const DEADLINE: f64 = 0.9;
+pub(super) type NetworkSection = sidestep_scenario::network::NetworkSection<Connectors>;
 
-#[derive(Debug, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub(super) struct NetworkSection {
-    loss: Option<Chance>,
-    duplication: Option<Chance>,
-    latency_s: Option<Number<Latency>>,
-    max_delay_s: Option<NonNegative>,
-    patience_s: Option<Positive>,
-    deadline_s: Option<Positive>,
-    silent: Vec<Spanned<Silence>>,
-    one_way: Vec<Spanned<OneWay>>,
+/// A while in which a connector's radio is dead: it sends nothing, hears nothing, and knows it.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Silence {
+    /// Number of the connector in its chain.
+    connector: u32,
+    /// Number of the chain.
+    #[serde(default)]
+    chain: EntityId,
+    /// Start of the silence, in seconds after the start of the run.
+    #[serde(default)]
+    from_s: f64,
+    /// End of the silence, in seconds after the start of the run; infinite unless given.
+    #[serde(default = "for_ever")]
+    until_s: f64,
 }
 
-/// A probability below 1, because some messages must get through in the end.
-type Chance = Number<FromBelow<0, 1>>;
+/// A while in which no message gets from one side to another. Connectors on no side hear all, and are
+/// heard by all.
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Partition {
+    /// Numbers of the connectors on each side.
+    sides: Vec<Vec<u32>>,
+    /// Number of the chain.
+    #[serde(default)]
+    chain: EntityId,
+    /// Start of the partition, in seconds after the start of the run.
+    #[serde(default)]
+    from_s: f64,
+    /// End of the partition, in seconds after the start of the run; infinite unless given.
+    #[serde(default = "for_ever")]
+    until_s: f64,
+}
+
+/// A while in which a link between two neighbors works one way only.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct OneWay {
+    /// Number of the connector that is heard by the other.
+    sender: u32,
+    /// Number of its neighbor, whose messages do not reach it.
+    receiver: u32,
+    /// Number of the chain.
+    #[serde(default)]
+    chain: EntityId,
+    /// Start of that while, in seconds after the start of the run.
+    #[serde(default)]
+    from_s: f64,
+    /// End of that while, in seconds after the start of the run; infinite unless given.
+    #[serde(default = "for_ever")]
+    until_s: f64,
+}
 
 /// A time above 0 that a clock can resolve.
 #[derive(Debug, Clone, Copy)]
-struct Latency;
+pub(super) struct Latency;
 
 impl Rule for Latency {
     fn allows(number: f64) -> bool {
@@ -49,76 +84,66 @@ impl Rule for Latency {
     }
 }
 
-impl NetworkSection {
-    fn network(&self, dt_s: f64) -> Network {
-        let latency_s = self.latency_s.map_or(LATENCY_S, f64::from);
-        let max_delay_s = self.max_delay_s.map_or(0.0, f64::from);
-        Network {
-            loss: self.loss.map_or(0.0, f64::from),
-            duplication: self.duplication.map_or(0.0, f64::from),
-            latency_s,
-            max_delay_s,
-            patience_s: self.patience_s.map_or(3.0 * (latency_s + max_delay_s), f64::from),
-            deadline_s: self.deadline_s.map_or(DEADLINE * dt_s, f64::from),
-            silences: self.silent.iter().map(|one| *one.get_ref()).collect(),
-            one_ways: self.one_way.iter().map(|one| *one.get_ref()).collect(),
+/// The connectors of a scenario: their number in each chain. On the network they are counted on, chain
+/// after chain.
+#[derive(Debug)]
+pub(super) struct Connectors(Vec<u32>);
+
+impl Connectors {
+    fn of<const D: usize>(chains: &[ChainSpec<D>]) -> Self {
+        Self(chains.iter().map(|spec| spec.start.points().len() as u32).collect())
+    }
+
+    /// Returns the ids on the network of some connectors of a chain.
+    fn ids(&self, chain: EntityId, connectors: &[u32]) -> Result<Vec<EntityId>, Wrong> {
+        let Some((before, &[n, ..])) = self.0.split_at_checked(chain as usize) else {
+            let cause = format!("chain {chain} does not exist");
+            let last = self.0.len().max(1) - 1;
+            return Err(Wrong::new(cause, format!("give numbers from 0 to {last}")));
+        };
+        if let Some(k) = connectors.iter().find(|&&k| k >= n) {
+            let cause = format!("connector {k} does not exist in chain {chain}");
+            return Err(Wrong::new(cause, format!("give numbers from 0 to {}", n - 1)));
         }
-    }
-
-    /// Returns the first fault that is about connectors that do not exist, or at undefined times.
-    fn wrong_fault<const D: usize>(&self, chains: &[ChainSpec<D>]) -> Option<Wrong> {
-        let silent = self.silent.iter().map(|one| {
-            let Silence { connector, chain, from_s, until_s } = *one.get_ref();
-            (one.span(), wrong_ids(chain, &[connector], chains).or(wrong_while(from_s, until_s)))
-        });
-        let one_way = self.one_way.iter().map(|one| {
-            let OneWay { sender, receiver, chain, from_s, until_s } = *one.get_ref();
-            let wrong = wrong_ids(chain, &[sender, receiver], chains)
-                .or(wrong_link(sender, receiver))
-                .or(wrong_while(from_s, until_s));
-            (one.span(), wrong)
-        });
-        silent.chain(one_way).find_map(|(span, words)| {
-            let (cause, remedy) = words?;
-            Some(Wrong { span, cause, remedy })
-        })
+        let first_id: u32 = before.iter().sum();
+        Ok(connectors.iter().map(|k| first_id + k).collect())
     }
 }
 
-/// A fault of the scenario's network that makes no sense.
-struct Wrong {
-    span: Range<usize>,
-    cause: String,
-    remedy: String,
-}
+impl Names for Connectors {
+    type Silence = Silence;
+    type Partition = Partition;
+    type OneWay = OneWay;
+    type Latency = Latency;
 
-fn wrong_ids<const D: usize>(
-    chain: EntityId,
-    connectors: &[u32],
-    chains: &[ChainSpec<D>],
-) -> Option<(String, String)> {
-    let Some(spec) = chains.get(chain as usize) else {
-        let cause = format!("chain {chain} does not exist");
-        return Some((cause, format!("give numbers from 0 to {}", chains.len().max(1) - 1)));
-    };
-    let n = spec.start.points().len();
-    let k = connectors.iter().find(|&&k| k as usize >= n)?;
-    let cause = format!("connector {k} does not exist in chain {chain}");
-    Some((cause, format!("give numbers from 0 to {}", n - 1)))
-}
+    // That of a bus along the chain.
+    const LATENCY_S: f64 = 1e-5;
+    const TALKS: u32 = 1;
+    const LONGEST_DEADLINE: &str = "at most dt_s";
 
-fn wrong_link(sender: u32, receiver: u32) -> Option<(String, String)> {
-    let cause = format!("connectors {sender} and {receiver} are no neighbors");
-    let remedy = "only neighbors talk to each other: give numbers that differ by 1".into();
-    (sender.abs_diff(receiver) != 1).then_some((cause, remedy))
-}
+    fn silence(&self, one: &Silence) -> Result<network::Silence, Wrong> {
+        let agent = self.ids(one.chain, &[one.connector])?[0];
+        Ok(network::Silence { agent, during: during(one.from_s, one.until_s)? })
+    }
 
-/// Returns cause and remedy of a while that is none.
-fn wrong_while(from_s: f64, until_s: f64) -> Option<(String, String)> {
-    let is_right = from_s >= 0.0 && from_s.is_finite() && until_s > from_s;
-    let cause = format!("from_s = {from_s}, until_s = {until_s}");
-    let remedy = "give times in seconds from 0 on, the end after the start";
-    (!is_right).then(|| (cause, remedy.into()))
+    fn partition(&self, one: &Partition) -> Result<network::Partition, Wrong> {
+        let sides = one.sides.iter().map(|side| self.ids(one.chain, side));
+        let sides = sides.collect::<Result<_, _>>()?;
+        check_sides(&one.sides, "connector")?;
+        Ok(network::Partition { sides, during: during(one.from_s, one.until_s)? })
+    }
+
+    fn one_way(&self, one: &OneWay) -> Result<network::OneWay, Wrong> {
+        let OneWay { sender, receiver, chain, from_s, until_s } = *one;
+        let ids = self.ids(chain, &[sender, receiver])?;
+        if sender.abs_diff(receiver) != 1 {
+            let cause = format!("connectors {sender} and {receiver} are no neighbors");
+            let remedy = "only neighbors talk to each other: give numbers that differ by 1";
+            return Err(Wrong::new(cause, remedy));
+        }
+        let during = during(from_s, until_s)?;
+        Ok(network::OneWay { sender: ids[0], receiver: ids[1], during })
+    }
 }
 
 impl<const D: usize> Compiler<'_, D> {
@@ -129,36 +154,14 @@ impl<const D: usize> Compiler<'_, D> {
         chains: &[ChainSpec<D>],
     ) -> Result<Option<Network>, InputError> {
         let Some(section) = &self.file.chain.network else { return Ok(None) };
-        let error =
-            |cause: &str, remedy: &str| Err(self.source.error(section.span(), cause, remedy));
         if self.file.chain.deployment == Deployment::Direct {
             let cause = "a network, but one process moves the chains (deployment = \"direct\")";
-            return error(cause, "set deployment = \"team\", or leave [chain.network] out");
+            let remedy = "set deployment = \"team\", or leave [chain.network] out";
+            return Err(self.source.error(section.span(), cause, remedy));
         }
-        let network = section.get_ref().network(dt_s);
-        if let Some((cause, remedy)) = wrong_times(&network, dt_s) {
-            return error(&cause, remedy);
-        }
-        match section.get_ref().wrong_fault(chains) {
-            Some(Wrong { span, cause, remedy }) => {
-                Err(self.source.error(Some(span), cause, remedy))
-            }
-            None => Ok(Some(network)),
-        }
+        let network = section.get_ref().network(dt_s, &Connectors::of(chains));
+        network.map(Some).map_err(|Wrong { span, cause, remedy }| {
+            self.source.error(span.unwrap_or_else(|| section.span()), cause, remedy)
+        })
     }
-}
-
-/// Returns cause and remedy of times that do not fit into a cycle.
-fn wrong_times(n: &Network, dt_s: f64) -> Option<(String, &'static str)> {
-    let waits_s = n.patience_s.max(n.latency_s + n.max_delay_s);
-    if n.deadline_s <= dt_s && 8.0 * waits_s <= n.deadline_s {
-        return None;
-    }
-    let cause = format!(
-        "latency_s = {}, max_delay_s = {}, patience_s = {}, deadline_s = {}",
-        n.latency_s, n.max_delay_s, n.patience_s, n.deadline_s
-    );
-    let remedy = "give a patience of at most an eighth of the deadline, latency and delay of no \
-                  more, and a deadline of at most dt_s";
-    Some((cause, remedy))
 }

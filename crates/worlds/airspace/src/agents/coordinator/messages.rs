@@ -2,9 +2,9 @@
 //! sees it.
 
 use super::epoch::{Epoch, Position};
-use crate::agents::packet::Draft;
 use crate::agents::party::Unsound;
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::network::Draft;
 
 /// A message about one of the coordinators of a group.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]

@@ -6,10 +6,10 @@ use super::host::Hosting;
 use super::seat::Sent;
 use super::state::{Coordinator, block};
 use crate::agents::link::{Ended, Radio};
-use crate::agents::packet::HEADER_BYTES;
 use crate::agents::party::{Concludes, Outgoing, Party, Progress, Unsound};
 use crate::agents::{Briefing, Conclusion, OwnShip};
 use sidestep_kernel::EntityId;
+use sidestep_kernel::network::HEADER_BYTES;
 use std::sync::Arc;
 
 /// The program aboard one airplane that takes coordinators in, runs them, and sends them on.

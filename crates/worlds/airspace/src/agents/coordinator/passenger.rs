@@ -1,8 +1,8 @@
 //! Coordinators and hosts, as they see each other.
 
 use super::epoch::Epoch;
-use crate::agents::network::Patience;
 use crate::agents::party::Unsound;
+use sidestep_kernel::network::Patience;
 
 /// The next step of a coordinator that was run on a host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

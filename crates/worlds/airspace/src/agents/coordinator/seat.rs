@@ -5,8 +5,8 @@
 use super::epoch::{Epoch, Position};
 use super::messages::{Candidacy, Message, written};
 use super::{Passenger, Rules};
-use crate::agents::packet::Draft;
 use crate::agents::party::Unsound;
+use sidestep_kernel::network::Draft;
 use std::sync::Arc;
 
 /// A message on its way out, to one other host or to all.

@@ -1,8 +1,8 @@
 //! A cycle of one airplane, as far as it has come.
 
 use crate::agents::contact::Contacts;
-use crate::agents::network::Traffic;
 use crate::agents::packet::{TalkId, Topic};
+use crate::agents::traffic::Traffic;
 use crate::agents::{Ended, Talk};
 use crate::decide::Considered;
 use crate::events::{Event, EventKind};

@@ -1,9 +1,10 @@
 //! Whatever bytes come: they are counted and dropped, and nobody breaks off.
 
 use super::*;
-use crate::agents::packet::{Draft, Seal, open};
+use crate::agents::packet::Seal;
 use proptest::prelude::*;
 use sidestep_kernel::Seed;
+use sidestep_kernel::network::{Draft, open};
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
 use std::collections::VecDeque;
 
@@ -48,14 +49,14 @@ fn changed(bytes: &[u8], draws: &mut Draws) -> Vec<u8> {
 /// Returns a packet that is well formed and says something else.
 fn forged(payload: &[u8], draws: &mut Draws) -> Vec<u8> {
     let fingerprint = u64::from_le_bytes(std::array::from_fn(|k| payload[4 + k]));
-    let (seal, message) = open(payload, fingerprint).expect("a real packet");
+    let (seal, message) = open::<Topic>(payload, fingerprint).expect("a real packet");
     Draft::of_bytes(&changed(message, draws)).sealed(&seal)
 }
 
 /// Returns a packet whose message is right and whose head is not.
 fn misplaced(payload: &[u8], draws: &mut Draws) -> Vec<u8> {
     let fingerprint = u64::from_le_bytes(std::array::from_fn(|k| payload[4 + k]));
-    let (mut seal, message) = open(payload, fingerprint).expect("a real packet");
+    let (mut seal, message) = open::<Topic>(payload, fingerprint).expect("a real packet");
     let Seal { talk, .. } = &mut seal;
     match draws.below(5) {
         0 => talk.cycle = talk.cycle.wrapping_add(2 + u64::from(draws.below(1000))),
@@ -200,7 +201,7 @@ fn every_reason_is_told_from_the_others() {
         crew.pilots[own].begin(sight, 0);
     }
     let packet = crew.pilots[1].take_packets().swap_remove(0).payload;
-    let (seal, message) = open(&packet, run.world().fingerprint).expect("a real packet");
+    let (seal, message) = open::<Topic>(&packet, run.world().fingerprint).expect("a real packet");
     let with = |change: &dyn Fn(&mut Seal)| {
         let mut seal = seal;
         change(&mut seal);

@@ -3,8 +3,9 @@
 use super::{ConnectorAgent, Outgoing};
 use crate::agents::control::{Control, Goes};
 use crate::agents::link::Link;
-use crate::agents::message::Packet;
+use crate::agents::message::{Motion, Packet};
 use crate::agents::side::Side;
+use sidestep_kernel::network::{Seal, TalkId};
 
 impl<const D: usize> ConnectorAgent<D> {
     /// Looks at the clock: sends again what was not confirmed, and gives up who never confirms.
@@ -60,9 +61,16 @@ impl<const D: usize> ConnectorAgent<D> {
             else {
                 continue;
             };
-            let payload = Packet { cycle, missing, parcel }.bytes();
+            let sequence = self.traffic.messages as u32;
+            let talk = TalkId { cycle, topic: Motion, members: self.members };
+            let (fingerprint, sender) = (self.fingerprint, self.id());
+            let seal = Seal { fingerprint, talk, sender, sequence };
+            let payload = Packet { missing, parcel }.draft().sealed(&seal);
             self.traffic.count(payload.len());
-            out.push(Outgoing { to: self.first_id + neighbor, payload });
+            if let Some(link) = &mut self.links[side] {
+                link.note_size(payload.len());
+            }
+            out.push(Outgoing { to: self.first_id + neighbor, sequence, payload });
         }
         out
     }

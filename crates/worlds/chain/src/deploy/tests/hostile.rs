@@ -1,7 +1,7 @@
 //! Bytes that no agent sends: they are counted and dropped, whatever they are, and never a panic.
 
 use super::{network, sights};
-use crate::agents::{ConnectorAgent, Outgoing, Sight, Wish};
+use crate::agents::{ConnectorAgent, Motion, Outgoing, Sight, Wish};
 use crate::motion::replan::{Memory, Rungs, Situation};
 use crate::rods::chain::{Chain, Connector, Rod};
 use crate::rods::geometry::Point;
@@ -10,6 +10,8 @@ use crate::rods::rules::Rules;
 use crate::rods::veto::Source;
 use crate::rods::wire::Place;
 use proptest::prelude::*;
+use sidestep_kernel::Cycle;
+use sidestep_kernel::network::{Draft, Refusal, Seal, TalkId, open};
 
 const N: usize = 5;
 
@@ -60,6 +62,12 @@ fn packets() -> Vec<(u32, Outgoing)> {
     }
 }
 
+/// A packet around any bytes, as one of the chain would send it in a cycle.
+fn sealed(sender: u32, cycle: Cycle, message: &[u8]) -> Vec<u8> {
+    let talk = TalkId::new(cycle, Motion, &[0, 1, 2, 3, 4]);
+    Draft::of_bytes(message).sealed(&Seal { fingerprint: 0, talk, sender, sequence: 0 })
+}
+
 #[test]
 fn what_cannot_be_read_and_who_is_no_neighbor_is_counted_and_dropped() {
     let mut agent = agents().remove(2);
@@ -76,6 +84,9 @@ fn what_cannot_be_read_and_who_is_no_neighbor_is_counted_and_dropped() {
     agent.on_packet(from.max(1), &longer, 1);
     agent.on_timer(1_000_000);
     assert_eq!(agent.control().expect("time is up").traffic.dropped, 5);
+    let refused = agent.refused();
+    let counts = [Refusal::NoPacket, Refusal::Sender, Refusal::Damaged].map(|why| refused.of(why));
+    assert_eq!(counts, [3, 1, 1]);
 }
 
 /// Floods of questions, and packets of cycles to come, take a bounded room.
@@ -85,15 +96,15 @@ fn a_flood_takes_a_bounded_room() {
     let neighbor = agents().remove(3).id();
     agent.begin(shown([-0.8, 0.6]).remove(4), 0).expect("a sight");
     let flood = |k: u32| {
-        let mut bytes = vec![1, 5, 0];
+        let mut bytes = vec![0];
         bytes.extend(postcard::to_stdvec(&(3 * k, 0u32)).expect("numbers"));
         // Three times "Where are you?", never a confirmation.
         bytes.extend([3, 5, 5, 5]);
-        bytes
+        sealed(neighbor, 5, &bytes)
     };
     for k in 0..10_000 {
         agent.on_packet(neighbor, &flood(k), 1);
-        agent.on_packet(neighbor, &[1, 9, 0, 0, 0, 0], 1);
+        agent.on_packet(neighbor, &sealed(neighbor, 9, &[0, 0, 0, 0]), 1);
     }
     let sent: usize = agent.take_packets().iter().map(|out| out.payload.len()).sum();
     assert!((1000..500_000).contains(&sent), "{sent} bytes");
@@ -113,10 +124,8 @@ proptest! {
         if begins {
             agent.begin(shown([-0.8, 0.6]).remove(k), 0).expect("a sight");
         }
-        let mut versioned = vec![1];
-        versioned.extend(&bytes);
         agent.on_packet(from, &bytes, 1);
-        agent.on_packet(from, &versioned, 1);
+        agent.on_packet(from, &sealed(from, 5, &bytes), 1);
         agent.take_packets();
         agent.on_timer(1000);
         prop_assert_eq!(agent.control().is_some(), begins);
@@ -136,11 +145,14 @@ proptest! {
         }
         for (tick, (packet, at, byte, to)) in (1..).zip(changes) {
             let (_, out) = &real[packet.index(real.len())];
-            let mut payload = out.payload.clone();
-            let at = at.index(payload.len());
-            payload[at] ^= byte;
+            let (seal, message) = open::<Motion>(&out.payload, 0).expect("a real packet");
+            let mut message = message.to_vec();
+            let at = at.index(message.len());
+            message[at] ^= byte;
             for from in [to.checked_sub(1), Some(to + 1)].into_iter().flatten() {
-                agents[to].on_packet(from as u32, &payload, tick);
+                let sender = from as u32;
+                let payload = Draft::of_bytes(&message).sealed(&Seal { sender, ..seal });
+                agents[to].on_packet(sender, &payload, tick);
                 agents[to].on_timer(tick);
                 agents[to].take_packets();
             }

@@ -218,6 +218,10 @@ fn a_network_needs_connectors_that_exist_and_times_that_fit() {
         ("silent = [{ connector = 1, chain = 1 }]", "numbers from 0 to 0"),
         ("silent = [{ connector = 1, from_s = 9, until_s = 3 }]", "end after the start"),
         ("one_way = [{ sender = 1, receiver = 3 }]", "numbers that differ by 1"),
+        ("partitions = [{ sides = [[0, 1], [2, 9]] }]", "numbers from 0 to 3"),
+        ("partitions = [{ sides = [[0, 1], [1, 2]] }]", "name each connector once"),
+        ("partitions = [{ sides = [[0, 1]] }]", "at least two"),
+        ("bandwidth_bit_s = 0.5", "at least 1 bit/s"),
     ];
     for (network, cause) in wrong {
         let text = text("team", &format!("network = {{ {network} }}\n{chain}"));

@@ -2,7 +2,6 @@
 //! nobody moves on a veto, and all go on when everybody is back.
 
 use super::{compared_on, network, talked};
-use crate::agents::network::{Network, OneWay, Silence};
 use crate::agents::{Ended, Goes};
 use crate::chain_run;
 use crate::deploy::settled;
@@ -12,6 +11,7 @@ use crate::rods::rules::Rules;
 use crate::rods::veto::{Motion, Request, Source};
 use proptest::prelude::*;
 use sidestep_kernel::Simulation;
+use sidestep_kernel::network::{Network, OneWay, Silence, While};
 use sidestep_kernel::view::{Happening, Look};
 use sidestep_scenario::Source as Text;
 
@@ -85,6 +85,40 @@ fn a_link_that_works_one_way_only_stops_the_chain_as_well() {
 }
 
 #[test]
+fn a_partition_and_a_radio_that_does_not_reach_stop_the_chain() {
+    let cut = "partitions = [{ from_s = 1.0, until_s = 2.0, sides = [[0, 1, 2, 3], [4, 5]] }]";
+    let mut run = led(cut, "0.5");
+    run.advance(22);
+    let lost: Vec<_> = told(&mut *run).into_iter().filter(|t| t.0 == Happening::Unheard).collect();
+    assert_eq!(lost, [3, 4].map(|k| (Happening::Unheard, Some(k))));
+    let stands = run.poses().text;
+    run.advance(18);
+    assert_eq!(run.poses().text, stands);
+    run.advance(20);
+    assert_ne!(run.poses().text, stands);
+    let mut short = led("range_m = 0.4", "0.5");
+    let stands = short.poses().text;
+    short.advance(5);
+    assert_eq!(short.poses().text, stands);
+    assert_eq!(short.metrics()["contacts_lost"], 10, "nobody reaches anybody");
+}
+
+/// Losses come in bursts, or packets take their time: the chain goes on, as all of a motion or none of it.
+#[test]
+fn bursts_and_narrow_links_cost_time() {
+    let progress = |network: &str| {
+        let mut run = led(network, "0.5");
+        run.advance(300);
+        run.metrics()["progress"].as_f64().expect("a number")
+    };
+    let wide = progress("");
+    let bursts = progress("bursts = { loss = 1.0, lasts_s = 0.2, every_s = 2.0 }");
+    let narrow = progress("bandwidth_bit_s = 3e7\npatience_s = 2e-3");
+    assert!(wide > 0.0 && bursts > 0.0 && narrow > 0.0, "{wide} {bursts} {narrow}");
+    assert!(bursts < wide, "{bursts} {wide}");
+}
+
+#[test]
 fn a_motion_that_takes_longer_than_a_cycle_is_not_carried_out_and_told() {
     let mut run = led("latency_s = 5e-3\npatience_s = 5e-3", "0.5");
     let stands = run.poses().text;
@@ -117,10 +151,10 @@ fn faulty(
     silent: Option<u32>,
     cut: Option<(u32, bool)>,
 ) -> Network {
-    let whole = |connector| Silence { connector, chain: 0, from_s: 0.0, until_s: f64::INFINITY };
+    let whole = |agent| Silence { agent, during: While::ALWAYS };
     let one_way = |(k, up): (u32, bool)| {
         let (sender, receiver) = if up { (k, k + 1) } else { (k + 1, k) };
-        OneWay { sender, receiver, chain: 0, from_s: 0.0, until_s: f64::INFINITY }
+        OneWay { sender, receiver, during: While::ALWAYS }
     };
     Network {
         silences: silent.into_iter().map(whole).collect(),

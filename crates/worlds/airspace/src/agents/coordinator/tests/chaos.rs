@@ -3,8 +3,8 @@
 use super::super::epoch::{Epoch, is_majority};
 use super::super::host::Hosting;
 use super::{Tourist, hosts};
-use crate::agents::network::Patience;
 use proptest::prelude::*;
+use sidestep_kernel::network::Patience;
 use std::collections::BTreeMap;
 
 /// A while in which some hosts hear no others: from tick, to tick, and the side of each host.

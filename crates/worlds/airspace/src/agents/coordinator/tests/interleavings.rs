@@ -5,7 +5,7 @@ use super::super::epoch::{Epoch, is_majority};
 use super::super::seat::Post;
 use super::{Hotel, Tourist, hosts};
 use crate::agents::coordinator::host::Hosting;
-use crate::agents::network::Patience;
+use sidestep_kernel::network::Patience;
 use std::collections::{BTreeMap, HashSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
 

@@ -7,9 +7,9 @@ mod recovery;
 use super::epoch::Epoch;
 use super::host::Hosting;
 use super::passenger::{Here, Passenger, Rules, Ship, Step};
-use crate::agents::network::Patience;
 use crate::agents::party::Unsound;
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::network::Patience;
 
 /// A coordinator that visits all hosts, returns, and tells all how it was: in each of some rounds, the
 /// last of which ends with the telling.

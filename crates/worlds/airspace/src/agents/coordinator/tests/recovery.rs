@@ -2,7 +2,7 @@
 
 use super::chaos::{Faults, Group};
 use super::hosts;
-use crate::agents::network::Patience;
+use sidestep_kernel::network::Patience;
 
 /// Rounds that a coordinator makes, so that its host dies in any of them.
 const ROUNDS: u8 = 20;

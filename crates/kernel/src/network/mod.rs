@@ -1,52 +1,28 @@
-//! The network of the agents: its faults, and the traffic on it.
+//! A network of agents: its faults, its packets, and how long agents wait for each other over it.
+//!
+//! ```text
+//! links.rs      which links carry messages at a time, and which are in a burst of losses
+//! carrier.rs    a transport with the faults of a network
+//! ether.rs      the same for what one agent sends, in a process of its own
+//! packet.rs     what goes over the network, around every message
+//! ```
+//!
+//! Agents are known by their ids on the network; what these are is up to the world.
 
+mod carrier;
+mod ether;
 mod links;
+mod packet;
 
-pub use links::{Bursts, OneWay, Partition, Silence};
-use serde::{Deserialize, Serialize};
-use sidestep_kernel::ports::Faults;
-use sidestep_kernel::{EntityId, math};
-
-/// Messages and bytes that went over the network.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Traffic {
-    /// Number of messages, one per receiver; for a coordinator, its migrations.
-    pub messages: u64,
-    /// Number of messages if one could reach all.
-    pub multicasts: u64,
-    /// Number of bytes of the messages, in their serialized form.
-    pub bytes: u64,
-    /// Number of bytes if one message could reach all.
-    pub multicast_bytes: u64,
-    /// Number of ticks that the talks took, one after the other.
-    pub ticks: u64,
-}
-
-impl Traffic {
-    /// Adds the counts of other traffic.
-    pub fn add(&mut self, other: Self) {
-        self.messages += other.messages;
-        self.multicasts += other.multicasts;
-        self.bytes += other.bytes;
-        self.multicast_bytes += other.multicast_bytes;
-        self.ticks += other.ticks;
-    }
-
-    /// Adds the counts of the same talk by another one who took part in it.
-    pub(crate) fn add_beside(&mut self, other: Self) {
-        let ticks = self.ticks.max(other.ticks);
-        self.add(other);
-        self.ticks = ticks;
-    }
-
-    /// Counts a message to `receivers` others.
-    pub(crate) fn count(&mut self, receivers: usize, bytes: usize) {
-        self.messages += receivers as u64;
-        self.multicasts += 1;
-        self.bytes += (receivers * bytes) as u64;
-        self.multicast_bytes += bytes as u64;
-    }
-}
+use crate::math;
+use crate::ports::Faults;
+use crate::units::EntityId;
+pub use carrier::{Apart, Carrier};
+pub use ether::Ether;
+pub use links::{Bursts, FaultStreams, OneWay, Partition, Silence, While};
+pub use packet::{
+    Draft, HEADER_BYTES, Refusal, Refused, Seal, TalkId, Topic, digest, fingerprint, open,
+};
 
 /// Chance of giving up one that is in touch.
 const GIVEN_UP: f64 = 1e-9;
@@ -66,16 +42,15 @@ pub struct Network {
     pub bandwidth_bit_s: f64,
     /// Largest further delay in seconds, drawn uniformly, so that messages overtake each other.
     pub max_delay_s: f64,
-    /// Time in seconds without a new message after which an agent asks those it waits for.
+    /// Time in seconds without a new message after which an agent asks or sends again.
     pub patience_s: f64,
-    /// Time in seconds after which an optimization ends; the same for the shield's exchange after
-    /// it.
+    /// Time in seconds after which a talk ends.
     pub deadline_s: f64,
     /// Distance in meters that messages reach.
     pub range_m: f64,
     /// Bursts of losses, if there are any.
     pub bursts: Option<Bursts>,
-    /// Airplanes whose radio is dead, and the times.
+    /// Agents whose radio is dead, and the times.
     pub silences: Vec<Silence>,
     /// Sides that do not hear each other, and the times.
     pub partitions: Vec<Partition>,
@@ -84,13 +59,13 @@ pub struct Network {
 }
 
 impl Network {
-    /// Returns whether an airplane is silent at a time.
+    /// Returns whether an agent is silent at a time.
     pub fn is_silent(&self, id: EntityId, at_s: f64) -> bool {
-        self.silences.iter().any(|silence| silence.airplane == id && silence.is_on(at_s))
+        self.silences.iter().any(|silence| silence.agent == id && silence.during.is_on(at_s))
     }
 
     /// Returns whether a link carries messages at a time, as far as distance does not matter.
-    pub(crate) fn carries(&self, [sender, receiver]: [EntityId; 2], at_s: f64) -> bool {
+    pub fn carries(&self, [sender, receiver]: [EntityId; 2], at_s: f64) -> bool {
         let is_cut = self.partitions.iter().any(|one| one.cuts([sender, receiver], at_s));
         !is_cut && !self.one_ways.iter().any(|one| one.stops(sender, receiver, at_s))
     }
@@ -99,22 +74,23 @@ impl Network {
         (seconds / self.latency_s).round().max(1.0) as u64
     }
 
-    /// Returns the time that some ticks take.
-    pub(crate) fn seconds(&self, ticks: u64) -> f64 {
+    /// Returns the time in seconds that some ticks take.
+    pub fn seconds(&self, ticks: u64) -> f64 {
         ticks as f64 * self.latency_s
     }
 
     /// Returns the number of bits that go over a link in a tick.
-    pub(crate) fn bits_per_tick(&self) -> f64 {
+    pub fn bits_per_tick(&self) -> f64 {
         self.bandwidth_bit_s * self.latency_s
     }
 
-    pub(crate) fn deadline_ticks(&self) -> u64 {
+    /// Returns the number of ticks of a talk.
+    pub fn deadline_ticks(&self) -> u64 {
         self.ticks(self.deadline_s)
     }
 
     /// Returns how long an agent waits before it asks, and how often it asks.
-    pub(crate) fn patience(&self) -> Patience {
+    pub fn patience(&self) -> Patience {
         let (tries, first_tries) = (self.tries(GIVEN_UP), self.tries(MISSED));
         let bits_per_tick = self.bits_per_tick();
         Patience { ticks: self.ticks(self.patience_s), bits_per_tick, tries, first_tries }
@@ -122,7 +98,7 @@ impl Network {
 
     /// Returns the same for talks of many steps: one that has fallen silent is given up in a quarter
     /// of the time at the latest, so that enough is left to go on without it.
-    pub(crate) fn short_patience(&self) -> Patience {
+    pub fn short_patience(&self) -> Patience {
         let most = (self.deadline_s / (4.0 * self.patience_s)).max(2.0) as u32;
         let long = self.patience();
         Patience { tries: long.tries.min(most), first_tries: long.first_tries.min(most), ..long }
@@ -139,7 +115,8 @@ impl Network {
         ((lost + (burst_s + on_way_s) / self.patience_s) as u32).saturating_add(1)
     }
 
-    pub(crate) fn faults(&self) -> Faults {
+    /// Returns the faults that a transport draws for every message.
+    pub fn faults(&self) -> Faults {
         Faults {
             loss: self.loss,
             duplication: self.duplication,
@@ -148,8 +125,8 @@ impl Network {
     }
 }
 
-/// The time after which an endpoint asks, and the number of questions.
-#[derive(Debug, Clone, Copy)]
+/// The time after which an agent asks, and the number of questions.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Patience {
     /// Number of ticks without a new message after which it asks.
     pub ticks: u64,
@@ -163,13 +140,13 @@ pub struct Patience {
 
 impl Patience {
     /// Returns whether anybody ever asks, as nobody does on a network that loses nothing.
-    pub(crate) fn asks(&self) -> bool {
+    pub fn asks(&self) -> bool {
         self.ticks < u64::MAX
     }
 
     /// Returns the number of ticks after which it asks where messages are of this size: those that
     /// a message and its answer take on the way come on top.
-    pub(crate) fn ticks_for(&self, bytes: usize) -> u64 {
+    pub fn ticks_for(&self, bytes: usize) -> u64 {
         let on_way = (2.0 * 8.0 * bytes as f64 / self.bits_per_tick).ceil();
         self.ticks.saturating_add(on_way as u64)
     }

@@ -1,59 +1,63 @@
-//! Links between airplanes: which of them carry messages at a time, and which are in a burst of
+//! Links between agents: which of them carry messages at a time, and which are in a burst of
 //! losses.
 
-use crate::purpose;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-use sidestep_kernel::EntityId;
-use sidestep_kernel::distr::Chance;
-use sidestep_kernel::stream::Streams;
+use crate::distr::Chance;
+use crate::stream::{Purpose, Streams};
+use crate::units::EntityId;
 
 /// Steps of the chain of bursts in the shorter of its two mean times: a burst lasts whole steps.
 const STEPS_PER_MEAN: f64 = 10.0;
 
-/// A while in which an airplane's radio is dead: it sends nothing, hears nothing, and knows it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Silence {
-    /// Id of the airplane.
-    pub airplane: EntityId,
-    /// Start of the silence, in seconds after the start of the run.
-    #[serde(default)]
+/// A while, in seconds after the start of the run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct While {
+    /// Its start.
     pub from_s: f64,
-    /// End of the silence, in seconds after the start of the run; infinite unless given.
-    #[serde(default = "for_ever")]
+    /// Its end; may be infinite.
     pub until_s: f64,
 }
 
-/// A while in which no message gets from one side to another. Airplanes on no side hear all, and
-/// are heard by all.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+/// A while in which an agent's radio is dead: it sends nothing, hears nothing, and knows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Silence {
+    /// Id of the agent.
+    pub agent: EntityId,
+    /// The while.
+    pub during: While,
+}
+
+/// A while in which no message gets from one side to another. Agents on no side hear all, and are heard
+/// by all.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Partition {
-    /// Ids of the airplanes on each side.
+    /// Ids of the agents on each side.
     pub sides: Vec<Vec<EntityId>>,
-    /// Start of the partition, in seconds after the start of the run.
-    #[serde(default)]
-    pub from_s: f64,
-    /// End of the partition, in seconds after the start of the run; infinite unless given.
-    #[serde(default = "for_ever")]
-    pub until_s: f64,
+    /// The while.
+    pub during: While,
 }
 
 /// A while in which a link works one way only.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OneWay {
-    /// Id of the airplane that is heard by the other.
+    /// Id of the agent that is heard by the other.
     pub sender: EntityId,
-    /// Id of the airplane whose messages do not reach the other.
+    /// Id of the agent whose messages do not reach the other.
     pub receiver: EntityId,
-    /// Start of that while, in seconds after the start of the run.
-    #[serde(default)]
-    pub from_s: f64,
-    /// End of that while, in seconds after the start of the run; infinite unless given.
-    #[serde(default = "for_ever")]
-    pub until_s: f64,
+    /// The while.
+    pub during: While,
+}
+
+/// The streams from which faults are drawn, and the purposes of the draws.
+#[derive(Debug, Clone, Copy)]
+pub struct FaultStreams {
+    /// The streams of the run.
+    pub streams: Streams,
+    /// Faults of messages.
+    pub network: Purpose,
+    /// States of links: in a burst of losses or not.
+    pub burst: Purpose,
+    /// Messages lost in a burst.
+    pub burst_loss: Purpose,
 }
 
 /// Bursts of losses (Gilbert and Elliott): each direction of each link is a Markov chain of two
@@ -68,30 +72,28 @@ pub struct Bursts {
     pub every_s: f64,
 }
 
-fn for_ever() -> f64 {
-    f64::INFINITY
-}
+impl While {
+    /// The time from the start of the run on.
+    pub const ALWAYS: Self = Self { from_s: 0.0, until_s: f64::INFINITY };
 
-impl Silence {
-    pub(super) fn is_on(&self, at_s: f64) -> bool {
+    /// Returns whether a time is in it.
+    pub fn is_on(&self, at_s: f64) -> bool {
         self.from_s <= at_s && at_s < self.until_s
     }
 }
 
 impl Partition {
-    /// Returns whether it keeps two airplanes apart at a time.
+    /// Returns whether it keeps two agents apart at a time.
     pub(super) fn cuts(&self, [a, b]: [EntityId; 2], at_s: f64) -> bool {
         let side = |id: EntityId| self.sides.iter().position(|side| side.contains(&id));
-        let is_on = self.from_s <= at_s && at_s < self.until_s;
-        is_on && side(a).zip(side(b)).is_some_and(|(a, b)| a != b)
+        self.during.is_on(at_s) && side(a).zip(side(b)).is_some_and(|(a, b)| a != b)
     }
 }
 
 impl OneWay {
     /// Returns whether it stops a message at a time.
     pub(super) fn stops(&self, sender: EntityId, receiver: EntityId, at_s: f64) -> bool {
-        let is_on = self.from_s <= at_s && at_s < self.until_s;
-        is_on && (self.receiver, self.sender) == (sender, receiver)
+        self.during.is_on(at_s) && (self.receiver, self.sender) == (sender, receiver)
     }
 }
 
@@ -101,13 +103,13 @@ impl Bursts {
     /// In each step of the chain its state is drawn anew with a certain probability, and else stays
     /// as it is. That is the chain with the given mean times, and its state at any time follows from
     /// the draws of a few steps before it.
-    pub(crate) fn is_on(&self, streams: &Streams, link: [EntityId; 2], at_s: f64) -> bool {
+    pub(super) fn is_on(&self, draws: &FaultStreams, link: [EntityId; 2], at_s: f64) -> bool {
         let step_s = self.lasts_s.min(self.every_s) / STEPS_PER_MEAN;
         let renewed = Chance::new(step_s / self.lasts_s + step_s / self.every_s);
         let in_burst = Chance::new(self.lasts_s / (self.lasts_s + self.every_s));
         let mut step = (at_s / step_s) as u64;
         loop {
-            let words = streams.pair(link[0], link[1], step, purpose::BURST, 0);
+            let words = draws.streams.pair(link[0], link[1], step, draws.burst, 0);
             if step == 0 || renewed.happens(words[0]) {
                 return in_burst.happens(words[1]);
             }
@@ -119,18 +121,19 @@ impl Bursts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep_kernel::Seed;
+    use crate::units::Seed;
 
     /// 2,000 bursts of 40 links: the standard error of a mean time is 2.2 %, and five of them are
     /// allowed.
     #[test]
     fn bursts_last_and_return_as_stated() {
         let bursts = Bursts { loss: 1.0, lasts_s: 2.0, every_s: 6.0 };
-        let streams = Streams::new(Seed(5));
+        let [network, burst, burst_loss] = [5, 6, 7].map(Purpose);
+        let draws = FaultStreams { streams: Streams::new(Seed(5)), network, burst, burst_loss };
         let (step_s, steps) = (0.2, 2000);
         let (mut on, mut begun) = (0, 0);
         for receiver in 1..=40 {
-            let state = |k: u64| bursts.is_on(&streams, [0, receiver], (k as f64 + 0.5) * step_s);
+            let state = |k: u64| bursts.is_on(&draws, [0, receiver], (k as f64 + 0.5) * step_s);
             on += (0..steps).filter(|&k| state(k)).count();
             begun += (1..steps).filter(|&k| state(k) && !state(k - 1)).count();
         }
@@ -143,7 +146,7 @@ mod tests {
     #[test]
     fn a_partition_cuts_between_its_sides_and_nowhere_else() {
         let sides = vec![vec![0, 2], vec![1, 3]];
-        let partition = Partition { sides, from_s: 10.0, until_s: 20.0 };
+        let partition = Partition { sides, during: While { from_s: 10.0, until_s: 20.0 } };
         assert!(partition.cuts([0, 3], 10.0) && partition.cuts([3, 0], 19.9));
         for (pair, at_s) in [([0, 2], 15.0), ([0, 4], 15.0), ([0, 3], 9.9), ([0, 3], 20.0)] {
             assert!(!partition.cuts(pair, at_s), "{pair:?} at {at_s}");

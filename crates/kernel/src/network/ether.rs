@@ -1,0 +1,54 @@
+//! The faults that happen to what one agent sends, where each is a process of its own.
+//!
+//! They are drawn as those of a network in memory are, so that a packet of the same number in the same tick
+//! of the same cycle meets the same faults, wherever its sender runs.
+
+use super::{Carrier, FaultStreams, Network};
+use crate::ports::{Envelope, Transport};
+use crate::units::EntityId;
+use std::collections::BTreeMap;
+
+/// The network between one agent and all others, with its faults.
+#[derive(Debug, Clone)]
+pub struct Ether {
+    network: Network,
+    draws: FaultStreams,
+    talks: Vec<(u64, f64)>,
+    /// Tick from which on each way of a link is free.
+    free_at: BTreeMap<[EntityId; 2], f64>,
+}
+
+impl Ether {
+    /// Returns a network with these faults.
+    pub fn new(network: Network, draws: FaultStreams) -> Self {
+        Self { network, draws, talks: vec![(0, 0.0)], free_at: BTreeMap::new() }
+    }
+
+    /// Begins a cycle: all links are free. Its talks are given by their first ticks and the times of those, in
+    /// seconds after the start of the run, rising; at least one.
+    pub fn begin(&mut self, talks: Vec<(u64, f64)>) {
+        (self.talks, self.free_at) = (talks, BTreeMap::new());
+    }
+
+    /// Returns the arrivals of a packet at its receiver: none if it is lost, two if it is doubled. Of each the tick in
+    /// which all of it is on its way, and the tick in which it arrives. Its `cycle` is the tick in which it is sent.
+    /// Distances do not matter here.
+    pub fn arrivals(&mut self, packet: Envelope) -> Vec<(u64, u64)> {
+        let faults = (Some(&self.network), self.draws);
+        let mut carrier = Carrier::in_memory(faults, None, &self.talks);
+        carrier.free_at = std::mem::take(&mut self.free_at);
+        let receiver = packet.receiver;
+        carrier.send(packet);
+        let mut arrivals = Vec::new();
+        while let Some(at) = carrier.next_arrival() {
+            arrivals.extend(carrier.receive(receiver, at).iter().map(|copy| (copy.cycle, at)));
+        }
+        self.free_at = std::mem::take(&mut carrier.free_at);
+        arrivals
+    }
+
+    /// Duration of a tick in seconds.
+    pub fn tick_s(&self) -> f64 {
+        self.network.latency_s
+    }
+}

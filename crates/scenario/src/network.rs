@@ -1,0 +1,255 @@
+//! The section of a network that may lose and delay messages: the same keys in every world whose agents
+//! talk.
+//!
+//! A world says how its agents are named in the lists of faults, and which of them there are ([`Names`]).
+
+use super::checked::{FromBelow, NonNegative, Number, Positive, Rule, Share};
+use super::schema;
+use super::spanned::Spanned;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
+use sidestep_kernel::EntityId;
+use sidestep_kernel::network::{Bursts, Network, OneWay, Partition, Silence, While};
+use std::fmt::Debug;
+use std::ops::Range;
+
+/// The names of a world's agents in its network's section, and what is usual there.
+pub trait Names {
+    /// A silence, as it is written.
+    type Silence: DeserializeOwned + JsonSchema + Debug;
+    /// A partition, as it is written.
+    type Partition: DeserializeOwned + JsonSchema + Debug;
+    /// A link that works one way, as it is written.
+    type OneWay: DeserializeOwned + JsonSchema + Debug;
+    /// Limits of a latency.
+    type Latency: Rule + Copy;
+
+    /// Latency unless it is given, seconds.
+    const LATENCY_S: f64;
+    /// Number of talks in a cycle, one after the other.
+    const TALKS: u32;
+    /// Words for the longest deadline.
+    const LONGEST_DEADLINE: &str;
+
+    /// Returns a silence by its agent's id on the network.
+    ///
+    /// # Errors
+    /// When there is no such agent, or the times make no sense.
+    fn silence(&self, one: &Self::Silence) -> Result<Silence, Wrong>;
+
+    /// Returns a partition by its agents' ids on the network.
+    ///
+    /// # Errors
+    /// When there are no such agents or sides, or the times make no sense.
+    fn partition(&self, one: &Self::Partition) -> Result<Partition, Wrong>;
+
+    /// Returns a link by its agents' ids on the network.
+    ///
+    /// # Errors
+    /// When there is no such link, or the times make no sense.
+    fn one_way(&self, one: &Self::OneWay) -> Result<OneWay, Wrong>;
+}
+
+/// A network's section that makes no sense.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wrong {
+    /// The place of what is wrong; none for the section itself.
+    pub span: Option<Range<usize>>,
+    /// The cause.
+    pub cause: String,
+    /// The remedy.
+    pub remedy: String,
+}
+
+impl Wrong {
+    /// Returns what is wrong, at no place of its own.
+    pub fn new(cause: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { span: None, cause: cause.into(), remedy: remedy.into() }
+    }
+}
+
+/// The section of a network.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, bound = "N: Names")]
+#[schemars(rename = "NetworkSection", bound = "N: Names")]
+pub struct NetworkSection<N: Names> {
+    loss: Option<Chance>,
+    duplication: Option<Chance>,
+    latency_s: Option<Number<N::Latency>>,
+    max_delay_s: Option<NonNegative>,
+    patience_s: Option<Positive>,
+    deadline_s: Option<Positive>,
+    bandwidth_bit_s: Option<Number<Bandwidth>>,
+    range_m: Option<Positive>,
+    bursts: Option<BurstsSection>,
+    silent: Vec<Spanned<N::Silence>>,
+    partitions: Vec<Spanned<N::Partition>>,
+    one_way: Vec<Spanned<N::OneWay>>,
+}
+
+impl<N: Names> Default for NetworkSection<N> {
+    fn default() -> Self {
+        Self {
+            loss: None,
+            duplication: None,
+            latency_s: None,
+            max_delay_s: None,
+            patience_s: None,
+            deadline_s: None,
+            bandwidth_bit_s: None,
+            range_m: None,
+            bursts: None,
+            silent: Vec::new(),
+            partitions: Vec::new(),
+            one_way: Vec::new(),
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct BurstsSection {
+    /// Probability of a loss within a burst.
+    loss: Share,
+    /// Mean length of a burst.
+    lasts_s: Positive,
+    /// Mean time between two bursts.
+    every_s: Positive,
+}
+
+impl BurstsSection {
+    fn bursts(&self) -> Bursts {
+        let Self { loss, lasts_s, every_s } = self;
+        Bursts { loss: loss.get(), lasts_s: lasts_s.get(), every_s: every_s.get() }
+    }
+}
+
+/// A probability below 1, because some messages must get through in the end.
+type Chance = Number<FromBelow<0, 1>>;
+
+/// A bandwidth that carries a message in the time of a run.
+#[derive(Debug, Clone, Copy)]
+struct Bandwidth;
+
+impl Rule for Bandwidth {
+    fn allows(number: f64) -> bool {
+        number >= 1.0
+    }
+
+    fn words() -> String {
+        "at least 1 bit/s".into()
+    }
+
+    fn limits() -> Value {
+        schema::or_infinite(json!({ "minimum": 1 }))
+    }
+}
+
+/// Part of a cycle in which its talks end, unless it is given.
+const TALKING: f64 = 0.9;
+
+impl<N: Names> NetworkSection<N> {
+    /// Returns the network, in a world with cycles of `dt_s` seconds.
+    ///
+    /// # Errors
+    /// When times do not fit into a cycle, or a fault makes no sense: the first one of these.
+    pub fn network(&self, dt_s: f64, names: &N) -> Result<Network, Wrong> {
+        let latency_s = self.latency_s.map_or(N::LATENCY_S, f64::from);
+        let max_delay_s = self.max_delay_s.map_or(0.0, f64::from);
+        let deadline_s = TALKING / f64::from(N::TALKS) * dt_s;
+        let network = Network {
+            loss: self.loss.map_or(0.0, f64::from),
+            duplication: self.duplication.map_or(0.0, f64::from),
+            latency_s,
+            bandwidth_bit_s: self.bandwidth_bit_s.map_or(f64::INFINITY, f64::from),
+            max_delay_s,
+            patience_s: self.patience_s.map_or(3.0 * (latency_s + max_delay_s), f64::from),
+            deadline_s: self.deadline_s.map_or(deadline_s, f64::from),
+            range_m: self.range_m.map_or(f64::INFINITY, f64::from),
+            bursts: self.bursts.as_ref().map(BurstsSection::bursts),
+            silences: Vec::new(),
+            partitions: Vec::new(),
+            one_ways: Vec::new(),
+        };
+        check_times::<N>(&network, dt_s)?;
+        Ok(Network {
+            silences: read(&self.silent, |one| names.silence(one))?,
+            partitions: read(&self.partitions, |one| names.partition(one))?,
+            one_ways: read(&self.one_way, |one| names.one_way(one))?,
+            ..network
+        })
+    }
+}
+
+/// Reads a list of faults.
+fn read<A, B>(all: &[Spanned<A>], one: impl Fn(&A) -> Result<B, Wrong>) -> Result<Vec<B>, Wrong> {
+    let at = |written: &Spanned<A>| {
+        one(written.get_ref()).map_err(|wrong| Wrong { span: Some(written.span()), ..wrong })
+    };
+    all.iter().map(at).collect()
+}
+
+/// Checks that times fit into a cycle.
+fn check_times<N: Names>(n: &Network, dt_s: f64) -> Result<(), Wrong> {
+    let waits_s = n.patience_s.max(n.latency_s + n.max_delay_s);
+    if f64::from(N::TALKS) * n.deadline_s <= dt_s && 8.0 * waits_s <= n.deadline_s {
+        return Ok(());
+    }
+    let cause = format!(
+        "latency_s = {}, max_delay_s = {}, patience_s = {}, deadline_s = {}",
+        n.latency_s, n.max_delay_s, n.patience_s, n.deadline_s
+    );
+    let remedy = format!(
+        "give a patience of at most an eighth of the deadline, latency and delay of no more, and a \
+         deadline of {}",
+        N::LONGEST_DEADLINE
+    );
+    Err(Wrong::new(cause, remedy))
+}
+
+/// Returns a while.
+///
+/// # Errors
+/// When its times are none.
+pub fn during(from_s: f64, until_s: f64) -> Result<While, Wrong> {
+    if from_s >= 0.0 && from_s.is_finite() && until_s > from_s {
+        return Ok(While { from_s, until_s });
+    }
+    let cause = format!("from_s = {from_s}, until_s = {until_s}");
+    Err(Wrong::new(cause, "give times in seconds from 0 on, the end after the start"))
+}
+
+/// Checks the sides of a partition, whose agents people call `agent`.
+///
+/// # Errors
+/// When one is named twice, or there are fewer than two sides.
+pub fn check_sides(sides: &[Vec<EntityId>], agent: &str) -> Result<(), Wrong> {
+    check_once(sides.concat(), agent)?;
+    if sides.len() >= 2 {
+        return Ok(());
+    }
+    let remedy = "give at least two, e.g. sides = [[0, 2], [1, 3]]";
+    Err(Wrong::new("a partition with fewer than two sides", remedy))
+}
+
+/// Checks that no agent is named twice.
+///
+/// # Errors
+/// With the lowest one that is.
+pub fn check_once(mut ids: Vec<EntityId>, agent: &str) -> Result<(), Wrong> {
+    ids.sort_unstable();
+    match ids.windows(2).find(|pair| pair[0] == pair[1]) {
+        None => Ok(()),
+        Some(pair) => {
+            let cause = format!("{agent} {} is named twice", pair[0]);
+            Err(Wrong::new(cause, format!("name each {agent} once")))
+        }
+    }
+}
+
+/// The end of what has no end, seconds.
+pub fn for_ever() -> f64 {
+    f64::INFINITY
+}

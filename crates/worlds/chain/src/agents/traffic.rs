@@ -1,0 +1,22 @@
+//! The traffic on the network of the agents.
+
+use serde::{Deserialize, Serialize};
+
+/// Messages and bytes that went over the network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Traffic {
+    /// Number of packets.
+    pub messages: u64,
+    /// Number of their bytes, in their serialized form.
+    pub bytes: u64,
+    /// Number of packets that came and were dropped, because they could not be read or made no sense.
+    pub dropped: u64,
+}
+
+impl Traffic {
+    /// Counts a packet.
+    pub(super) fn count(&mut self, bytes: usize) {
+        self.messages += 1;
+        self.bytes += bytes as u64;
+    }
+}
