@@ -1,5 +1,8 @@
 // Begins before the page does. What it finds becomes a JSON script at the end of the page.
 (() => {
+  // No window of this browser is as narrow as a phone. The page is so from the start: the clock of a probe leaves
+  // no time for frames, in which a page would notice that its width has changed.
+  if (globalThis.probeWidth) document.documentElement.style.width = `${globalThis.probeWidth}px`;
   const found = { errors: [], violations: [], requests: [] };
   addEventListener("error", (event) => found.errors.push(event.message));
   addEventListener("unhandledrejection", (event) => found.errors.push(String(event.reason)));
@@ -93,11 +96,6 @@
       .map((part) => part.outerHTML.slice(0, 80));
 
   async function look() {
-    if (globalThis.probeWidth) {
-      // No window of this browser is as narrow as a phone.
-      document.documentElement.style.width = `${globalThis.probeWidth}px`;
-      await later(500);
-    }
     const plots = all(".plot .drawn");
     for (
       let k = 0;
