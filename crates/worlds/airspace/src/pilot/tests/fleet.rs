@@ -46,8 +46,11 @@ fn is_flown_alike(airspace: &str, airplanes: &str, mut orders: impl FnMut(&mut A
     assert_eq!(driven.digest(), own.digest(), "{airspace}");
     assert_eq!(metrics(&driven), metrics(&own), "{airspace}");
     assert_eq!(tables(&mut found), tables(&mut expected), "{airspace}");
-    // Who believes in another group is refused, and nobody else.
-    let strange = |pilot: &Pilot| pilot.refused().total() - pilot.refused().of(Refusal::OtherGroup);
+    // Who believes in another group is refused, at once or when that talk is over, and nobody else.
+    let strange = |pilot: &Pilot| {
+        let refused = pilot.refused();
+        refused.total() - refused.of(Refusal::OtherGroup) - refused.of(Refusal::Stale)
+    };
     assert!(crew.pilots.iter().all(|pilot| strange(pilot) == 0), "{airspace}");
 }
 
