@@ -23,7 +23,7 @@ use sidestep::worlds::airspace::{AirspaceRun, airspace_run};
 use sidestep_document::claim::{Claim, Verdict, tally};
 use sidestep_document::figure::Point;
 use sidestep_document::{Document, Estimate, Figure, FigureKind, Series, Table};
-pub use sockets::{Measured, Sockets, measure};
+pub use sockets::{Case, Flies, Measured, Sockets, measure};
 
 /// The amount of work to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -188,9 +188,8 @@ impl Agent {
             self.has_reported = true;
             let (about, heard): (_, Vec<_>) = (self.id(), self.heard.iter().copied().collect());
             self.roster.note_report(about, heard.clone());
-            if !heard.is_empty() {
-                said.push(vec![Item::Report { about, heard }]);
-            }
+            // Also one that has heard nobody: those who hear it wait for that.
+            said.push(vec![Item::Report { about, heard }]);
         }
         if self.found.is_none() && self.has_reported && link::Agent::awaits(self).is_empty() {
             self.find();
