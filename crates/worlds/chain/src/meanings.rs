@@ -72,6 +72,12 @@ pub(super) const MEANINGS: &[Meaning] = &[
         meaning: "greatest speed of any connector",
     },
     Meaning {
+        name: "longest_inside_steps",
+        words: "steps inside in a row, at most",
+        unit: "",
+        meaning: "most steps in a row at whose ends some part of one chain was deeper than 1e-6 m in an obstacle",
+    },
+    Meaning {
         name: "min_own_gap_m",
         words: "least distance of own parts",
         unit: "",

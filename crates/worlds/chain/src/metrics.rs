@@ -21,8 +21,10 @@ pub struct Tally {
     pub vetoes: [u64; Reason::ALL.len()],
     /// Steps at whose end some part was in an obstacle,
     pub penetrations: u64,
-    /// and whether the last step ended so.
-    pub is_inside: bool,
+    /// how many in a row ended so up to the last step,
+    pub inside_steps: u64,
+    /// and the most that ever did.
+    pub longest_inside_steps: u64,
     /// Whether parts got out of the way in the last step.
     pub is_escaping: bool,
     /// Least distance of any part from obstacles, meters; infinite if none came near.
@@ -224,6 +226,15 @@ impl Tally {
         self.dropped += traffic.dropped;
     }
 
+    /// Counts a step that left a part in an obstacle, or none; returns whether that is news.
+    pub(crate) fn note_inside(&mut self, is_inside: bool) -> bool {
+        let was_inside = self.inside_steps > 0;
+        self.penetrations += u64::from(is_inside);
+        self.inside_steps = if is_inside { self.inside_steps + 1 } else { 0 };
+        self.longest_inside_steps = self.longest_inside_steps.max(self.inside_steps);
+        is_inside != was_inside
+    }
+
     /// Adds a veto.
     pub(crate) fn add_veto(&mut self, reason: Reason) {
         self.vetoes[reason.number()] += 1;
@@ -236,7 +247,8 @@ impl Default for Tally {
             steps: 0,
             vetoes: [0; Reason::ALL.len()],
             penetrations: 0,
-            is_inside: false,
+            inside_steps: 0,
+            longest_inside_steps: 0,
             is_escaping: false,
             min_clearance_m: f64::INFINITY,
             min_own_gap_m: f64::INFINITY,
@@ -310,6 +322,8 @@ pub struct Metrics {
     pub max_slave_step_m: f64,
     /// Greatest speed of any connector, m/s.
     pub max_speed_m_s: f64,
+    /// Most steps in a row at whose ends some part of one chain was in an obstacle.
+    pub longest_inside_steps: u64,
     /// Least distance between parts of a chain that are no neighbors, while they are solid to each other,
     /// meters; negative where they overlapped, none if none came near. Chains of more than 32 rods are
     /// measured in every 16th cycle.
@@ -429,6 +443,7 @@ impl Metrics {
             moved_per_step: sum(|t| t.moved) as f64 / steps.max(1) as f64,
             max_slave_step_m: most(|t| t.max_slave_step_m),
             max_speed_m_s: most(|t| t.max_speed_m_s),
+            longest_inside_steps: tallies.iter().map(|t| t.longest_inside_steps).max().unwrap_or(0),
             min_own_gap_m: Some(own).filter(|m| m.is_finite()),
             done: sum(|t| t.done),
             reformed: sum(|t| t.reformed),

@@ -107,7 +107,10 @@ fn motion(m: &Metrics) -> Lines {
     };
     let penetrations = match m.penetrations {
         0 => "none".into(),
-        n => format!("{} steps with a part in an obstacle", grouped(n)),
+        n => {
+            let in_a_row = grouped(m.longest_inside_steps);
+            format!("{} steps with a part in an obstacle, up to {in_a_row} in a row", grouped(n))
+        }
     };
     let (moved, turned) = (m.moved_per_step, grouped(m.rotations));
     let mut lines = vec![

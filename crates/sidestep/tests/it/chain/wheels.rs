@@ -108,3 +108,35 @@ fn a_swarm_gets_past_a_disc_that_crosses_its_corridor() {
 fn a_swarm_past_a_disc_has_the_same_bits_however_it_is_run() {
     assert_d1::<2>(CROSSED, 1500, &[0, 850, 1100, 1499]);
 }
+
+/// Whether two neighbors of the swarm can be on both sides of the disc while it is as near to the wall as it comes: a
+/// search over their places, in steps of 2 cm. Distances are in meters from the middle of the disc, and from the wall.
+fn neighbors_fit_beside(room_m: f64, robot_m: f64) -> bool {
+    let (disc_m, longest_m) = (0.3, 0.8);
+    let places = |side: f64| {
+        let all = (0..=40).flat_map(|i| (0..=150).map(move |j| [0.02 * i as f64, 0.02 * j as f64]));
+        let all = all.map(move |[x, up]| [side * x, robot_m + up]);
+        let middle_m = room_m + disc_m;
+        all.filter(move |[x, y]| hypot(*x, y - middle_m) >= robot_m + disc_m).collect::<Vec<_>>()
+    };
+    let (before, behind) = (places(-1.0), places(1.0));
+    before.iter().any(|a| {
+        behind.iter().any(|b| {
+            let part = if b[0] > a[0] { -a[0] / (b[0] - a[0]) } else { 0.5 };
+            let passes_m = a[1] + part * (b[1] - a[1]);
+            hypot(b[0] - a[0], b[1] - a[1]) <= longest_m && passes_m < room_m
+        })
+    })
+}
+
+/// A line that lies across the way of the disc is always on the same side of it. Where no two neighbors fit between the
+/// disc and the wall on that side, none of it may be across its way whenever the disc is there: every 10 s from wall to
+/// wall. A line in single file takes longer to pass, even at its shortest and as fast as wheels go.
+#[test]
+fn no_line_gets_past_a_disc_that_leaves_too_little_room_beside_it() {
+    // Robots keep 0.08 m around themselves; from wall to wall not even their bodies fit.
+    assert!(neighbors_fit_beside(0.7, 0.33) && !neighbors_fit_beside(0.4, 0.33));
+    assert!(!neighbors_fit_beside(0.2, 0.25));
+    let (line_m, fastest_m_s, away_s) = (15.0 * 0.6, 1.2 * 0.5, 2.0 * 2.0 / 0.4);
+    assert!(line_m / fastest_m_s > away_s);
+}

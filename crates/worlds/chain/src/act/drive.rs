@@ -12,11 +12,11 @@ use crate::swarm::drive::Pose;
 use crate::world::purpose;
 
 /// The words for a wish that is put off.
-const WAIT: &str = "wait, because parts get out of the way";
+const WAIT: &str = "wait for what moves";
 
 /// A driver's wish in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Wish<const D: usize> {
+pub(super) enum Wish<const D: usize> {
     /// Nothing.
     Rest,
     /// The initiator at another place.
@@ -42,6 +42,7 @@ impl<const D: usize> Acting<'_, D> {
         let is_late = self.world.starts_s(self.body.driving.cycles + 1) >= task.lasts_s;
         self.body.driving.cycles += 1;
         let wish = self.wish(task);
+        self.look_ahead(task, wish);
         let wanted = self.wanted(task, wish);
         self.note(|notes| notes.wish = Some(wanted));
         match wish {

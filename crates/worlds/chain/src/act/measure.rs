@@ -37,9 +37,7 @@ impl<const D: usize> Acting<'_, D> {
             tally.min_clearance_m = tally.min_clearance_m.min(least_m);
         }
         let is_inside = least_m.min(self.scratch.robots_gap_m) < -PENETRATION_M;
-        tally.penetrations += u64::from(is_inside);
-        let was_inside = std::mem::replace(&mut tally.is_inside, is_inside);
-        if is_inside != was_inside {
+        if tally.note_inside(is_inside) {
             let kind = if is_inside { EventKind::Penetration } else { EventKind::Clear };
             self.tell(kind, part, (-least_m).max(0.0));
         }

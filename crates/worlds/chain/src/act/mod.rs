@@ -1,7 +1,7 @@
 //! Phase *act*: the actions of one chain in a cycle.
 //!
 //! ```text
-//! broken.rs -> bounds.rs (out of the way) -> drive.rs -> go.rs, wheels.rs, obey.rs
+//! broken.rs -> bounds.rs (out of the way) -> drive.rs -> foresee.rs -> go.rs, wheels.rs, obey.rs
 //!           -> bounds.rs (back into the claim) -> follow.rs -> measure.rs
 //! broken.rs -> drive.rs -> go.rs, later.rs         where nothing can object
 //!              drive.rs -> plan.rs                 where local rules come no nearer
@@ -13,6 +13,7 @@ mod bounds;
 mod broken;
 mod drive;
 mod follow;
+mod foresee;
 mod go;
 mod joints;
 mod later;

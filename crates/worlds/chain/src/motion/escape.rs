@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! literal.rs       the slides' own way: one part after the other, the deepest first
-//! simultaneous/    all parts of a tick at once, and a way out for a part that is caught
+//! simultaneous/    all parts of a tick at once, a way out for a part that is caught, and a leader that looks ahead
 //! threat.rs        the parts near an obstacle
 //! ```
 //!
@@ -20,11 +20,13 @@ use crate::rods::chain::Chain;
 use crate::rods::geometry::{Point, norm};
 use crate::rods::obstacle::{Obstacle, Obstacles};
 use crate::rods::propagate::Propagator;
+use crate::rods::rules::Rules;
 use crate::rods::veto::Veto;
 use literal::Literal;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
+pub(crate) use simultaneous::Lead;
 use simultaneous::Simultaneous;
 pub use simultaneous::WayOut;
 pub(crate) use threat::Part;
@@ -161,6 +163,9 @@ impl Margin {
 
 /// Gap that is kept beyond the way of the obstacle, meters.
 const SPARE_M: f64 = 0.05;
+/// Time from one choice of a leader to the next, s.
+const CHOOSES_EVERY_S: f64 = 0.2;
+
 impl<const D: usize> Escaper<D> {
     /// Returns an escaper for rules.
     pub fn new(rules: Escape) -> Self {
@@ -170,6 +175,26 @@ impl<const D: usize> Escaper<D> {
     /// Returns its rules.
     pub fn rules(&self) -> &Escape {
         &self.rules
+    }
+
+    /// Returns the ticks from one choice of a leader to the next; none if leaders choose nothing, because the chain
+    /// gives way on contact or by the literal method only.
+    pub(crate) fn chooses_every(&self) -> Option<u64> {
+        let Escape { dt_s, ticks_ahead, method, .. } = self.rules;
+        let chooses = method == Method::Simultaneous && ticks_ahead > 0.0;
+        chooses.then(|| (CHOOSES_EVERY_S / dt_s).round().max(1.0) as u64)
+    }
+
+    /// Lets the leader of a chain choose between its wish and resting: for what brings parts of the chain inside of
+    /// what moves for the least time. The choice is in `way_out`.
+    pub(crate) fn choose(
+        &self,
+        (chain, obstacles): (&Chain<D>, &Obstacles<D>),
+        rules: &Rules,
+        lead: &Lead<D>,
+        way_out: &mut WayOut,
+    ) {
+        way_out.set_rests(self.simultaneous.should_rest((chain, obstacles), rules, lead));
     }
 
     /// Moves the parts of a chain that are too near to a moving obstacle. `start` holds the

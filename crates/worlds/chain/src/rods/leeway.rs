@@ -68,12 +68,14 @@ impl<const D: usize> Leeway<D> {
         (self.odometer_m, self.built_at_m) = (0.0, f64::NEG_INFINITY);
     }
 
-    /// Notes that the chain stays where a motion of `way_m` has brought it, or goes back.
-    pub(super) fn ended(&mut self, chain: &Chain<D>, way_m: f64, goes_back: bool) {
-        match goes_back {
-            true => self.travel(way_m),
-            false => self.points.copy_from_slice(chain.points()),
-        }
+    /// Notes that the chain stays where an allowed motion has brought it.
+    pub(super) fn settle(&mut self, chain: &Chain<D>) {
+        self.points.copy_from_slice(chain.points());
+    }
+
+    /// Notes that a motion of `way_m` that was looked at is taken back.
+    pub(super) fn go_back(&mut self, way_m: f64) {
+        self.travel(way_m);
     }
 
     fn travel(&mut self, way_m: f64) {

@@ -15,6 +15,7 @@ use super::pass::{Direction, Tally};
 use super::rules::{Rotation, Rules};
 use super::scene::{Name, Overlay, Refusal, Scene, Step, TOLERANCE_M, fits, needed_m};
 use super::veto::{Mode, Motion, Moved, Outcome, Reason, Request, Veto};
+use apart::Proofs;
 use sidestep_kernel::InputError;
 use std::ops::Range;
 
@@ -30,6 +31,7 @@ pub struct Propagator<const D: usize> {
     overlay: Overlay<D>,
     own: OwnBody<D>,
     leeway: Leeway<D>,
+    proofs: Proofs,
     work: Work<D>,
     untried: Vec<Untried<D>>,
     /// Positions before the request, for the run of connectors that have moved.
@@ -161,21 +163,33 @@ impl<const D: usize> Propagator<D> {
         if is_open && self.pull_apart(chain, &heads, goes_on) {
             return Ok(());
         }
-        self.overlay.start(chain.points().len(), heads.first);
         if self.rules.self_collision {
+            if !is_open && self.sweep_apart(chain, obstacles, &heads) {
+                return Ok(());
+            }
             let rods = 0..chain.rods().len();
             self.own.refit(rods.map(|i| rod_box(chain, i, |k| chain.points()[k])));
         }
-        self.place_heads(chain, obstacles, &heads)?;
         let rotated = self.tally.rotated;
-        let followed = self
-            .sweep(chain, obstacles, heads.first + heads.n - 1, Direction::Up)
-            .and_then(|()| self.sweep(chain, obstacles, heads.first, Direction::Down));
+        let followed = self.sweep_from(chain, obstacles, &heads);
         match followed {
             Ok(()) => self.commit(chain, &heads),
             Err(_) => self.tally.rotated = rotated,
         }
         followed
+    }
+
+    /// Finds new places for the heads and everything that follows them.
+    fn sweep_from(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        heads: &Heads<D>,
+    ) -> Result<(), Objection> {
+        self.overlay.start(chain.points().len(), heads.first);
+        self.place_heads(chain, obstacles, heads)?;
+        self.sweep(chain, obstacles, heads.first + heads.n - 1, Direction::Up)?;
+        self.sweep(chain, obstacles, heads.first, Direction::Down)
     }
 
     fn place_heads(

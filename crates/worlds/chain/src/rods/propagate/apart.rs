@@ -4,8 +4,40 @@ use super::{Heads, Propagator, Tally};
 use crate::rods::chain::Chain;
 use crate::rods::geometry::distance;
 use crate::rods::leeway::Leeway;
+use crate::rods::obstacle::Obstacles;
 use crate::rods::open::{self, Stays};
 use std::ops::Range;
+
+/// Motions among obstacles until a proof is tried again. Where one fails, all that it took is lost, so every
+/// failure doubles the time to the next. No result depends on it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Proofs {
+    until_next: u32,
+    pause: u32,
+}
+
+/// Most motions from one proof to the next.
+const MOST_PAUSE: u32 = 256;
+
+impl Proofs {
+    /// Whether a proof is to be tried now.
+    fn is_due(&mut self) -> bool {
+        let is_due = self.until_next == 0;
+        self.until_next = self.until_next.saturating_sub(1);
+        is_due
+    }
+
+    fn note(&mut self, holds: bool) {
+        self.pause = if holds { 0 } else { (2 * self.pause).clamp(1, MOST_PAUSE) };
+        self.until_next = self.pause;
+    }
+
+    /// Returns those of a propagator that never tries one.
+    #[cfg(test)]
+    pub(super) fn never() -> Self {
+        Self { until_next: u32::MAX, pause: 0 }
+    }
+}
 
 impl<const D: usize> Propagator<D> {
     /// Makes a motion in which no part comes near another, if it is one; then nothing can object,
@@ -31,12 +63,54 @@ impl<const D: usize> Propagator<D> {
                 self.remember(heads.first, tally.from..tally.to);
             }
             self.tally.add(&tally);
+            self.leeway.settle(chain);
         } else {
             let run = tally.from..tally.to;
             chain.points_mut()[run.clone()].copy_from_slice(&self.leeway.noted()[run]);
+            self.leeway.go_back(way_m);
         }
-        self.leeway.ended(chain, way_m, !may);
         may
+    }
+
+    /// Makes a motion among obstacles in which no rod turns and no part comes near another, if it is one: every part is
+    /// then where it would be if each had been looked at.
+    pub(super) fn sweep_apart(
+        &mut self,
+        chain: &mut Chain<D>,
+        obstacles: &Obstacles<D>,
+        heads: &Heads<D>,
+    ) -> bool {
+        if !Leeway::is_for(chain) || !self.proofs.is_due() {
+            return false;
+        }
+        let rotated = self.tally.rotated;
+        self.rules.self_collision = false;
+        let followed = self.sweep_from(chain, obstacles, heads);
+        self.rules.self_collision = true;
+        // A rod that turns past an obstacle may have to turn past a part as well.
+        let holds = followed.is_ok() && self.tally.rotated == rotated && self.are_apart(chain);
+        if holds {
+            self.commit(chain, heads);
+            self.leeway.settle(chain);
+        }
+        self.tally.rotated = rotated;
+        self.proofs.note(holds);
+        holds
+    }
+
+    /// Whether the new places bring no part near another.
+    fn are_apart(&mut self, chain: &mut Chain<D>) -> bool {
+        self.leeway.note(chain);
+        let run = self.overlay.from..self.overlay.to;
+        let ways = self.overlay.placed().iter().zip(&chain.points()[run.clone()]);
+        let way_m = ways.map(|(new, old)| distance(*new, *old)).fold(0.0, f64::max);
+        chain.points_mut()[run.clone()].copy_from_slice(self.overlay.placed());
+        let are_apart = self.leeway.allows(chain, way_m);
+        chain.points_mut()[run.clone()].copy_from_slice(&self.leeway.noted()[run]);
+        if !are_apart {
+            self.leeway.go_back(way_m);
+        }
+        are_apart
     }
 
     /// Keeps the positions before a motion that the request may have to take back.

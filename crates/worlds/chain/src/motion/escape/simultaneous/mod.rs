@@ -3,6 +3,8 @@
 //! ```text
 //! solve.rs       where all parts go: contacts.rs, lengths.rs, and the laws.rs that hold whatever comes
 //! way_out.rs     what is done for parts that are caught: roll-outs of ways through an obstacle
+//! leading.rs     the leader's choice before anybody is caught: roll-outs of going on and of resting
+//! stage.rs       where roll-outs are made
 //! posture.rs     positions under trial
 //! ```
 //!
@@ -14,11 +16,13 @@
 mod contacts;
 mod given;
 mod laws;
+mod leading;
 mod lengths;
 #[cfg(test)]
 mod pinch;
 mod posture;
 mod solve;
+mod stage;
 #[cfg(test)]
 mod tests;
 mod way_out;
@@ -31,6 +35,8 @@ use crate::rods::obstacle::Obstacles;
 use crate::rods::rules::Rules;
 use crate::rods::veto::{Reason, Veto};
 use given::{Given, Through, Wishes};
+pub(crate) use leading::Lead;
+use leading::should_rest;
 use solve::Solver;
 pub use way_out::WayOut;
 
@@ -94,11 +100,23 @@ impl<const D: usize> Simultaneous<D> {
         told
     }
 
+    /// Whether a leader should rest.
+    pub(super) fn should_rest(
+        &self,
+        (chain, obstacles): (&Chain<D>, &Obstacles<D>),
+        rules: &Rules,
+        lead: &Lead<D>,
+    ) -> bool {
+        let most_m = self.rules.most_m();
+        let given = Given { chain, obstacles, rules, start: chain.points(), most_m };
+        should_rest(&self.rules, &given, lead)
+    }
+
     /// Finds the places of one step, in `best`; returns whether there are any.
     fn step(&mut self, given: &Given<'_, D>, way_out: &mut WayOut, told: &mut Escaped<D>) -> bool {
         let margin = self.rules.look_ahead();
         if !self.solver.look(given, margin) {
-            *way_out = WayOut::default();
+            way_out.forget();
             return false;
         }
         way_out.forget_what_is_passed(given, &self.solver);

@@ -1,4 +1,4 @@
-//! A bounded search for motions that avoid or leave the long pinches of `scenarios/chain/movers.toml`.
+//! A bounded search for motions that avoid or leave the long pinch of `scenarios/chain/movers.toml`.
 
 use super::*;
 use crate::rods::obstacle::Obstacle;
@@ -53,7 +53,7 @@ fn episodes(discs: usize, seed: u64) -> (World, Vec<Episode>) {
             past.pop_front();
         }
         run.advance(1);
-        if run.state().body(0).tally.is_inside {
+        if run.state().body(0).tally.inside_steps > 0 {
             since += 1;
             continue;
         }
@@ -144,14 +144,15 @@ fn motions(obstacles: &[u32], seed: u64) -> Vec<Vec<Leg>> {
     all
 }
 
-/// Of 24 runs, seeds 1 to 12 with 8 discs and with 16, four episodes are longer than 50 ticks. The search tries 1,481
-/// motions of each by the same solver at the same speed limit, from 2 s before on, in which nobody leads. So these are no
-/// pinches that no motion can leave: had the leader rested, the chain would have stayed out of them by itself.
+/// Of 24 runs, seeds 1 to 12 with 8 discs and with 16, one episode is longer than 50 ticks. The search tries 1,481 motions
+/// by the same solver at the same speed limit, from 2 s before on, in which nobody leads, with discs where they will be.
+/// So this is no pinch that no motion can leave; but the chain, which takes discs to go straight on, expects to be
+/// inside whether its leader goes on or rests, and then sets out on a way through a disc.
 #[test]
-#[ignore = "a search of some minutes"]
-fn no_long_pinch_would_be_one_if_the_leader_had_rested_two_seconds_before() {
+#[ignore = "a search of a minute"]
+fn the_only_long_pinch_would_be_none_if_the_chain_had_known_where_discs_turn_back() {
     let mut told = Vec::new();
-    for (discs, seed) in [(8, 6), (16, 5), (16, 8), (16, 9)] {
+    for (discs, seed) in [(16, 5)] {
         let (world, episodes) = episodes(discs, seed);
         for episode in &episodes {
             let motions = motions(&nearest(&world, episode), seed);
@@ -171,5 +172,5 @@ fn no_long_pinch_would_be_one_if_the_leader_had_rested_two_seconds_before() {
             told.push((episode.ticks, alone, bests));
         }
     }
-    assert_eq!(told, [57, 71, 78, 52].map(|ticks| (ticks, 0, [0; 3])));
+    assert_eq!(told, [(71, 0, [0; 3])]);
 }

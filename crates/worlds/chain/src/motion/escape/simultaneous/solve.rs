@@ -6,7 +6,7 @@
 
 use super::super::Margin;
 use super::super::threat::{Threat, left_of};
-use super::contacts::{Contacts, along_rod, nearest, radius_m};
+use super::contacts::{Contacts, along_rod, gap_m, nearest, radius_m};
 use super::given::{Given, Through, Wishes};
 use super::laws::{Bend, Laws};
 use super::lengths::Lengths;
@@ -31,6 +31,8 @@ pub(super) struct Solver<const D: usize> {
 /// Distance around an obstacle in which the chain goes along on a way through it, as a multiple of
 /// its longest rod.
 const ALONG: f64 = 2.0;
+/// Distance from which on an obstacle is passed, meters.
+const PASSED_M: f64 = 0.17;
 /// Part of a margin's violation that a round corrects.
 const SOFTLY: f64 = 0.3;
 /// Rounds in which only laws count, and the number of them between two checks.
@@ -200,6 +202,15 @@ impl<const D: usize> Solver<D> {
     fn keeps_laws(&self, given: &Given<'_, D>) -> bool {
         let Self { contacts, points, bends, .. } = self;
         Laws { given, points }.hold(contacts, bends)
+    }
+
+    /// Whether all parts are farther from an obstacle than it takes to have passed it.
+    pub(super) fn is_behind(&self, given: &Given<'_, D>, through: &Through<D>) -> bool {
+        let moving = given.obstacles.moving();
+        let threats = self.contacts.threats.iter();
+        threats
+            .filter(|t| moving[t.mover].id == through.obstacle)
+            .all(|threat| gap_m(given.chain, threat.part, &moving[threat.mover]) > PASSED_M)
     }
 
     /// Returns the least gap between the chain at some places and what moves, meters, and the

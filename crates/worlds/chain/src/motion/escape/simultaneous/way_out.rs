@@ -5,29 +5,26 @@
 //! obstacle that touches the chain, in some directions. Each is rolled out on the chain around the
 //! place, with obstacles going straight on, and the one with the least time inside is taken.
 
+use super::super::Escape;
 use super::super::threat::Part;
-use super::super::{Escape, Margin};
-use super::TOUCH_M;
-use super::contacts::radius_m;
-use super::given::{Given, Through, Wishes};
+use super::contacts::gap_m;
+use super::given::{Given, Through};
 use super::posture::ends;
 use super::solve::{Solver, away_from};
-use crate::rods::chain::Chain;
-use crate::rods::geometry::{
-    Point, add, along, cross, in_dimensions, norm, perpendicular, scaled, unit,
-};
-use crate::rods::obstacle::{Obstacle, Obstacles};
-use crate::rods::rules::Rules;
+use super::stage::{BETTER, Stage, Tried};
+use crate::rods::geometry::{Point, add, along, cross, in_dimensions, perpendicular, scaled, unit};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math::{cos, sin};
 use std::f64::consts::FRAC_PI_6;
 
-/// A chain's memory of how it gets out of where it was caught.
+/// A chain's memory of how it gets out of where it was caught, and of how its leader keeps it out.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct WayOut {
     passing: Option<Passing>,
     /// Ticks until another way may be looked for.
-    rest: u32,
+    pause: u32,
+    /// Whether its leader rests.
+    rests: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -37,23 +34,11 @@ struct Passing {
 }
 
 /// Ticks from one choice of a way to the next.
-const REST: u32 = 4;
-/// Distance at which a chain is in danger: another way is looked for; and distance from which on
-/// an obstacle is passed, meters.
+const PAUSE: u32 = 4;
+/// Distance at which a chain is in danger: another way is looked for, meters.
 const DANGER_M: f64 = 0.12;
-const PASSED_M: f64 = 0.17;
-/// Longest time of a roll-out, s, and most ticks; and ticks without contact after which it ends.
-const HORIZON_S: f64 = 3.0;
-const MOST_TICKS: usize = 150;
-const CLEAR_TICKS: usize = 75;
-/// Cost of depth, in ticks per meter and tick.
-const DEPTH_COST: f64 = 0.2;
-/// Factor by which a way must be better than the present one.
-const BETTER: f64 = 0.8;
 /// Most work of a choice: ticks of roll-outs times connectors in them.
 const MOST_WORK: usize = 100_000;
-/// Rounds of a solve in a roll-out, with margins and without.
-const ROUNDS: [usize; 2] = [12, 20];
 /// Connectors to either side of those in contact that roll-outs take along.
 const AROUND: usize = 12;
 
@@ -68,8 +53,23 @@ impl WayOut {
         self.passing.is_some()
     }
 
+    /// Whether the chain's leader rests, to keep it out.
+    pub(crate) fn rests(&self) -> bool {
+        self.rests
+    }
+
+    /// Remembers whether the leader rests.
+    pub(crate) fn set_rests(&mut self, rests: bool) {
+        self.rests = rests;
+    }
+
+    /// Forgets the way out, of a chain that nothing is near.
+    pub(super) fn forget(&mut self) {
+        *self = Self { rests: self.rests, ..Self::default() };
+    }
+
     pub(super) fn tick(&mut self) {
-        self.rest = self.rest.saturating_sub(1);
+        self.pause = self.pause.saturating_sub(1);
     }
 
     pub(super) fn through<const D: usize>(&self) -> Option<Through<D>> {
@@ -82,7 +82,7 @@ impl WayOut {
         given: &Given<'_, D>,
         solver: &Solver<D>,
     ) {
-        if self.through().is_some_and(|through| is_behind(given, solver, &through)) {
+        if self.through().is_some_and(|through| solver.is_behind(given, &through)) {
             self.passing = None;
         }
     }
@@ -95,19 +95,21 @@ impl WayOut {
         solver: &Solver<D>,
         gap_m: f64,
     ) -> bool {
-        if self.rest > 0 || gap_m > DANGER_M {
+        if self.pause > 0 || gap_m > DANGER_M {
             return false;
         }
-        self.rest = REST;
-        let Some(stage) = Stage::around(rules, given, solver) else { return false };
+        self.pause = PAUSE;
+        let around = in_danger(given, solver);
+        let Some(stage) = Stage::cut(rules, given, around) else { return false };
         let now = self.through();
-        let mut left = MOST_WORK / stage.chain.points().len();
-        let mut best = (BETTER * stage.cost(now, f64::INFINITY, &mut left) - 0.5, now);
+        let mut left = stage.ticks_for(MOST_WORK);
+        let cost_now = stage.cost(&Tried::way(now), f64::INFINITY, &mut left);
+        let mut best = (BETTER * cost_now - 0.5, now);
         for way in std::iter::once(None).chain(ways(given, solver).into_iter().map(Some)) {
             if left == 0 {
                 break;
             }
-            let cost = stage.cost(way, best.0, &mut left);
+            let cost = stage.cost(&Tried::way(way), best.0, &mut left);
             if cost < best.0 {
                 best = (cost, way);
             }
@@ -116,25 +118,6 @@ impl WayOut {
             best.1.map(|way| Passing { obstacle: way.obstacle, toward: in_dimensions(way.toward) });
         best.1 != now
     }
-}
-
-/// Whether all parts are farther from an obstacle than it takes to have passed it.
-fn is_behind<const D: usize>(
-    given: &Given<'_, D>,
-    solver: &Solver<D>,
-    through: &Through<D>,
-) -> bool {
-    let moving = given.obstacles.moving();
-    let threats = solver.contacts.threats.iter();
-    threats.filter(|t| moving[t.mover].id == through.obstacle).all(|threat| {
-        let mover = &moving[threat.mover];
-        gap_m(given.chain, threat.part, mover) > PASSED_M
-    })
-}
-
-fn gap_m<const D: usize>(chain: &Chain<D>, part: Part, mover: &Obstacle<D>) -> f64 {
-    let nearest = mover.core.nearest_to_segment(ends(chain.points(), part));
-    nearest.distance_m - mover.radius_m - radius_m(chain, part)
 }
 
 /// Returns the ways through the obstacles that touch the chain.
@@ -198,115 +181,10 @@ fn in_danger<const D: usize>(given: &Given<'_, D>, solver: &Solver<D>) -> (usize
     (from.min(to).saturating_sub(AROUND), (to + 1 + AROUND).min(last))
 }
 
-/// The chain around a place, and what moves near it: where ways are tried.
-struct Stage<'a, const D: usize> {
-    rules: &'a Rules,
-    chain: Chain<D>,
-    obstacles: Obstacles<D>,
-    margin: Margin,
-    dt_s: f64,
-    most_m: f64,
-    ticks: usize,
-}
-
-impl<'a, const D: usize> Stage<'a, D> {
-    /// Cuts out the stage; none if there is nothing to cut.
-    fn around(rules: &Escape, given: &Given<'a, D>, solver: &Solver<D>) -> Option<Self> {
-        let Given { chain, obstacles, most_m, .. } = *given;
-        let (from, to) = in_danger(given, solver);
-        let cut = Chain::broken(
-            chain.points()[from..=to].to_vec(),
-            chain.connectors()[from..=to].to_vec(),
-            chain.rods()[from..to].to_vec(),
-        );
-        let horizon_s = HORIZON_S.min(MOST_TICKS as f64 * rules.dt_s);
-        let mut near = obstacles.clone();
-        let middle = chain.points()[usize::midpoint(from, to)];
-        let reach_m: f64 = chain.rods()[from..to].iter().map(|rod| rod.max_m).sum();
-        let is_near = |o: &&Obstacle<D>| {
-            let way_m = horizon_s * (norm(o.velocity_m_s) + rules.speed_max_m_s);
-            o.core.nearest_to_point(middle).distance_m - o.radius_m < reach_m + way_m
-        };
-        let moving: Vec<_> = obstacles.moving().iter().filter(is_near).copied().collect();
-        near.set_moving(&moving).ok()?;
-        Some(Self {
-            rules: given.rules,
-            chain: cut.ok()?,
-            obstacles: near,
-            margin: rules.look_ahead(),
-            dt_s: rules.dt_s,
-            most_m,
-            ticks: (horizon_s / rules.dt_s).ceil() as usize,
-        })
-    }
-
-    /// Returns the time inside on a way, ticks, with something for depth; it may end early at
-    /// `enough`, or when no tick is `left`.
-    fn cost(&self, mut through: Option<Through<D>>, enough: f64, left: &mut usize) -> f64 {
-        let (mut chain, mut obstacles) = (self.chain.clone(), self.obstacles.clone());
-        let mut solver = Solver::default();
-        let (mut cost, mut clear) = (0.0, 0);
-        for _ in 0..self.ticks {
-            if *left == 0 {
-                return f64::INFINITY;
-            }
-            *left -= 1;
-            let start = chain.points().to_vec();
-            let given = Given {
-                chain: &chain,
-                obstacles: &obstacles,
-                rules: self.rules,
-                start: &start,
-                most_m: self.most_m,
-            };
-            let gap_m = self.tick(&given, &mut solver, &mut through);
-            chain.points_mut().copy_from_slice(&solver.points);
-            clear = if gap_m < -TOUCH_M { 0 } else { clear + 1 };
-            if clear == 0 {
-                cost += 1.0 - DEPTH_COST * gap_m;
-            }
-            if clear > CLEAR_TICKS || cost >= enough {
-                break;
-            }
-            obstacles.advance(self.dt_s);
-        }
-        cost
-    }
-
-    /// Makes one tick of a roll-out; the new places are the solver's. Returns the least gap,
-    /// meters.
-    fn tick(
-        &self,
-        given: &Given<'_, D>,
-        solver: &mut Solver<D>,
-        through: &mut Option<Through<D>>,
-    ) -> f64 {
-        if !solver.look(given, self.margin) {
-            solver.points.clear();
-            solver.points.extend_from_slice(given.chain.points());
-            return f64::INFINITY;
-        }
-        if through.is_some_and(|through| is_behind(given, solver, &through)) {
-            *through = None;
-        }
-        let (before_m, _) = solver.least_gap(given, given.chain.points());
-        let wishes = Wishes { margin: self.margin, through: *through, rounds: ROUNDS };
-        if solver.solve(given, &wishes) {
-            let (gap_m, _) = solver.least_gap(given, &solver.points);
-            if through.is_some() || gap_m >= before_m.min(0.0) {
-                return gap_m;
-            }
-        }
-        solver.points.clear();
-        solver.points.extend_from_slice(given.chain.points());
-        before_m
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rods::geometry::dot;
+    use crate::rods::geometry::{dot, norm};
 
     #[test]
     fn ways_are_unit_vectors_that_differ() {

@@ -7,9 +7,20 @@ fn far<const D: usize>() -> Obstacles<D> {
     Obstacles::new(vec![Obstacle::ball(0, [1e4; D], 1.0)], 1.0).unwrap()
 }
 
+/// Balls about the chain's start, and in its way.
+fn near<const D: usize>(seed: u64) -> Obstacles<D> {
+    let mut numbers = Numbers::new(seed ^ 0xba11);
+    let ball = |id| Obstacle::ball(id, numbers.point(12.0), 0.4);
+    Obstacles::new((0..if D == 2 { 12 } else { 60 }).map(ball).collect(), 1.0).unwrap()
+}
+
 /// Leads a chain about by one of its connectors, with the proof and without it; returns the numbers
 /// of motions and of vetoes.
-fn led_both_ways<const D: usize>(seed: u64, propagator: &mut Propagator<D>) -> [usize; 2] {
+fn led_both_ways<const D: usize>(
+    seed: u64,
+    propagator: &mut Propagator<D>,
+    [here, there]: [&Obstacles<D>; 2],
+) -> [usize; 2] {
     let mut numbers = Numbers::new(seed);
     let n_rods = 8 + (40.0 * numbers.unit()) as usize;
     let slack = if numbers.unit() < 0.5 { 0.0 } else { 0.3 };
@@ -18,18 +29,17 @@ fn led_both_ways<const D: usize>(seed: u64, propagator: &mut Propagator<D>) -> [
     let mut apart = crooked::<D>(seed, n_rods, rod, radius_m);
     let mut looked = apart.clone();
     propagator.rules = Rules { self_collision: true, ..Rules::default() };
-    let mut looking = propagator.clone();
+    let mut looking = Propagator { proofs: Proofs::never(), ..propagator.clone() };
     let k = if numbers.unit() < 0.5 { 0 } else { (n_rods as f64 * numbers.unit()) as usize };
     let (mut walk, mut vetoes) = (Wanderer::new(seed), 0);
     for _ in 0..60 {
         let to = walk.next(apart.points()[k], numbers.within(0.0, 0.6));
         let mode = if numbers.unit() < 0.5 { Mode::Exact } else { Mode::AsFarAsPossible };
         let request = Request { mode, ..Request::exact(k, to) };
-        let here = propagator.propagate(&mut apart, &Obstacles::default(), &request).unwrap();
-        let there = looking.propagate(&mut looked, &far(), &request).unwrap();
-        assert_eq!(here, there, "{seed}");
+        let outcome = propagator.propagate(&mut apart, here, &request).unwrap();
+        assert_eq!(outcome, looking.propagate(&mut looked, there, &request).unwrap(), "{seed}");
         assert_eq!(bits(&apart), bits(&looked), "{seed}");
-        if here.veto().is_some() {
+        if outcome.veto().is_some() {
             vetoes += 1;
             walk.turn();
         }
@@ -42,10 +52,16 @@ fn a_chain_in_its_own_way_moves_the_same_whether_or_not_its_parts_are_looked_at(
     // One propagator for all, because what it remembers of other chains must not matter.
     let (mut plane, mut space) = (Propagator::default(), Propagator::default());
     let mut sum = [0, 0];
+    let nowhere = (Obstacles::default(), Obstacles::default());
     for seed in 0..150 {
-        for [motions, vetoes] in
-            [led_both_ways::<2>(seed, &mut plane), led_both_ways::<3>(seed, &mut space)]
-        {
+        for [motions, vetoes] in [
+            led_both_ways::<2>(seed, &mut plane, [&nowhere.0, &far()]),
+            led_both_ways::<3>(seed, &mut space, [&nowhere.1, &far()]),
+            led_both_ways::<2>(seed, &mut plane, [&far(); 2]),
+            led_both_ways::<3>(seed, &mut space, [&far(); 2]),
+            led_both_ways::<2>(seed, &mut plane, [&near(seed); 2]),
+            led_both_ways::<3>(seed, &mut space, [&near(seed); 2]),
+        ] {
             sum = [sum[0] + motions, sum[1] + vetoes];
         }
     }

@@ -1,0 +1,204 @@
+//! The chain around a place, and what moves near it: where motions are rolled out.
+
+use super::super::{Escape, Margin};
+use super::given::{Given, Through, Wishes};
+use super::solve::Solver;
+use super::{PRESSED, TOUCH_M};
+use crate::rods::chain::Chain;
+use crate::rods::geometry::{Point, add, distance, norm};
+use crate::rods::obstacle::{Obstacle, Obstacles};
+use crate::rods::propagate::Propagator;
+use crate::rods::rules::Rules;
+use crate::rods::veto::Request;
+
+/// A part of a chain, and the obstacles that may come near it.
+pub(super) struct Stage<'a, const D: usize> {
+    rules: &'a Rules,
+    chain: Chain<D>,
+    obstacles: Obstacles<D>,
+    margin: Margin,
+    dt_s: f64,
+    most_m: f64,
+    ticks: usize,
+}
+
+/// The motions of a roll-out, beside those out of the way.
+#[derive(Clone, Copy)]
+pub(super) struct Tried<const D: usize> {
+    through: Option<Through<D>>,
+    /// The connector that leads, and its way in a tick, meters.
+    lead: Option<(usize, Point<D>)>,
+    /// Ticks without contact after which the roll-out ends.
+    clear: usize,
+}
+
+/// Factor by which a choice must be better than the present one.
+pub(super) const BETTER: f64 = 0.8;
+/// Longest time of a roll-out, s, and most ticks.
+const HORIZON_S: f64 = 3.0;
+const MOST_TICKS: usize = 150;
+/// Ticks without contact after which a way out has ended.
+const CLEAR_TICKS: usize = 75;
+/// Cost of depth, in ticks per meter and tick.
+const DEPTH_COST: f64 = 0.2;
+/// Rounds of a solve in a roll-out, with margins and without.
+const ROUNDS: [usize; 2] = [12, 20];
+
+impl<const D: usize> Tried<D> {
+    /// Returns a way through an obstacle, or none, while nobody leads.
+    pub(super) fn way(through: Option<Through<D>>) -> Self {
+        Self { through, lead: None, clear: CLEAR_TICKS }
+    }
+
+    /// Returns the way of a connector that leads, meters a tick.
+    pub(super) fn lead(k: usize, way_m: Point<D>) -> Self {
+        Self { through: None, lead: Some((k, way_m)), clear: MOST_TICKS }
+    }
+}
+
+impl<'a, const D: usize> Stage<'a, D> {
+    /// Cuts out the stage between two connectors; none if there is nothing to cut.
+    pub(super) fn cut(
+        rules: &Escape,
+        given: &Given<'a, D>,
+        (from, to): (usize, usize),
+    ) -> Option<Self> {
+        let Given { chain, obstacles, most_m, .. } = *given;
+        let cut = Chain::broken(
+            chain.points()[from..=to].to_vec(),
+            chain.connectors()[from..=to].to_vec(),
+            chain.rods()[from..to].to_vec(),
+        );
+        let horizon_s = HORIZON_S.min(MOST_TICKS as f64 * rules.dt_s);
+        let mut near = obstacles.clone();
+        let middle = chain.points()[usize::midpoint(from, to)];
+        let reach_m: f64 = chain.rods()[from..to].iter().map(|rod| rod.max_m).sum();
+        let is_near = |o: &&Obstacle<D>| {
+            let way_m = horizon_s * (norm(o.velocity_m_s) + rules.speed_max_m_s);
+            o.core.nearest_to_point(middle).distance_m - o.radius_m < reach_m + way_m
+        };
+        let moving: Vec<_> = obstacles.moving().iter().filter(is_near).copied().collect();
+        near.set_moving(&moving).ok()?;
+        Some(Self {
+            rules: given.rules,
+            chain: cut.ok()?,
+            obstacles: near,
+            margin: rules.look_ahead(),
+            dt_s: rules.dt_s,
+            most_m,
+            ticks: (horizon_s / rules.dt_s).ceil() as usize,
+        })
+    }
+
+    /// Whether something that moves may come near it.
+    pub(super) fn is_approached(&self) -> bool {
+        self.obstacles.moving().iter().any(Obstacle::is_moving)
+    }
+
+    /// Returns the ticks of roll-outs that some work allows, in ticks times connectors.
+    pub(super) fn ticks_for(&self, work: usize) -> usize {
+        work / self.chain.points().len()
+    }
+
+    /// Returns the time inside by some motions, ticks, with something for depth; it may end early at
+    /// `enough`, or when no tick is `left`.
+    pub(super) fn cost(&self, tried: &Tried<D>, enough: f64, left: &mut usize) -> f64 {
+        let (mut chain, mut obstacles) = (self.chain.clone(), self.obstacles.clone());
+        let (mut solver, mut propagator) = (Solver::default(), self.propagator());
+        let Tried { mut through, lead, clear: clear_ticks } = *tried;
+        let (mut cost, mut clear) = (0.0, 0);
+        if let Some(lead) = lead {
+            // This cycle's escape is over.
+            let start = chain.points().to_vec();
+            self.lead((&mut chain, &start), &obstacles, &mut propagator, lead);
+            obstacles.advance(self.dt_s);
+        }
+        for _ in 0..self.ticks {
+            if *left == 0 {
+                return f64::INFINITY;
+            }
+            *left -= 1;
+            let start = chain.points().to_vec();
+            let given = Given {
+                chain: &chain,
+                obstacles: &obstacles,
+                rules: self.rules,
+                start: &start,
+                most_m: self.most_m,
+            };
+            let gap_m = self.tick(&given, &mut solver, &mut through);
+            chain.points_mut().copy_from_slice(&solver.points);
+            clear = if gap_m < -TOUCH_M { 0 } else { clear + 1 };
+            if clear == 0 {
+                cost += 1.0 - DEPTH_COST * gap_m;
+            }
+            if clear > clear_ticks || cost >= enough {
+                break;
+            }
+            if let Some(lead) = lead.filter(|_| clear > 0) {
+                self.lead((&mut chain, &start), &obstacles, &mut propagator, lead);
+            }
+            obstacles.advance(self.dt_s);
+        }
+        cost
+    }
+
+    fn propagator(&self) -> Propagator<D> {
+        let slave_step_max_m = self.rules.slave_step_max_m.min(self.most_m);
+        Propagator::new(Rules { slave_step_max_m, ..*self.rules })
+    }
+
+    /// Leads the chain on, unless it needs its speed to get out of the way. `start` holds the places at the start
+    /// of the tick.
+    fn lead(
+        &self,
+        (chain, start): (&mut Chain<D>, &[Point<D>]),
+        obstacles: &Obstacles<D>,
+        propagator: &mut Propagator<D>,
+        (k, way_m): (usize, Point<D>),
+    ) {
+        let longest_m = |chain: &Chain<D>| {
+            let ways = start.iter().zip(chain.points());
+            ways.map(|(a, b)| distance(*a, *b)).fold(0.0, f64::max)
+        };
+        if longest_m(chain) > PRESSED * self.most_m {
+            return;
+        }
+        let escaped = chain.points().to_vec();
+        let to = add(chain.points()[k], way_m);
+        // Out of the range of coordinates nobody leads.
+        let went = propagator.propagate(chain, obstacles, &Request::exact(k, to));
+        if went.is_err() || longest_m(chain) > self.most_m {
+            chain.points_mut().copy_from_slice(&escaped);
+        }
+    }
+
+    /// Makes one tick of a roll-out; the new places are the solver's. Returns the least gap,
+    /// meters.
+    fn tick(
+        &self,
+        given: &Given<'_, D>,
+        solver: &mut Solver<D>,
+        through: &mut Option<Through<D>>,
+    ) -> f64 {
+        if !solver.look(given, self.margin) {
+            solver.points.clear();
+            solver.points.extend_from_slice(given.chain.points());
+            return f64::INFINITY;
+        }
+        if through.is_some_and(|through| solver.is_behind(given, &through)) {
+            *through = None;
+        }
+        let (before_m, _) = solver.least_gap(given, given.chain.points());
+        let wishes = Wishes { margin: self.margin, through: *through, rounds: ROUNDS };
+        if solver.solve(given, &wishes) {
+            let (gap_m, _) = solver.least_gap(given, &solver.points);
+            if through.is_some() || gap_m >= before_m.min(0.0) {
+                return gap_m;
+            }
+        }
+        solver.points.clear();
+        solver.points.extend_from_slice(given.chain.points());
+        before_m
+    }
+}
