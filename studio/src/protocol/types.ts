@@ -256,6 +256,10 @@ world: string, } | { "kind": "recording",
 /**
  * Its path, as a listing gave it.
  */
+path: string, } | { "kind": "fleet",
+/**
+ * The endpoint that the command line named.
+ */
 path: string, };
 
 /**
@@ -582,12 +586,24 @@ digest: string | null,
 /**
  * Of a recording: whether the digest was confirmed, or will be.
  */
-banner: string | null, };
+banner: string | null,
+/**
+ * Of a fleet: its nodes.
+ */
+fleet: Fleet | null, };
+
+/**
+ * A fleet at one moment.
+ */
+export type Fleet = { has_begun: boolean, silent_s: number, late_cycles: number, talk_p50_ms: number | null, talk_p99_ms: number | null, nodes: Array<Node>, };
+
+export type Node = { agent: number, state: string, epoch: number, heard: Array<number>, round: number, flown: number, late: number, lives: number, packets_per_s: number, bytes_per_s: number, silent_s: number | null, };
+
 
 /**
  * The activity of a session.
  */
-export type State = "playing" | "paused" | "seeking" | "over" | "failed";
+export type State = "playing" | "paused" | "seeking" | "watched" | "over" | "failed";
 
 /**
  * The scene, which stays as it is.

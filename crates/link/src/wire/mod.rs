@@ -4,6 +4,7 @@
 
 pub mod board;
 pub mod memory;
+pub mod window;
 pub mod zenoh;
 
 pub use crate::party::Party;

@@ -34,7 +34,8 @@ struct Page {
 fn means(folder: &std::path::Path, workers: usize) -> Means {
     let files = Files::below(&[folder.to_path_buf()]).expect("a folder");
     let budget = Arc::new(Budget::new(1 << 28, 1 << 28));
-    Means { worlds: WORLDS, files, workers, read_only: false, budget, showcase: None }
+    let screens = Vec::new();
+    Means { worlds: WORLDS, files, workers, read_only: false, budget, showcase: None, screens }
 }
 
 impl Page {
