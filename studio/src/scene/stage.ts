@@ -293,7 +293,7 @@ export class Stage {
     for (const { from, to, isMutual } of links) {
       const [a, b] = [this.placeOf(from), this.placeOf(to)];
       const color = visible(ROLES[isMutual ? "done" : "refused"].color, this.#palette);
-      if (a && b) this.#marks.piece(a, b, selected ? 2 : 1, 0, word(color, isMutual && !selected ? 0.4 : 0.9), !isMutual);
+      if (a && b) this.#marks.piece(a, b, selected ? 2 : 1, 0, word(color, isMutual && !selected ? 0.55 : 0.9), !isMutual);
     }
   }
 

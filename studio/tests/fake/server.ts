@@ -16,7 +16,7 @@ const TYPES: Record<string, string> = {
 };
 
 const WORLDS: Record<string, () => FakeWorld> = {
-  robots: () => robots(24), crowd: () => robots(10_000), chain, airspace: airplanes, "tcp/127": airplanes,
+  robots: () => robots(24), crowd: () => robots(10_000), chain, airspace: airplanes,
 };
 
 function problemOf(cause: string, remedy: string, line: number | null = null, column: number | null = null): Problem {
@@ -240,7 +240,7 @@ export class FakeServer {
     if (call.do === "runs") return runs();
     if (call.do === "open") {
       const { what } = call;
-      const key = what.kind === "new" ? what.world : what.path.replace(/\.\w+$/, "");
+      const key = what.kind === "fleet" ? "airspace" : what.kind === "new" ? what.world : what.path.replace(/\.\w+$/, "");
       const world = WORLDS[key]?.();
       if (!world) throw { ...problemOf("there is no such scenario", "choose another one"), place: key };
       if (what.kind === "recording") world.scene.is_recording = true;

@@ -3,7 +3,7 @@
 use crate::studio::Studio;
 use crate::support::{Ended, Place, requires, signal, wait_for};
 use serde_json::json;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::Child;
 
@@ -86,7 +86,7 @@ fn a_fleet_that_the_studio_watches_is_seen_to_its_end_steered_by_nobody_and_has_
     let place = place();
     let alone = place.json(&["run", "ring.toml"]);
     // It waits for a node that is not started yet, so whoever watches sees all of it.
-    let mut fleet = place.start(&["fleet", "ring.toml", "--nodes", "2", "--out", "r", "--json"]);
+    let mut fleet = place.start(&["fleet", "ring.toml", "--nodes", "2", "--out", "r"]);
     let at = endpoint(&mut fleet);
     let studio = Studio::start(&place, &[&at]);
     let mut page = studio.page();
@@ -122,7 +122,7 @@ fn a_fleet_that_the_studio_watches_is_seen_to_its_end_steered_by_nobody_and_has_
     assert!(nodes.iter().all(|node| node["flown"] == 12), "{nodes:?}");
     assert!(page.frames().iter().all(|frame| frame.starts_with(b"SSTF")));
     let ended = Ended(fleet.wait_with_output().expect("it ends"));
-    assert_eq!((ended.code(), &ended.json()["digest"]), (0, &alone["digest"]));
+    assert_eq!(ended.code(), 0, "{}", ended.err());
     assert_eq!(node.wait_with_output().expect("it ends").status.code(), Some(0));
     assert_eq!(place.json(&["replay", "r"])["digest"], alone["digest"]);
 }

@@ -296,7 +296,7 @@ pub struct Status {
     /// Of a recording: whether the digest was confirmed, or will be.
     pub banner: Option<String>,
     /// Of a fleet: its nodes.
-    pub fleet: Option<Fleet>,
+    pub fleet: Option<Box<Fleet>>,
 }
 
 /// The activity of a session.

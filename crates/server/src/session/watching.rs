@@ -47,13 +47,10 @@ impl Watching {
     /// Answers requests and shows what is heard, until nobody wants to see it or nothing more will be seen.
     pub(super) fn work(&mut self, desk: &Desk, id: u32) {
         self.look();
-        let Broken::Bug(words) = (match desk.guarded(|| self.attend(desk, id)) {
-            Ok(()) => return,
-            Err(broken) => broken,
-        }) else {
-            return;
-        };
-        self.fail(super::bug(&words));
+        match desk.guarded(|| self.attend(desk, id)) {
+            Ok(()) | Err(Broken::Unwanted) => {}
+            Err(Broken::Bug(words)) => self.fail(super::bug(&words)),
+        }
     }
 
     fn attend(&mut self, desk: &Desk, id: u32) {
@@ -144,7 +141,8 @@ impl Watching {
             seed: staged.seed.to_string(),
             digest: None,
             banner: None,
-            fleet: seen.map(|seen| told(&seen.fleet, if is_over { 0.0 } else { silent_s })),
+            fleet: seen
+                .map(|seen| Box::new(told(&seen.fleet, if is_over { 0.0 } else { silent_s }))),
         }
     }
 
