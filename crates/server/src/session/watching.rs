@@ -102,7 +102,11 @@ impl Watching {
 
     fn opened(&self) -> Answer {
         let staged = &self.screen.staged;
-        let scene = scene((&staged.world, &staged.agent), &staged.scenery, false);
+        let mut scene = scene((&staged.world, &staged.agent), &staged.scenery, false);
+        // Tabs are told apart by names, which scenarios need not have.
+        if scene.name.is_empty() {
+            scene.name.clone_from(&self.screen.endpoint);
+        }
         Answer::Opened { session: self.session, scene, status: self.status(&self.screen.now()) }
     }
 
