@@ -52,7 +52,7 @@ function view(action: Action, session: Session): void {
   if (action === "nearer" || action === "farther") stage?.zoom(action === "nearer" ? ZOOM : 1 / ZOOM);
   if (action === "fit") stage?.fit();
   if (action === "trails") session.trails = TRAILS[(TRAILS.indexOf(session.trails) + 1) % TRAILS.length]!;
-  if (action === "edit") page.edits = !page.edits;
+  if (action === "edit" && !session.isFleet) page.edits = !page.edits;
   if (action === "deselect") session.select(null);
   if (action === "filter") {
     page.tab = "agents";

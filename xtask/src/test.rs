@@ -25,7 +25,8 @@ struct Part {
 }
 
 /// Tests beside the code, and the promises of the library, whose golden digests hold with checks as well.
-const BESIDE: Part = Part { targets: &["--lib", "--bins", "--test", "promises"], environment: &CHECKS };
+const BESIDE: Part =
+    Part { targets: &["--lib", "--bins", "--test", "promises"], environment: &CHECKS };
 
 /// Tests from outside. Examples are compiled, so that none falls behind.
 const OUTSIDE: Part = Part { targets: &["--test", "*", "--examples"], environment: &[] };

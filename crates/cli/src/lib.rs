@@ -19,6 +19,7 @@ mod commands;
 mod console;
 mod exit;
 mod fleet_table;
+mod fleet_watch;
 mod interrupt;
 mod link;
 mod pages;

@@ -36,6 +36,13 @@ pub(crate) struct LinkArgs {
     #[arg(long)]
     log_json: bool,
 
+    #[command(flatten)]
+    tls: TlsArgs,
+}
+
+/// Options of certificates, with which both ends of every link prove who they are.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct TlsArgs {
     /// Certificate of the authority that has signed those of all parties (PEM)
     #[arg(long, value_name = "FILE", requires_all = ["tls_cert", "tls_key"], help_heading = "Encryption")]
     tls_ca: Option<PathBuf>,
@@ -58,18 +65,10 @@ fn seconds(text: &str) -> Result<f64, String> {
 impl LinkArgs {
     /// Returns the settings for a scenario.
     pub(crate) fn common(&self, file: PathBuf, overrides: Vec<String>) -> Common {
-        let files = (self.tls_ca.clone(), self.tls_cert.clone(), self.tls_key.clone());
-        let tls = match files {
-            (Some(authority), Some(certificate), Some(key)) => {
-                Some(Tls { authority, certificate, key })
-            }
-            // The command line gives all of them or none.
-            _ => None,
-        };
         let build = sidestep_session::build().into();
         Common {
             flown: Flown { file, overrides, build },
-            tls,
+            tls: self.tls.files(),
             lease_s: self.lease,
             metrics: self.metrics.clone(),
             json_log: self.log_json,
@@ -79,7 +78,20 @@ impl LinkArgs {
 
     /// Returns the protocol of endpoints.
     pub(crate) fn protocol(&self) -> &'static str {
-        if self.tls_ca.is_some() { "tls" } else { "tcp" }
+        if self.tls.tls_ca.is_some() { "tls" } else { "tcp" }
+    }
+}
+
+impl TlsArgs {
+    /// Returns the files, where there are any.
+    pub(crate) fn files(&self) -> Option<Tls> {
+        match (self.tls_ca.clone(), self.tls_cert.clone(), self.tls_key.clone()) {
+            (Some(authority), Some(certificate), Some(key)) => {
+                Some(Tls { authority, certificate, key })
+            }
+            // The command line gives all of them or none.
+            _ => None,
+        }
     }
 }
 

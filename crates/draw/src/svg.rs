@@ -121,7 +121,10 @@ impl Svg {
 
     /// Writes `text` with its baseline at `y`.
     pub(crate) fn text(&mut self, x: f64, y: f64, text: &str, look: &TextLook<'_>) {
-        let (x, y, size, fill) = (Num(x), Num(y), Num(look.size_px), look.fill);
+        let (x, y, size) = (Num(x), Num(y), Num(look.size_px));
+        // Ink is what the document fills with where nothing is said.
+        let fill =
+            if look.fill == INK { String::new() } else { format!(r#" fill="{}""#, look.fill) };
         let anchor = match look.anchor {
             Anchor::Start => "",
             Anchor::Middle => r#" text-anchor="middle""#,
@@ -135,7 +138,7 @@ impl Svg {
             String::new()
         };
         self.raw(format_args!(
-            r#"<text x="{x}" y="{y}" font-size="{size}" fill="{fill}"{anchor}{weight}{halo}{turn}>{}</text>"#,
+            r#"<text x="{x}" y="{y}" font-size="{size}"{fill}{anchor}{weight}{halo}{turn}>{}</text>"#,
             Escaped(text)
         ));
     }
@@ -172,7 +175,7 @@ impl Svg {
         let (width, height) = (Num(width_px.ceil()), Num(height_px.ceil()));
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
-             viewBox=\"0 0 {width} {height}\" font-family=\"{FAMILIES}\" role=\"img\">\n\
+             viewBox=\"0 0 {width} {height}\" fill=\"{INK}\" font-family=\"{FAMILIES}\" role=\"img\">\n\
              <title>{}</title>\n{ground}\n{}</svg>\n",
             Escaped(title),
             self.body

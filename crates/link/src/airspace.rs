@@ -2,10 +2,11 @@
 
 use crate::ports::{Absurd, Arrival, Channel, Doing, Outgoing, Program, Sent, Sight, Stage};
 use crate::words::{Begin, Fingerprint};
+use sidestep::kernel::network::Ether;
 use sidestep::kernel::ports::Envelope;
+use sidestep::kernel::view::{Frame, Look as View};
 use sidestep::kernel::{Cycle, Digest, EntityId, InputError};
 use sidestep::scenario::{Compiled, Source};
-use sidestep::kernel::network::Ether;
 use sidestep::worlds::airspace::deploy::Deployment;
 use sidestep::worlds::airspace::pilot::{Fleet, Packet, Pilot, Refusal, Sight as Percept};
 use sidestep::worlds::airspace::{AirspaceRun, AirspaceWorld};
@@ -59,12 +60,13 @@ pub struct Airspace<'a> {
     journey: Journey,
     watcher: &'a dyn Watcher,
     cycle_s: f64,
+    is_watched: bool,
 }
 
 impl<'a> Airspace<'a> {
     /// Returns the stage of a run.
     pub fn new(journey: Journey, watcher: &'a dyn Watcher) -> Self {
-        let mut stage = Self { journey, watcher, cycle_s: 0.0 };
+        let mut stage = Self { journey, watcher, cycle_s: 0.0, is_watched: false };
         stage.cycle_s = stage.run().world().timing.dt_s;
         stage
     }
@@ -129,6 +131,15 @@ impl Stage for Airspace<'_> {
         let next = self.journey.cycle() + 1;
         self.journey.advance_to(next, self.watcher)?;
         Ok(absurd)
+    }
+
+    fn frame(&mut self) -> Frame {
+        let run = self.journey.simulation_mut();
+        // Events are kept from now on: a fleet that nobody watches keeps none.
+        if !std::mem::replace(&mut self.is_watched, true) {
+            run.watch();
+        }
+        run.frame(View::BODIES)
     }
 }
 

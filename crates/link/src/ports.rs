@@ -1,6 +1,7 @@
 //! Ports of a fleet to its world, and of a node to its agent: both as bytes, so that any world can be flown.
 
 use crate::words::Begin;
+use sidestep::kernel::view::Frame;
 use sidestep::kernel::{Cycle, EntityId};
 
 /// The world of a fleet, at its server.
@@ -29,6 +30,9 @@ pub trait Stage {
         &mut self,
         controls: Vec<(EntityId, Vec<u8>)>,
     ) -> Result<Vec<Absurd>, sidestep_session::Error>;
+
+    /// Returns what is to be seen now, with the events since the frame before. Looking changes nothing.
+    fn frame(&mut self) -> Frame;
 }
 
 /// All that an agent perceives at the start of a cycle.

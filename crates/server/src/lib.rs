@@ -9,6 +9,7 @@
 //! encode/      frames as bytes       samples.rs   metrics against time    chronicle.rs   events
 //! files.rs     what may be read      write.rs     what may be written     beside.rs      what a text can name
 //! results/     reports, exports      zip.rs       answers made small
+//! screen.rs    fleets that fly elsewhere
 //! ```
 //! A session is a thread that owns a `Simulation`. Sockets pass requests to it by a channel and take replies, states
 //! and frames from an outbox into which sessions put without waiting. So nothing that a page does or leaves undone
@@ -30,6 +31,7 @@ pub mod protocol;
 mod request;
 mod results;
 mod samples;
+mod screen;
 mod serve;
 mod session;
 mod socket;
@@ -38,6 +40,7 @@ mod zip;
 
 pub use encode::Encoder;
 pub use request::{MOST_REQUEST_BYTES, decode};
+pub use screen::Screen;
 
 use files::Files;
 use guard::Guard;
@@ -86,6 +89,8 @@ pub struct Options {
     pub workers: usize,
     /// The settled address at which viewers of Foxglove's protocol watch the session that was opened last.
     pub foxglove: Option<ViewersAt>,
+    /// Fleets that fly elsewhere, which are opened and only watched.
+    pub screens: Vec<Arc<Screen>>,
 }
 
 /// A server that runs, until it is ended or dropped.
@@ -102,7 +107,13 @@ impl Studio {
     /// # Errors
     /// When something that was named is not there, or the port cannot be had.
     pub fn start(options: Options) -> Result<Self, Error> {
-        let (folders, open) = divided(&options.named);
+        let (folders, mut open) = divided(&options.named);
+        open.extend(
+            options
+                .screens
+                .iter()
+                .map(|screen| Named { kind: "fleet".into(), path: screen.endpoint.clone() }),
+        );
         let files = Files::below(&folders).map_err(|p| input(&p))?;
         let listener = listen::bind(&options.host, options.port)?;
         let failed = |e: std::io::Error| {
@@ -116,10 +127,10 @@ impl Studio {
         let guard = Guard::new(address, &options.host).map_err(failed)?;
         let token = guard.token().map(String::from);
         let (ending, ends) = watch::channel(false);
-        let Options { worlds, workers, read_only, program, foxglove, .. } = options;
+        let Options { worlds, workers, read_only, program, foxglove, screens, .. } = options;
         let budget = Arc::new(Budget::new(ALL_KEYFRAME_BYTES, KEYFRAME_BYTES));
         let showcase = foxglove.map(|at| Arc::new(Showcase::new(at)));
-        let means = Means { worlds, files, workers, read_only, budget, showcase };
+        let means = Means { worlds, files, workers, read_only, budget, showcase, screens };
         let house = Arc::new(House::new(means, guard, program, open, ends));
         let runtime =
             Builder::new_current_thread().enable_all().max_blocking_threads(MOST_ASIDES).build();

@@ -5,6 +5,7 @@
 //! the one before it has ended.
 
 use serde::{Deserialize, Serialize};
+use sidestep::kernel::view::{Frame, Scenery};
 use sidestep::kernel::words::Lines;
 use sidestep::kernel::{Cycle, EntityId, InputError};
 use std::path::PathBuf;
@@ -20,6 +21,8 @@ pub enum Job {
     Fleet(FleetJob),
     /// Fly one airplane of it.
     Node(NodeJob),
+    /// Watch a fleet that flies already.
+    Watch(WatchJob),
 }
 
 /// A scenario, and the build that is to fly it.
@@ -86,6 +89,19 @@ pub struct NodeJob {
     pub patience_s: f64,
 }
 
+/// Somebody who watches a fleet and takes no part in it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct WatchJob {
+    /// The build that asks: others may show something else.
+    pub build: String,
+    /// Endpoints at one of which the server is.
+    pub connect: Vec<String>,
+    /// Certificates, where links are encrypted.
+    pub tls: Option<Tls>,
+    /// Time in seconds that it waits for the server; after as long a silence the server is taken to be gone.
+    pub patience_s: f64,
+}
+
 /// The course of time in a fleet.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -128,6 +144,10 @@ pub enum Told {
     Listens(Vec<String>),
     /// The fleet as it is now.
     Fleet(FleetNow),
+    /// To who watches: what stays as it is.
+    Scene(Box<Staged>),
+    /// To who watches: the world and the fleet as they are now.
+    Seen(Box<Seen>),
     /// The fleet has come to its end, or was stopped.
     Ended {
         /// The summary of the run, as `summary.json` has it.
@@ -154,6 +174,35 @@ pub struct Failed {
     pub cause: String,
     /// The remedy.
     pub remedy: String,
+}
+
+/// All of a fleet that stays as it is, for who watches it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Staged {
+    /// The build of its server.
+    pub build: String,
+    /// The world's name.
+    pub world: String,
+    /// The noun for an agent, e.g. `airplane`.
+    pub agent: String,
+    /// The seed of the run.
+    pub seed: u64,
+    /// The scenery.
+    pub scenery: Scenery,
+}
+
+/// A world and its fleet at one moment, for who watches it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Seen {
+    /// Its number among all that were shown, from 1.
+    pub number: u64,
+    /// The bodies; its log has the last events of the run, not only those since the frame before, which a viewer may
+    /// not have seen.
+    pub frame: Frame,
+    /// The nodes.
+    pub fleet: FleetNow,
+    /// Whether the fleet has come to its end.
+    pub is_over: bool,
 }
 
 /// A fleet at one moment.

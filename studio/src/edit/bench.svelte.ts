@@ -57,9 +57,10 @@ export class Bench {
   #items(): Item[] {
     const { model } = this.draft;
     const { world, dimensions } = this.session.scene;
-    if (!model || dimensions !== 2) return [];
+    if (!model) return [];
+    if (world === "chain") return chainItems(model, this.m_per_px, dimensions === 3 ? 3 : 2);
+    if (dimensions !== 2) return [];
     if (world === "robots") return this.ground ? robotItems(model, this.ground) : [];
-    if (world === "chain") return chainItems(model, this.m_per_px);
     return world === "airspace" ? airplaneItems(model, this.m_per_px) : [];
   }
 
@@ -214,7 +215,9 @@ export class Bench {
   /** What is at a place, in words. */
   wordsAt(to: Place): string {
     const { ground, board } = this;
-    if (!ground) return `x ${to[0].toPrecision(4)} m, y ${to[1].toPrecision(4)} m`;
+    const meters = (axis: string, value: number): string => `${axis} ${value.toPrecision(4)} m`;
+    const height = this.session.scene.dimensions === 3 ? `, ${meters("z", to[2])}` : "";
+    if (!ground) return `${meters("x", to[0])}, ${meters("y", to[1])}${height}`;
     const cell = cellOf(ground, to[0], to[1]);
     const mark = board?.markAt(cell);
     const what = mark === "#" ? ", wall" : mark === "?" ? ", unknown" : mark === "." ? ", free" : "";

@@ -1,9 +1,10 @@
 /** Draws what is worked on over the picture: boxes, outlines, handles and the cursor. */
 
 import type { Place } from "../protocol";
-import type { PlaneEye } from "../scene/camera";
+import type { Eye } from "../scene/camera";
 import { css, mixed, ROLES, visible, type Palette, type Rgb } from "../scene/palette";
 import { placeOf, type Board, type Ground, type Mark } from "./board";
+import { AXIS_NAMES, handlesAt } from "./axes";
 import type { Cell } from "./cells";
 import type { Item } from "./tools/item";
 
@@ -28,15 +29,17 @@ export interface Sketch {
   shape: "circle" | "line" | "box" | null;
   /** Where the dragged item would come to stand. */
   shifted: { item: Item; by: Place } | null;
+  /** Where the handles of the axes stand, in space. */
+  axesAt: Place | null;
   cursor: Place | null;
 }
 
 export class Sketcher {
   readonly #pen: CanvasRenderingContext2D;
-  readonly #eye: PlaneEye;
+  readonly #eye: Eye;
   readonly #palette: Palette;
 
-  constructor(pen: CanvasRenderingContext2D, eye: PlaneEye, palette: Palette) {
+  constructor(pen: CanvasRenderingContext2D, eye: Eye, palette: Palette) {
     this.#pen = pen;
     this.#eye = eye;
     this.#palette = palette;
@@ -50,12 +53,13 @@ export class Sketcher {
     if (ground) this.#cells(ground, sketch.cells, sketch.mark);
     for (const item of sketch.items) this.#item(item, item === sketch.chosen, sketch.wrong.has(item), [0, 0, 0]);
     if (sketch.shifted) this.#item(sketch.shifted.item, true, false, sketch.shifted.by);
+    if (sketch.axesAt) this.#axes(sketch.axesAt);
     if (sketch.stroke && sketch.shape) this.#stroke(...sketch.stroke, sketch.shape);
     if (sketch.cursor) this.#cursor(sketch.cursor);
   }
 
-  #px([x, y]: Place): [number, number] {
-    const [px, py] = this.#eye.project(x, y);
+  #px(at: Place): [number, number] {
+    const [px, py] = this.#eye.project(...at);
     return [px, py];
   }
 
@@ -112,9 +116,11 @@ export class Sketcher {
   }
 
   #item(item: Item, isChosen: boolean, isWrong: boolean, by: Place): void {
+    const [, , inFront] = this.#eye.project(...item.at_m);
+    if (!inFront) return;
     const pen = this.#pen;
     const color = isWrong ? ROLES.refused.color : item.kind === "goal" ? ROLES.target.color : item.kind === "area" ? ROLES.claim.color : ROLES.done.color;
-    const at = (p: Place): Place => [p[0] + by[0], p[1] + by[1], 0];
+    const at = (p: Place): Place => [p[0] + by[0], p[1] + by[1], p[2] + by[2]];
     const ink = css(visible(color, this.#palette));
     pen.strokeStyle = ink;
     pen.lineWidth = isChosen ? 3.5 : 1.5;
@@ -144,6 +150,31 @@ export class Sketcher {
     pen.lineWidth = isChosen ? 3.5 : 2;
     pen.strokeStyle = ink;
     pen.stroke();
+  }
+
+  /** Arrows along the axes, with their letters. */
+  #axes(at: Place): void {
+    const pen = this.#pen;
+    const colors: readonly Rgb[] = [ROLES.refused.color, ROLES.true.color, ROLES.wish.color];
+    for (const { axis, tip_m } of handlesAt(this.#eye, at)) {
+      const [[x, y], [tx, ty]] = [this.#px(at), this.#px(tip_m)];
+      const color = css(visible(colors[axis]!, this.#palette));
+      pen.beginPath();
+      pen.moveTo(x, y);
+      pen.lineTo(tx, ty);
+      pen.lineWidth = 2.5;
+      pen.strokeStyle = color;
+      pen.stroke();
+      pen.beginPath();
+      pen.arc(tx, ty, HANDLE_PX + 2, 0, 2 * Math.PI);
+      pen.fillStyle = color;
+      pen.fill();
+      pen.font = "bold 11px system-ui, sans-serif";
+      pen.textAlign = "center";
+      pen.textBaseline = "middle";
+      pen.fillStyle = "#000";
+      pen.fillText(AXIS_NAMES[axis], tx, ty + 0.5);
+    }
   }
 
   #flag(at: Place): void {
@@ -207,9 +238,12 @@ export function changedCells(board: Board, shown: Uint8Array | null): Cell[] {
 }
 
 /** The item at a point of the canvas: handles first, then what lies under it. */
-export function itemAt(items: readonly Item[], eye: PlaneEye, x_px: number, y_px: number): Item | null {
-  const px = ([x, y]: Place): [number, number] => [eye.project(x, y)[0], eye.project(x, y)[1]];
-  const near = ({ at_m }: Item, within: number): boolean => Math.hypot(px(at_m)[0] - x_px, px(at_m)[1] - y_px) <= within;
+export function itemAt(items: readonly Item[], eye: Eye, x_px: number, y_px: number): Item | null {
+  const px = (at: Place): [number, number] => {
+    const [x, y] = eye.project(...at);
+    return [x, y];
+  };
+  const near = ({ at_m }: Item, within: number): boolean => eye.project(...at_m)[2] && Math.hypot(px(at_m)[0] - x_px, px(at_m)[1] - y_px) <= within;
   const byHandle = items.findLast((item) => item.kind !== "area" && item.kind !== "body" && near(item, HANDLE_PX + 4));
   if (byHandle) return byHandle;
   const bodies = items.filter((item) => item.kind === "body" || item.kind === "area");

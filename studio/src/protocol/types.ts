@@ -256,6 +256,10 @@ world: string, } | { "kind": "recording",
 /**
  * Its path, as a listing gave it.
  */
+path: string, } | { "kind": "fleet",
+/**
+ * The endpoint that the command line named.
+ */
 path: string, };
 
 /**
@@ -531,11 +535,11 @@ problem: Problem, };
  */
 export type Named = {
 /**
- * `scenario`, `recording` or `sweep`.
+ * `scenario`, `recording`, `sweep` or `fleet`.
  */
 kind: string,
 /**
- * Its path.
+ * Its path, or the endpoint of a fleet.
  */
 path: string, };
 
@@ -582,12 +586,94 @@ digest: string | null,
 /**
  * Of a recording: whether the digest was confirmed, or will be.
  */
-banner: string | null, };
+banner: string | null,
+/**
+ * Of a fleet: its nodes.
+ */
+fleet: Fleet | null, };
 
 /**
  * The activity of a session.
  */
-export type State = "playing" | "paused" | "seeking" | "over" | "failed";
+export type State = "playing" | "paused" | "seeking" | "watched" | "over" | "failed";
+
+/**
+ * A fleet at one moment.
+ */
+export type Fleet = {
+/**
+ * Whether all nodes have joined.
+ */
+has_begun: boolean,
+/**
+ * Seconds since its server was heard.
+ */
+silent_s: number,
+/**
+ * Number of cycles that began late, in real time.
+ */
+late_cycles: number,
+/**
+ * Median time in milliseconds from the percepts of a cycle to its last control.
+ */
+talk_p50_ms: number | null,
+/**
+ * The time in milliseconds below which 99 of 100 of them are.
+ */
+talk_p99_ms: number | null,
+/**
+ * The nodes, by rising number of the agent.
+ */
+nodes: Array<Node>, };
+
+/**
+ * The node of an agent.
+ */
+export type Node = {
+/**
+ * The agent's number.
+ */
+agent: number,
+/**
+ * A word for its state: `awaited`, `joined`, `gone`, or its part in the cycle.
+ */
+state: string,
+/**
+ * Epoch of the coordinator that it follows.
+ */
+epoch: number,
+/**
+ * Numbers of the agents that it has heard in the last cycle.
+ */
+heard: Array<number>,
+/**
+ * The round of its talk.
+ */
+round: number,
+/**
+ * Number of its controls that were flown.
+ */
+flown: number,
+/**
+ * Number of its controls that came late, or not at all.
+ */
+late: number,
+/**
+ * Number of times that it has joined.
+ */
+lives: number,
+/**
+ * Packets that it sends in a second.
+ */
+packets_per_s: number,
+/**
+ * Bytes that it sends in a second.
+ */
+bytes_per_s: number,
+/**
+ * Seconds since the server has heard it; none of one that it has never heard.
+ */
+silent_s: number | null, };
 
 /**
  * The scene, which stays as it is.

@@ -21,6 +21,10 @@ export interface Eye {
   center(at: Place): void;
   /** Meters of a pixel at the point that is looked at. */
   readonly mPerPx: number;
+  /** The point that is looked at. */
+  readonly middle: Place;
+  /** The place at a point of the canvas; in space that one of them which is as far away as another place. */
+  under(x_px: number, y_px: number, as: Place): Place;
   /** Where a place appears: x and y in pixels, and whether in front. */
   project(x: number, y: number, z: number): [number, number, boolean];
 }
@@ -83,6 +87,14 @@ export class PlaneEye implements Eye {
       this.x + (x_px - this.#width / 2) * this.mPerPx,
       this.y - (y_px - this.#height / 2) * this.mPerPx,
     ];
+  }
+
+  get middle(): Place {
+    return [this.x, this.y, 0];
+  }
+
+  under(x_px: number, y_px: number): Place {
+    return [...this.at(x_px, y_px), 0];
   }
 
   project(x: number, y: number): [number, number, boolean] {
@@ -157,6 +169,18 @@ export class SpaceEye implements Eye {
   center(at: Place): void {
     this.target.set(...at);
     this.#update();
+  }
+
+  get middle(): Place {
+    return this.target.toArray();
+  }
+
+  under(x_px: number, y_px: number, as: Place): Place {
+    const from = this.camera.position;
+    const way = new Vector3((2 * x_px) / this.#width - 1, 1 - (2 * y_px) / this.#height, 0.5).unproject(this.camera).sub(from);
+    const ahead = this.camera.getWorldDirection(new Vector3());
+    const far = ahead.dot(new Vector3(...as).sub(from)) / ahead.dot(way);
+    return way.multiplyScalar(far).add(from).toArray();
   }
 
   project(x: number, y: number, z: number): [number, number, boolean] {

@@ -18,6 +18,8 @@ export class Quads {
   readonly #columns: Record<string, Column>;
   /** One entry for each quad; the attributes have four. */
   readonly #entries: Record<string, Numbers> = {};
+  /** The entries as the renderer has them: most columns stay from one picture to the next. */
+  readonly #sent: Record<string, Numbers> = {};
   #capacity = 0;
 
   constructor(columns: Record<string, Column>, material: RawShaderMaterial) {
@@ -41,6 +43,7 @@ export class Quads {
       const before = this.#entries[name];
       if (before) entries.set(before);
       this.#entries[name] = entries;
+      this.#sent[name] = entries.slice().fill(0);
       const corners = bytes ? new Uint8Array(16 * this.#capacity) : new Float32Array(4 * size * this.#capacity);
       geometry.setAttribute(name, new BufferAttribute(corners, size, bytes === true).setUsage(DynamicDrawUsage));
     }
@@ -63,10 +66,13 @@ export class Quads {
     this.mesh.visible = count > 0;
     if (count === 0) return;
     for (const [name, { size, bytes }] of Object.entries(this.#columns)) {
+      const [entries, sent, numbers] = [this.#entries[name]!, this.#sent[name]!, count * (bytes ? 1 : size)];
+      if (isSame(entries, sent, numbers)) continue;
+      sent.set(entries.subarray(0, numbers));
       const attribute = geometry.getAttribute(name) as BufferAttribute;
       const { array } = attribute;
       const corners = bytes ? new Uint32Array(array.buffer) : (array as Float32Array);
-      spread(this.#entries[name]!, corners, bytes ? 1 : size, count);
+      spread(entries, corners, bytes ? 1 : size, count);
       attribute.clearUpdateRanges();
       attribute.addUpdateRange(0, 4 * count * size);
       attribute.needsUpdate = true;
@@ -84,6 +90,11 @@ function trianglesOf(quads: number): Uint32Array {
   const index = new Uint32Array(6 * quads);
   for (let i = 0; i < quads; i++) index.set([4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 2, 4 * i + 1, 4 * i + 3], 6 * i);
   return index;
+}
+
+function isSame(a: Numbers, b: Numbers, count: number): boolean {
+  for (let i = 0; i < count; i++) if (a[i] !== b[i]) return false;
+  return true;
 }
 
 /** Writes each entry four times. */

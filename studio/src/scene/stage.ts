@@ -4,6 +4,7 @@ import { Color, Group, Scene as Graph, SRGBColorSpace, WebGLRenderer, type Mesh 
 import type { Frame } from "../decode";
 import type { Inspection, Place, Role, Scene, Who } from "../protocol";
 import type { Bodies } from "../state/cast";
+import type { Link } from "../fleet/links";
 import type { TrailChoice } from "../state/session.svelte";
 import { PlaneEye, SpaceEye, type Extent, type Eye } from "./camera";
 import { extentOf, flatRadiusOf } from "./extent";
@@ -11,7 +12,7 @@ import { FloorLayer } from "./floor";
 import { drawGrid } from "./grid";
 import { drawMarks, drawScans, fillAreas } from "./marks";
 import { Overlay, type Label } from "./overlay";
-import { paletteOf, visible, word, type Palette } from "./palette";
+import { paletteOf, ROLES, visible, word, type Palette } from "./palette";
 import { pick } from "./pick";
 import { PlanePainter } from "./plane";
 import { SpacePainter } from "./space";
@@ -34,6 +35,8 @@ export interface Choices {
   inspection: Inspection | null;
   trails: TrailChoice;
   widthIsTrue: boolean;
+  /** Who hears whom, in a fleet; by the bodies' indices. */
+  links: readonly Link[];
 }
 
 /** Bodies with names of their own are labeled if there are not more. */
@@ -81,7 +84,7 @@ export class Stage {
   #bodies: Bodies | null = null;
   #frame: Frame | null = null;
   #trails: Trails | null = null;
-  #choices: Choices = { selected: null, inspection: null, trails: "none", widthIsTrue: false };
+  #choices: Choices = { selected: null, inspection: null, trails: "none", widthIsTrue: false, links: [] };
   #hovered: number | undefined;
   #extent: Extent;
   #size: [number, number] = [1, 1];
@@ -279,8 +282,19 @@ export class Stage {
     const roles = drawMarks(marks, this.#marks, this.#palette);
     const scans = selected && this.#frame ? this.#frame.text.scans : [];
     for (const role of drawScans(scans, this.#marks, this.#palette)) roles.add(role);
+    this.#drawLinks();
     this.#marks.end();
     this.#roles = roles;
+  }
+
+  /** Thin where all links are drawn, as there are many then. */
+  #drawLinks(): void {
+    const { links, selected } = this.#choices;
+    for (const { from, to, isMutual } of links) {
+      const [a, b] = [this.placeOf(from), this.placeOf(to)];
+      const color = visible(ROLES[isMutual ? "done" : "refused"].color, this.#palette);
+      if (a && b) this.#marks.piece(a, b, selected ? 2 : 1, 0, word(color, isMutual && !selected ? 0.55 : 0.9), !isMutual);
+    }
   }
 
   #dropAreas(): void {

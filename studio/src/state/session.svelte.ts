@@ -2,6 +2,7 @@
 
 import { Credit } from "../credit";
 import { decodeFrame, FrameError, type Frame } from "../decode";
+import { linksOf, type Link } from "../fleet/links";
 import { LOST, Refused, problemOf } from "../connection";
 import { firstSpeed, SPEEDS, whoKey } from "../format";
 import type { Answer, Call, Cast, Event, Inspection, Problem, Scene, Speed, Status, Subject, Who } from "../protocol";
@@ -116,6 +117,10 @@ export class Session {
   async resume(): Promise<number> {
     const { cycle, isPlaying, seed } = this.#kept ?? { cycle: 0, isPlaying: false, seed: null };
     const { id } = this;
+    if (this.isFleet) {
+      this.#kept = null;
+      return this.shown.cycle;
+    }
     if (this.text !== null) await this.restart(seed, this.text);
     if (cycle > 0) await this.#seeker.to(cycle);
     if (id !== this.id) return cycle;
@@ -136,13 +141,18 @@ export class Session {
     this.starts++;
   }
 
+  /** Whether it is a fleet that flies elsewhere: it is watched, and nothing is asked of it. */
+  get isFleet(): boolean {
+    return this.subject.kind === "fleet";
+  }
+
   /** The seed, where a number of the page can hold it; a recording has none but its own. */
   get seed(): number | null {
     return this.#kept ? this.#kept.seed : this.#ownSeed;
   }
 
   get #ownSeed(): number | null {
-    if (this.subject.kind === "recording") return null;
+    if (this.subject.kind === "recording" || this.isFleet) return null;
     const seed = Number(this.status.seed);
     return this.status.seed !== "" && Number.isSafeInteger(seed) ? seed : null;
   }
@@ -164,6 +174,18 @@ export class Session {
   get lastCycle(): number {
     const planned = this.status.cycles_planned;
     return Number.isFinite(planned) && planned !== null && planned > 0 ? planned : Math.max(100, this.status.cycle);
+  }
+
+  /** Who hears whom in a fleet, by the indices of bodies; of the selected agent alone where one is. */
+  get links(): Link[] {
+    const { bodies, selected } = this;
+    const { fleet } = this.status;
+    if (!fleet || !bodies) return [];
+    const index = (number: number): number | undefined => bodies.find({ kind: this.scene.agent, number, part: null });
+    return linksOf(fleet, selected?.number ?? null).flatMap(({ from, to, isMutual }) => {
+      const [a, b] = [index(from), index(to)];
+      return a === undefined || b === undefined ? [] : [{ from: a, to: b, isMutual }];
+    });
   }
 
   subscribe(onFrame: () => void): () => void {
@@ -260,7 +282,7 @@ export class Session {
     this.events
       .fetch(cycle, (from, until, most) => this.#ask({ do: "events", from, until, most }))
       .catch(quiet);
-    if (withMetrics) this.metrics.fetch((from) => this.#ask({ do: "metrics", from })).catch(quiet);
+    if (withMetrics && !this.isFleet) this.metrics.fetch((from) => this.#ask({ do: "metrics", from })).catch(quiet);
   }
 
   // What the page can do with it.
@@ -312,6 +334,7 @@ export class Session {
 
   /** Goes to a cycle; while one is under way only the latest wish is kept. */
   seek(cycle: number): void {
+    if (this.isFleet) return;
     this.#order();
     void this.#seeker.to(Math.round(Math.min(Math.max(0, cycle), this.lastCycle)));
   }
@@ -429,7 +452,7 @@ export class Session {
   }
 
   #inspectSoon(): void {
-    if (!this.selected || this.#isInspecting || this.#inspectTimer !== null) return;
+    if (!this.selected || this.isFleet || this.#isInspecting || this.#inspectTimer !== null) return;
     const wait_ms = Math.max(0, this.#inspectedAt_ms + INSPECT_EVERY_MS - performance.now());
     this.#inspectTimer = setTimeout(() => {
       this.#inspectTimer = null;

@@ -85,8 +85,8 @@ export class Studio {
 
   /** The sessions that a transport command is meant for. */
   get led(): Session[] {
-    if (this.inStep) return this.sessions;
-    return this.active ? [this.active] : [];
+    const meant = this.inStep ? this.sessions : this.sessions.filter((session) => session === this.active);
+    return meant.filter((session) => !session.isFleet);
   }
 
   /** The sessions that are to be seen. */
@@ -119,7 +119,8 @@ export class Studio {
     }
     const session = new Session(subject, { ask: this.ask, problem: (problem) => this.problem(problem) });
     if (!(await this.#openAt(session, seed))) return false;
-    remember(subject, session.scene.name);
+    // The studio knows a fleet only as long as its command line names it.
+    if (!session.isFleet) remember(subject, session.scene.name);
     this.sessions = [...this.sessions, session];
     this.activeKey = session.key;
     this.#deliver(session);
@@ -183,7 +184,7 @@ export class Studio {
   get pair(): [Session, Session] | null {
     const active = this.active;
     const other = this.sessions.find((one) => one !== active);
-    if (!this.inStep || !active || !other) return null;
+    if (!this.inStep || !active || !other || active.isFleet || other.isFleet) return null;
     return this.sessions.indexOf(other) < this.sessions.indexOf(active) ? [other, active] : [active, other];
   }
 

@@ -137,10 +137,58 @@ describe("the canvas", () => {
     expect(await edited(3)).toEqual({ op: "remove", key: "robots.0" });
   });
 
-  test("obstacles of chains in space and routes of airplanes: told, put and moved", async () => {
+  /** Where the chosen thing and the tips of its axes are on the screen. */
+  async function axes(): Promise<[number, number][]> {
+    const layer = page.locator("canvas.layer");
+    await page.waitForFunction(() => (document.querySelector<HTMLElement>("canvas.layer")?.dataset.axes ?? "") !== "");
+    return layer.evaluate((canvas: HTMLElement) => {
+      const box = canvas.getBoundingClientRect();
+      return canvas.dataset.axes!.split(" ").map((point) => {
+        const [x, y] = point.split(",").map(Number) as [number, number];
+        return [box.left + x, box.top + y] as [number, number];
+      });
+    });
+  }
+
+  async function pull([x, y]: [number, number], dx: number, dy: number): Promise<void> {
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    await page.mouse.move(x + dx, y + dy, { steps: 6 });
+    await page.mouse.up();
+  }
+
+  test("what chains in space start from, go to and must avoid is moved along axes, in the view and by keys, and put back", async () => {
     await draws("chain");
-    await page.getByText("A scene in space is changed in its forms").waitFor();
-    await page.context().close();
+    await page.locator("canvas.layer").focus();
+    await page.keyboard.press("n");
+    const [, , , up] = await axes();
+    await pull(up!, 0, -80);
+    const lifted = (await edited(1)) as { key: string; value: number[] };
+    expect([lifted.key, lifted.value[0], lifted.value[1]]).toEqual(["obstacles.0.at_m", 1, 2]);
+    expect(lifted.value[2]).toBeGreaterThan(0.6);
+    const [middle] = await axes();
+    await pull(middle!, 70, 0);
+    const aside = (await edited(2)) as { key: string; value: number[] };
+    expect(aside.key).toBe("obstacles.0.at_m");
+    // The view is level: what goes sideways in it stays at its height.
+    expect(aside.value[2]).toBeCloseTo(lifted.value[2]!, 1);
+    expect(Math.hypot(aside.value[0]! - 1, aside.value[1]! - 2)).toBeGreaterThan(0.2);
+    await page.locator("canvas.layer").focus();
+    for (const name of ["obstacles.1.at_m", "chains.0.at_m", "chains.0.tasks.0.targets_m.0"]) {
+      await page.keyboard.press("n");
+      for (const key of ["Enter", "PageUp", "PageUp", "Enter"]) await page.keyboard.press(key);
+      await expect.poll(() => edits().at(-1)?.key, { timeout: 30_000 }).toBe(name);
+      await checked();
+    }
+    for (let i = 0; i < 5; i++) await page.getByRole("button", { name: "Undo" }).click();
+    await checked();
+    expect(text()).toContain("at_m = [1.0, 2.0, 0.5]");
+    expect(await page.getByRole("button", { name: "Undo" }).isDisabled()).toBe(true);
+    await page.screenshot({ path: "screenshots/edit-space-1280.png" });
+    expect(complaints).toEqual([]);
+  });
+
+  test("routes of airplanes are put and moved", async () => {
     await draws("airspace");
     await hand.drag([-4000, 0], [-3000, 2000]);
     const moved = await edited(1);

@@ -40,10 +40,16 @@ const CHAIN = `format = 1
 world = "chain"
 name = "Made-up snake"
 [[obstacles]]
-at_m = [1.0, 2.0]
+at_m = [1.0, 2.0, 0.5]
 radius_m = 0.5
+[[obstacles]]
+at_m = [-2.0, -1.0, 0.5]
+size_m = [1.0, 0.6, 0.8]
 [[chains]]
-at_m = [0.0, 0.0]
+at_m = [0.0, 0.0, 0.0]
+[[chains.tasks]]
+kind = "reach"
+targets_m = [[2.0, 0.0, 1.0]]
 `;
 
 const AIRSPACE = `format = 1
@@ -91,7 +97,7 @@ export const SCHEMA: Table = {
   },
 };
 
-const KEYS = /^(robots|people|doors|obstacles|airplanes|format|world|name|seed|count|size|cycles|box_size_m|ascii|observations|nothing|wall|robot|at|sensors|regime|region|events|callsign|at_m|heading_deg|way_points_m|radius_m|ends_m|size_m|kind|goals|repeat|open|closed|periodic|period|behaviour|effector)$/;
+const KEYS = /^(robots|people|doors|obstacles|airplanes|targets_m|format|world|name|seed|count|size|cycles|box_size_m|ascii|observations|nothing|wall|robot|at|sensors|regime|region|events|callsign|at_m|heading_deg|way_points_m|radius_m|ends_m|size_m|kind|goals|repeat|open|closed|periodic|period|behaviour|effector)$/;
 
 function problem(cause: string, remedy: string, at: { line: number; column: number; end: number } | null, key: string | null): Problem {
   return {

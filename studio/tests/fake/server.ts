@@ -5,7 +5,7 @@ import { createServer, type Server, type ServerResponse } from "node:http";
 import type { AddressInfo } from "node:net";
 import { extname, join, normalize } from "node:path";
 import { WebSocketServer, type WebSocket } from "ws";
-import type { Answer, Call, Notice, Problem, Request, Status, Subject, SweepRun } from "../../src/protocol";
+import type { Answer, Call, Fleet, Notice, Problem, Request, Status, Subject, SweepRun } from "../../src/protocol";
 import { check, edited, modelOf, SCHEMA, textOf } from "./edit";
 import { encodeFrame } from "./encode";
 import { airplanes, chain, robots, type FakeWorld } from "./scenes";
@@ -26,7 +26,21 @@ function problemOf(cause: string, remedy: string, line: number | null = null, co
 /** The cycle from which on runs of the seed 2 are others. */
 export const PARTING = 137;
 
+/** Eight nodes: all hear all but the last, whom nobody hears, and who is late; the third is lost. */
+function fleetAt(cycle: number): Fleet {
+  const node = (agent: number): Fleet["nodes"][number] => {
+    const isLost = agent === 2;
+    return {
+      agent, state: isLost ? "gone" : "decide", epoch: 1, round: 3, flown: cycle, late: agent === 7 ? 4 : 0, lives: 1,
+      heard: isLost ? [] : [0, 1, 3, 4, 5, 6].filter((other) => other !== agent),
+      packets_per_s: 12, bytes_per_s: 3456, silent_s: isLost ? 12 : agent === 7 ? 3 : 0.2,
+    };
+  };
+  return { has_begun: true, silent_s: 0, late_cycles: 1, talk_p50_ms: 12.5, talk_p99_ms: 40, nodes: Array.from({ length: 8 }, (_, i) => node(i)) };
+}
+
 class Run {
+  isFleet = false;
   credit = 0;
   cycle = 0;
   playing = false;
@@ -52,10 +66,16 @@ class Run {
   status(): Status {
     const { cyclesPlanned: planned, scene } = this.world;
     const isOver = this.cycle >= planned;
+    if (this.isFleet) {
+      return {
+        session: this.id, state: isOver ? "over" : "watched", cycle: this.cycle, cycles_planned: planned, time_s: this.cycle * scene.cycle_s,
+        speed: { times: 1 }, cycles_per_s: 0, seed: this.seed, digest: null, banner: null, fleet: fleetAt(this.cycle),
+      };
+    }
     return {
       session: this.id, state: isOver ? "over" : this.playing ? "playing" : "paused", cycle: this.cycle, cycles_planned: planned,
       time_s: this.cycle * scene.cycle_s, speed: this.speed, cycles_per_s: this.playing ? 10 : 0, seed: this.seed,
-      digest: this.playing && !isOver ? null : this.digest(), banner: null,
+      digest: this.playing && !isOver ? null : this.digest(), banner: null, fleet: null,
     };
   }
 
@@ -220,12 +240,13 @@ export class FakeServer {
     if (call.do === "runs") return runs();
     if (call.do === "open") {
       const { what } = call;
-      const key = what.kind === "new" ? what.world : what.path.replace(/\.\w+$/, "");
+      const key = what.kind === "fleet" ? "airspace" : what.kind === "new" ? what.world : what.path.replace(/\.\w+$/, "");
       const world = WORLDS[key]?.();
       if (!world) throw { ...problemOf("there is no such scenario", "choose another one"), place: key };
       if (what.kind === "recording") world.scene.is_recording = true;
       if (what.kind === "recording" && call.seed !== null) throw problemOf("a recording has a seed of its own", "open its scenario");
       const run = new Run(this.#next++, world, call.seed, socket);
+      run.isFleet = run.playing = what.kind === "fleet";
       this.#runs.set(run.id, run);
       run.goTo(0);
       return { is: "opened", session: run.id, scene: world.scene, status: run.status() };
@@ -233,6 +254,9 @@ export class FakeServer {
     if (call.do === "schema") return { is: "schema", schema: SCHEMA };
     const run = this.#runs.get(call.session);
     if (!run) throw problemOf("no such session", "open it again");
+    if (run.isFleet && !["close", "credit", "look", "events", "tables"].includes(call.do)) {
+      throw problemOf("a fleet is only watched here", "steer it where it was started");
+    }
     const answer = call.do === "save" ? this.#save(call.to, call.over) : act(call, run);
     if (call.do === "close") this.#runs.delete(run.id);
     if (answer.is === "done") say({ notice: "status", ...run.status() });

@@ -12,7 +12,7 @@ const SCENE = { world: "robots", name: "Hall", dimensions: 2, cycle_s: 0.1, is_r
 function status(more: Partial<Status> = {}): Status {
   return {
     session: 1, state: "paused", cycle: 0, cycles_planned: 1000, time_s: 0, speed: { times: 1 }, cycles_per_s: 0, seed: "7",
-    digest: null, banner: null, ...more,
+    digest: null, banner: null, fleet: null, ...more,
   };
 }
 

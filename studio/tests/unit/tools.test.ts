@@ -1,8 +1,10 @@
 import { describe, expect, test } from "vitest";
+import { along, axisAt, handlesAt } from "../../src/edit/axes";
 import { Board, groundOf } from "../../src/edit/board";
 import type { Table } from "../../src/edit/keypath";
 import { airplaneItems, headingTo, putAirplane, putWayPoint } from "../../src/edit/tools/airspace";
 import { chainItems, putBall, putBox, putPatrol, putPolygon, putWall } from "../../src/edit/tools/chain";
+import { SpaceEye } from "../../src/scene/camera";
 import { around, putBody, putDoor, putGoal, robotItems } from "../../src/edit/tools/robots";
 
 const board = new Board("######\n#....#\n#....#\n######\n", 0.5);
@@ -121,6 +123,49 @@ describe("chains", () => {
     const straight: Table = { obstacles: [{ at_m: [1, 1], velocity_m_s: [1, 0] }, { ends_m: [[0, 0], [1, 1]] }] };
     expect(putPatrol(straight, [3, 3, 0], ["obstacles", 1], 0.01).map((edit) => edit.op)).toEqual(["remove", "set", "set"]);
     expect(putPatrol({ obstacles: { ends_m: [[0, 0], [1, 1]] } }, [3, 3, 0], null, 0.01)).toEqual([]);
+  });
+});
+
+describe("chains in space", () => {
+  const model: Table = {
+    obstacles: [{ at_m: [1, 2, 3], radius_m: 0.5 }, { at_m: [0, 0, 1], size_m: [2, 4, 6], turn_deg: 90 }, { ends_m: [[0, 0, 0], [2, 0, 4]], radius_m: 0.1 }],
+    chains: { at_m: [0, 0, 1], tasks: [{ kind: "reach", targets_m: [[5, 6, 7]] }] },
+  };
+  const items = chainItems(model, 0.01, 3);
+  const item = (key: string): (typeof items)[number] => items.find(({ path }) => path.join(".") === key)!;
+
+  test("all that has a place keeps its three numbers when it is moved", () => {
+    expect(item("obstacles.0").move([1.504, 2, 3.25])).toEqual([{ op: "set", key: "obstacles.0.at_m", value: [1.5, 2, 3.25] }]);
+    expect(item("obstacles.2").move([2, 0, 3])).toEqual([{ op: "set", key: "obstacles.2.ends_m", value: [[1, 0, 1], [3, 0, 5]] }]);
+    expect(item("obstacles.2.ends_m.1").move([2, 1, 4])).toEqual([{ op: "set", key: "obstacles.2.ends_m.1", value: [2, 1, 4] }]);
+    expect(item("chains.at_m").move([0, 0, 2])).toEqual([{ op: "set", key: "chains.at_m", value: [0, 0, 2] }]);
+    expect(item("chains.tasks.0.targets_m.0").move([5, 6, 8])).toEqual([{ op: "set", key: "chains.tasks.0.targets_m.0", value: [5, 6, 8] }]);
+  });
+
+  test("outlines hold the whole body, and places of the plane have none here", () => {
+    const reach = (key: string, k: number): number[] => [Math.min, Math.max].map((most) => Number(most(...item(key).outline_m.map((p) => p[k]!)).toFixed(9)));
+    expect([0, 1, 2].map((k) => reach("obstacles.0", k))).toEqual([[0.5, 1.5], [1.5, 2.5], [2.5, 3.5]]);
+    expect([0, 1, 2].map((k) => reach("obstacles.1", k))).toEqual([[-2, 2], [-1, 1], [-2, 4]]);
+    expect(chainItems({ obstacles: [{ at_m: [1, 2], radius_m: 1 }] }, 0.01, 3)).toEqual([]);
+  });
+
+  test("a handle moves its own number alone, as far as the pointer goes along it", () => {
+    const eye = new SpaceEye();
+    eye.resize(800, 600);
+    eye.fit({ lo: [-2, -2, -2], hi: [2, 2, 2] });
+    const at = [0.5, 0.25, 0] as [number, number, number];
+    const handles = handlesAt(eye, at);
+    expect(handles.map(({ axis }) => axis)).toEqual([0, 1, 2]);
+    for (const { axis, tip_m } of handles) {
+      const [[x, y], [tx, ty]] = [eye.project(...at), eye.project(...tip_m)];
+      expect(axisAt(eye, at, tx, ty)).toBe(axis);
+      const by = along(eye, at, axis, tx - x, ty - y);
+      expect(by[axis]).toBeCloseTo(tip_m[axis] - at[axis], 9);
+      expect(by.filter((part) => part !== 0)).toHaveLength(1);
+      const [px, py] = eye.project(...tip_m);
+      eye.under(px, py, tip_m).forEach((part, k) => expect(part).toBeCloseTo(tip_m[k]!, 4));
+    }
+    expect(axisAt(eye, at, 0, 0)).toBeNull();
   });
 });
 

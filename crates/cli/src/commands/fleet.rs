@@ -16,6 +16,9 @@ Examples:
   sidestep fleet ring.toml --set airspace.deployment=compact-team
   sidestep fleet ring.toml --clock realtime --speed 10 --watch
   sidestep fleet ring.toml --out runs/fleet    then report, replay, export
+  sidestep fleet ring.toml --clock realtime --listen tcp/127.0.0.1:7600
+                                           and sidestep studio tcp/127.0.0.1:7600
+                                           shows it
   sidestep fleet ring.toml --nodes 0 --listen tcp/10.0.0.1:7600
                                            the airplanes are elsewhere: see
                                            sidestep node --help
@@ -106,14 +109,15 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
     let mut ended = None;
     let done = run(&Job::Fleet(args.job()), |told| match told {
         Told::Listens(endpoints) => {
-            if args.nodes.is_some() {
+            // Lockstep is over before anybody could watch, unless it waits for nodes.
+            if args.nodes.is_some() || args.clock == ClockName::Realtime {
                 console.note(format!("The server listens at {}", endpoints.join(", ")));
             }
         }
         Told::Fleet(now) => shown.show(&now),
         Told::Ended { summary, outcome, fleet } => ended = Some((summary, outcome, fleet)),
-        // The caller has it already.
-        Told::Failed(_) => {}
+        // The caller has it already; the others are told to who watches.
+        Told::Failed(_) | Told::Scene(_) | Told::Seen(_) => {}
     });
     shown.clear();
     if let Some((summary, outcome, fleet)) = ended {

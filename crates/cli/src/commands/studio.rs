@@ -2,7 +2,9 @@
 
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
+use crate::fleet_watch;
 use crate::interrupt;
+use crate::link::TlsArgs;
 use crate::plan::WorkersArg;
 use crate::viewers;
 use crate::worlds;
@@ -22,6 +24,7 @@ Examples:
   sidestep studio scenarios --port 8000 --no-open
   sidestep studio --addr 0.0.0.0           for others, who need its token
   sidestep studio office.toml --foxglove 127.0.0.1:8765
+  sidestep studio tcp/127.0.0.1:7600       watch the fleet that flies there
 
 The page may read what lies below the folders that are named, the folders of the files that are \
 named, or else the current folder. It writes what you save there, and nothing else. Ctrl-C ends it.";
@@ -33,8 +36,9 @@ const LOOK: Duration = Duration::from_millis(50);
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct StudioArgs {
-    /// Scenarios, folders of runs and sweeps and MCAP files to open, and folders to choose from
-    #[arg(value_name = "SCENARIO|DIR|FILE")]
+    /// Scenarios, folders of runs and sweeps and MCAP files to open, folders to choose from, and
+    /// endpoints of fleets to watch
+    #[arg(value_name = "SCENARIO|DIR|FILE|ENDPOINT")]
     named: Vec<PathBuf>,
 
     /// Address to listen at; any but a loopback address asks for a token
@@ -60,24 +64,31 @@ pub(crate) struct StudioArgs {
 
     #[command(flatten)]
     workers: WorkersArg,
+
+    #[command(flatten)]
+    tls: TlsArgs,
 }
 
 /// Runs the command until it is interrupted.
 ///
 /// # Errors
-/// When something that is named is not there, or the port cannot be had.
+/// When something that is named is not there, a fleet does not answer, or the port cannot be had.
 pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Failure> {
     interrupt::listen()?;
     let foxglove = args.foxglove.as_ref().map(ViewersAt::settled).transpose()?;
+    let (named, fleets) = fleet_watch::divided(&args.named);
+    let watch = |endpoint: &String| fleet_watch::watch(endpoint, args.tls.files());
+    let screens = fleets.iter().map(watch).collect::<Result<Vec<_>, _>>()?;
     let studio = Studio::start(Options {
         worlds: worlds(),
         program: format!("sidestep {}", sidestep_session::build()),
-        named: args.named.clone(),
+        named,
         host: args.addr.clone(),
         port: args.port,
         read_only: args.read_only,
         workers: args.workers.count(),
         foxglove: foxglove.clone(),
+        screens,
     })?;
     if let Some(at) = &foxglove {
         viewers::tell(at, console);

@@ -1,7 +1,11 @@
 //! Fleets: a process for each airplane, by the program `sidestep-link` where it is built.
 
-use crate::support::{Place, requires, signal, wait_for};
+use crate::studio::Studio;
+use crate::support::{Ended, Place, requires, signal, wait_for};
+use serde_json::json;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
+use std::process::Child;
 
 const RING: &str = "format = 1\nworld = \"airspace\"\nseed = 5\ncycles = 12\n[airspace]\n\
     deployment = \"compact-team\"\n[airspace.generator]\nkind = \"superconflict\"\nn = 3\n";
@@ -60,8 +64,79 @@ fn ctrl_c_ends_a_fleet_in_good_order() {
     let child = place.start(&args);
     wait_for("the folder", || place.path("r/scenario.toml").exists());
     signal(&child, "INT");
-    let ended = crate::support::Ended(child.wait_with_output().expect("ended"));
+    let ended = Ended(child.wait_with_output().expect("ended"));
     assert_eq!(ended.code(), 130, "{}", ended.err());
     let folder = sidestep_record::RunView::open(&place.path("r"));
     assert!(folder.is_ok(), "it can be looked at: {:?}", folder.err());
+}
+
+/// Waits until a fleet tells where its server listens; returns the endpoint.
+fn endpoint(fleet: &mut Child) -> String {
+    let mut lines = BufReader::new(fleet.stderr.as_mut().expect("errors")).lines();
+    let mut told = lines.by_ref().map(|line| line.expect("text"));
+    let line = told.find(|line| line.contains("listens at")).expect("it says where");
+    line.rsplit(' ').next().expect("an endpoint").to_string()
+}
+
+#[test]
+fn a_fleet_that_the_studio_watches_is_seen_to_its_end_steered_by_nobody_and_has_the_same_digest() {
+    if !is_there() {
+        return;
+    }
+    let place = place();
+    let alone = place.json(&["run", "ring.toml"]);
+    // It waits for a node that is not started yet, so whoever watches sees all of it.
+    let mut fleet = place.start(&["fleet", "ring.toml", "--nodes", "2", "--out", "r"]);
+    let at = endpoint(&mut fleet);
+    let studio = Studio::start(&place, &[&at]);
+    let mut page = studio.page();
+    assert_eq!(page.read()["open"], json!([{ "kind": "fleet", "path": at }]));
+    let what = json!({ "kind": "fleet", "path": at });
+    let opened = page.ask(json!({ "do": "open", "what": what, "seed": null }));
+    let session = opened["session"].clone();
+    assert_eq!(
+        (&opened["scene"]["agent"], &opened["status"]["state"]),
+        (&"airplane".into(), &"watched".into())
+    );
+    page.ask(json!({ "do": "credit", "session": session, "frames": 100 }));
+    for call in ["play", "seek", "restart", "inspect", "edit", "save"] {
+        let request = match call {
+            "play" => json!({ "do": call, "session": session, "speed": "fastest" }),
+            "seek" => json!({ "do": call, "session": session, "cycle": 3 }),
+            "restart" => json!({ "do": call, "session": session, "seed": 1, "text": null }),
+            "inspect" => {
+                let who = json!({ "kind": "airplane", "number": 0, "part": null });
+                json!({ "do": call, "session": session, "who": who })
+            }
+            "edit" => json!({ "do": call, "session": session, "text": "", "edits": [] }),
+            _ => json!({ "do": call, "session": session, "text": "", "to": null, "over": true }),
+        };
+        assert!(page.reply(request)["problem"].is_object(), "{call}");
+    }
+    let node = ["node", "ring.toml", "--airplane", "2", "--connect", &at];
+    let node = place.start(&[&node[..], &["--listen", "tcp/127.0.0.1:0"]].concat());
+    let over = page.over(&session);
+    let nodes = over["fleet"]["nodes"].as_array().expect("nodes");
+    assert_eq!((over["cycle"].as_f64(), nodes.len()), (alone["cycles"].as_f64(), 3), "{over}");
+    assert!(nodes.iter().all(|node| node["flown"] == 12), "{nodes:?}");
+    assert!(page.frames().iter().all(|frame| frame.starts_with(b"SSTF")));
+    let ended = Ended(fleet.wait_with_output().expect("it ends"));
+    assert_eq!(ended.code(), 0, "{}", ended.err());
+    assert_eq!(node.wait_with_output().expect("it ends").status.code(), Some(0));
+    assert_eq!(place.json(&["replay", "r"])["digest"], alone["digest"]);
+}
+
+#[test]
+fn an_address_where_no_fleet_flies_is_refused_before_a_page_is_served() {
+    let place = place();
+    let missing = place.command(&["studio", "--no-open", "tcp/127.0.0.1:9"]);
+    let ended = { missing }.env("SIDESTEP_LINK", "nowhere").output().map(Ended).expect("it starts");
+    assert_eq!(ended.code(), 2, "{}", ended.err());
+    assert!(ended.err().contains("cargo install --path crates/link"), "{}", ended.err());
+    if !is_there() {
+        return;
+    }
+    let ended = place.run(&["studio", "--no-open", "tcp/127.0.0.1:9"]);
+    assert_eq!((ended.code(), ended.out()), (1, String::new()));
+    assert!(ended.err().contains("nobody answers at tcp/127.0.0.1:9"), "{}", ended.err());
 }

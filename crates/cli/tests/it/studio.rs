@@ -94,7 +94,7 @@ pub(crate) struct Page {
 
 impl Page {
     /// Waits for something that is no frame.
-    fn read(&mut self) -> Value {
+    pub(crate) fn read(&mut self) -> Value {
         loop {
             match self.socket.read().expect("a message") {
                 Message::Text(text) => return serde_json::from_str(&text).expect("JSON"),
@@ -137,6 +137,11 @@ impl Page {
         self.ask(
             json!({ "do": "open", "what": { "kind": "scenario", "path": path }, "seed": null }),
         )
+    }
+
+    /// Returns the frames that came so far.
+    pub(crate) fn frames(&self) -> &[Vec<u8>] {
+        &self.frames
     }
 
     fn last_over(&self, session: &Value) -> Option<Value> {

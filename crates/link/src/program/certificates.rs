@@ -5,11 +5,23 @@ use sidestep_session::fleet::Tls;
 use std::path::Path;
 use x509_parser::pem::Pem;
 
+/// Checks certificates, and that endpoints are of the sort that goes with them.
+///
+/// # Errors
+/// With the first thing that is wrong.
+pub(super) fn check_all<'a>(
+    endpoints: impl IntoIterator<Item = &'a String>,
+    tls: Option<&Tls>,
+) -> Result<(), InputError> {
+    tls.map_or(Ok(()), check)?;
+    check_endpoints(endpoints, tls)
+}
+
 /// Checks that the files are there, and are certificates that hold today.
 ///
 /// # Errors
 /// With the first that is not.
-pub(super) fn check(tls: &Tls) -> Result<(), InputError> {
+fn check(tls: &Tls) -> Result<(), InputError> {
     for (option, file) in [("--tls-ca", &tls.authority), ("--tls-cert", &tls.certificate)] {
         let place = format!("{option} {}", file.display());
         check_certificate(&place, &read(&place, file)?)?;
@@ -27,7 +39,7 @@ pub(super) fn check(tls: &Tls) -> Result<(), InputError> {
 ///
 /// # Errors
 /// With the first endpoint at which it is otherwise.
-pub(super) fn check_endpoints<'a>(
+fn check_endpoints<'a>(
     endpoints: impl IntoIterator<Item = &'a String>,
     tls: Option<&Tls>,
 ) -> Result<(), InputError> {

@@ -6,16 +6,19 @@ use super::metrics;
 use super::node::wrong_endpoint;
 use super::packets::Packets;
 use super::scenario::Scenario;
+use super::shown::{self, Shown};
 use super::told::tell;
 use crate::airspace::Airspace;
 use crate::mail::Mail;
 use crate::server::{Attendant, Broken, Look, Server, Terms};
 use crate::wire::Party;
+use crate::wire::window::Window;
 use crate::wire::zenoh::{WireError, ZenohWire, hold};
 use crate::words::{Clock, Logged, Topology, Welcome};
-use sidestep::kernel::EntityId;
 use sidestep::kernel::ports::RecordError;
-use sidestep_session::fleet::{FleetJob, FleetNow, NodeJob, NodeNow, Told};
+use sidestep::kernel::view::Frame;
+use sidestep::kernel::{Cycle, EntityId, Simulation};
+use sidestep_session::fleet::{FleetJob, FleetNow, NodeJob, NodeNow, Staged, Told};
 use sidestep_session::{Error, Journey, Keep, Watcher};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -38,6 +41,8 @@ pub(super) fn fly(job: &FleetJob, lifeline: &Lifeline) -> Result<(), Error> {
     let keep = Keep { folder: job.out.as_deref(), mcap: None, replace: job.replace };
     let journey = Journey::start(scenario.compiled.as_ref(), &scenario.source, 1, keep, None)?;
     tell(&Told::Listens(listen.clone()));
+    let scene = shown::scene(&staged(journey.simulation()));
+    let shown = Shown::new(Window::open(&wire, scene).map_err(wrong_endpoint)?);
     let mail = Mail::new(Party::Server, Box::new(wire));
     let welcome =
         Welcome { clock: job.clock, topology: job.topology, overrides, logs_packets: job.packets };
@@ -53,7 +58,7 @@ pub(super) fn fly(job: &FleetJob, lifeline: &Lifeline) -> Result<(), Error> {
     let all = scenario.world.airplanes.len();
     let crew = Crew::start(node_jobs(job, &listen, all), job.clock != Clock::Lockstep)?;
     let cycles = stage.journey().simulation().plan().cycles;
-    let mut captain = Captain::new(crew, lifeline, cycles, told);
+    let mut captain = Captain::new(crew, lifeline, cycles, (told, shown));
     captain.packets = job
         .out
         .as_ref()
@@ -65,7 +70,21 @@ pub(super) fn fly(job: &FleetJob, lifeline: &Lifeline) -> Result<(), Error> {
     let (flown, _) = Server::new(mail, &mut stage, &mut captain, terms).run();
     captain.crew.end();
     let flown = flown.and_then(|()| captain.finish_packets());
-    finish(stage.into_journey(), &watcher, flown, captain.now)
+    let Captain { now, shown, .. } = captain;
+    let done = finish(stage.into_journey(), &watcher, flown, now);
+    shown.linger();
+    done
+}
+
+/// Returns what stays as it is of a run that is watched.
+fn staged(run: &dyn Simulation) -> Staged {
+    Staged {
+        build: sidestep_session::build().into(),
+        world: run.world().into(),
+        agent: run.agent().into(),
+        seed: run.plan().seed,
+        scenery: run.scenery(),
+    }
 }
 
 /// Returns the endpoints at which the server listens, each with a port.
@@ -144,6 +163,7 @@ struct Captain<'a> {
     lifeline: &'a Lifeline,
     cycles: u64,
     board: metrics::Board,
+    shown: Shown,
     report_at: Instant,
     /// Time at which all nodes had joined.
     began: Option<Instant>,
@@ -158,13 +178,19 @@ struct Captain<'a> {
 }
 
 impl<'a> Captain<'a> {
-    fn new(crew: Crew, lifeline: &'a Lifeline, cycles: u64, board: metrics::Board) -> Self {
+    fn new(
+        crew: Crew,
+        lifeline: &'a Lifeline,
+        cycles: u64,
+        (board, shown): (metrics::Board, Shown),
+    ) -> Self {
         let now = Instant::now();
         Self {
             crew,
             lifeline,
             cycles,
             board,
+            shown,
             report_at: now,
             began: None,
             now: FleetNow { cycles, ..FleetNow::default() },
@@ -249,6 +275,9 @@ impl Attendant for Captain<'_> {
             self.look(fleet);
             self.board.show(|| metrics::of_fleet(&self.now, fleet));
             tell(&Told::Fleet(self.now.clone()));
+            if self.shown.is_watched() {
+                self.shown.show(&self.now, false);
+            }
         }
         let member = |agent: EntityId| fleet.seats.get(&agent)?.member.clone();
         let gone = self.crew.look(|agent| member(agent).map(|member| member.listens))?;
@@ -261,6 +290,17 @@ impl Attendant for Captain<'_> {
 
     fn look_back(&mut self, fleet: &Look<'_>) {
         self.look(fleet);
+        self.shown.show(&self.now, true);
+    }
+
+    fn wants_frame(&self, cycle: Cycle) -> bool {
+        self.shown.wants_frame(cycle)
+    }
+
+    fn take_frame(&mut self, frame: Frame) {
+        self.now.cycle = frame.cycle;
+        self.shown.take(frame);
+        self.shown.show(&self.now, false);
     }
 
     fn take_packets(&mut self, packets: Vec<(EntityId, Logged)>) {

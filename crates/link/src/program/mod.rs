@@ -6,6 +6,7 @@
 //! told.rs    lines that are told                                metrics.rs  Prometheus' text
 //! log.rs     logs to standard error                             scenario.rs what server and nodes fly
 //! packets.rs the table of all packets                           certificates.rs whether they hold
+//! shown.rs   what is shown of a fleet                           watch.rs    who watches one
 //! ```
 
 mod certificates;
@@ -17,11 +18,13 @@ mod metrics;
 mod node;
 mod packets;
 mod scenario;
+mod shown;
 mod told;
+mod watch;
 
 use lifeline::Lifeline;
 use sidestep_session::Error;
-use sidestep_session::fleet::{Failed, Flown, Job, Told};
+use sidestep_session::fleet::{Common, Failed, Job, Told};
 use std::io::BufRead;
 use std::process::ExitCode;
 use told::tell;
@@ -57,30 +60,42 @@ fn version() -> String {
 }
 
 fn do_job(job: Job) -> Result<(), Error> {
-    let (common, [listen, connect]) = match &job {
-        Job::Fleet(job) => (&job.common, [&*job.listen, &[]]),
-        Job::Node(job) => (&job.common, [&*job.listen, &*job.connect]),
-    };
-    log::start(common.json_log, &common.log)?;
-    check_build(&common.flown)?;
-    common.tls.as_ref().map_or(Ok(()), certificates::check)?;
-    certificates::check_endpoints(listen.iter().chain(connect), common.tls.as_ref())?;
     match job {
-        Job::Fleet(job) => fleet::fly(&job, &Lifeline::watch()),
+        Job::Fleet(job) => {
+            prepare(&job.common, &job.listen)?;
+            fleet::fly(&job, &Lifeline::watch())
+        }
         Job::Node(job) => {
+            prepare(&job.common, job.listen.iter().chain(&job.connect))?;
             Lifeline::end_with();
             node::fly(&job)
+        }
+        Job::Watch(job) => {
+            check_build(&job.build)?;
+            certificates::check_all(&job.connect, job.tls.as_ref())?;
+            watch::watch(&job, &Lifeline::watch())
         }
     }
 }
 
+/// Checks what server and nodes are given alike, and begins their log.
+fn prepare<'a>(
+    common: &Common,
+    endpoints: impl IntoIterator<Item = &'a String>,
+) -> Result<(), Error> {
+    log::start(common.json_log, &common.log)?;
+    check_build(&common.flown.build)?;
+    certificates::check_all(endpoints, common.tls.as_ref())?;
+    Ok(())
+}
+
 /// Refuses the job of another build: all that decide must be of one.
-fn check_build(flown: &Flown) -> Result<(), Error> {
+fn check_build(build: &str) -> Result<(), Error> {
     let own = sidestep_session::build();
-    if flown.build == own {
+    if build == own {
         return Ok(());
     }
-    let cause = format!("sidestep-link is of sidestep {own}, and the command of {}", flown.build);
+    let cause = format!("sidestep-link is of sidestep {own}, and the command of {build}");
     let remedy = "install both from the same source: cargo install --path crates/link";
     Err(sidestep::kernel::InputError::new("sidestep-link", cause, remedy).into())
 }

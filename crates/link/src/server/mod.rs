@@ -20,6 +20,7 @@ use crate::ports::{Sight, Stage};
 use crate::wire::Party;
 use crate::words::{Clock, Control, Fingerprint, Logged, Ticked, Welcome, Word};
 pub use seat::Seat;
+use sidestep::kernel::view::Frame;
 use sidestep::kernel::{Cycle, EntityId};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -92,6 +93,14 @@ pub trait Attendant {
     /// Takes packets that nodes have sent, where all are recorded: those of the cycles before the present one, each
     /// with its sender.
     fn take_packets(&mut self, _: Vec<(EntityId, Logged)>) {}
+
+    /// Whether somebody watches who has no frame of this cycle yet.
+    fn wants_frame(&self, _: Cycle) -> bool {
+        false
+    }
+
+    /// Takes a frame that was wanted.
+    fn take_frame(&mut self, _: Frame) {}
 
     /// Looks at the fleet when all nodes have said what they had to say.
     fn look_back(&mut self, _: &Look<'_>) {}
@@ -193,6 +202,7 @@ impl<'a> Server<'a> {
             }
         }
         self.attendant.take_packets(std::mem::take(&mut self.packets));
+        self.show();
         let Self { mail, seats, tally, has_begun, stage, .. } = self;
         let cycle = stage.cycle();
         self.attendant.look_back(&Look { seats, tally, mail, cycle, has_begun: *has_begun });
@@ -229,6 +239,7 @@ impl<'a> Server<'a> {
             let seated: Vec<EntityId> = self.seated().collect();
             seated.into_iter().for_each(|agent| self.mail.note(Party::Node(agent), Word::Beat));
         }
+        self.show();
         let Self { mail, seats, tally, has_begun, stage, .. } = self;
         let look = Look { seats, tally, mail, cycle: stage.cycle(), has_begun: *has_begun };
         let mut gone = self.attendant.attend(&look)?;
@@ -239,6 +250,13 @@ impl<'a> Server<'a> {
         let reason = || format!("not heard for {} s", lease.as_secs_f64());
         gone.extend(silent.map(|agent| (agent, reason())));
         gone.into_iter().try_for_each(|(agent, reason)| self.lose(agent, reason))
+    }
+
+    /// Shows the world to those who watch it.
+    fn show(&mut self) {
+        if self.attendant.wants_frame(self.stage.cycle()) {
+            self.attendant.take_frame(self.stage.frame());
+        }
     }
 
     /// Notes that a node is gone.

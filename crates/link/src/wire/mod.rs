@@ -10,6 +10,7 @@
 pub mod board;
 mod handshake;
 pub mod memory;
+pub mod window;
 pub mod zenoh;
 
 pub use crate::party::Party;

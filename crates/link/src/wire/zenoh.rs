@@ -255,6 +255,31 @@ impl ZenohWire {
     }
 }
 
+impl ZenohWire {
+    /// Returns the server's session, for what is asked of it by others than nodes.
+    pub(super) fn session(&self) -> &Session {
+        &self.hub.session
+    }
+}
+
+/// Returns a session with a fleet's server, of somebody who is no node and only asks.
+///
+/// # Errors
+/// When none of some endpoints answers within some time.
+pub(super) fn asking(
+    connect: &[String],
+    tls: Option<&Tls>,
+    within: Duration,
+) -> Result<Session, WireError> {
+    for endpoint in connect {
+        host_and_port(endpoint)?;
+    }
+    let connected_within = Some(within);
+    let settings = Settings { mode: "client", connect, tls, connected_within, listen: &[] };
+    let no_answer = |reason| WireError::NoAnswer { endpoint: connect.join(", "), reason };
+    settings.open().map_err(no_answer)
+}
+
 impl Wire for ZenohWire {
     fn send(&mut self, to: &[Party], frame: &[u8]) {
         let line = match &mut self.mesh {

@@ -30,7 +30,7 @@ pub struct Measured {
 }
 
 /// What flies a scenario by processes: it is given the scenario's text.
-pub(super) type Flies<'a, E> = dyn FnMut(&str) -> Result<Measured, E> + 'a;
+pub type Flies<'a, E> = dyn FnMut(&str) -> Result<Measured, E> + 'a;
 
 /// The measurements over sockets, or the reason why there are none.
 #[derive(Debug, Clone, PartialEq, Serialize)]

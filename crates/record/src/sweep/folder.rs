@@ -8,18 +8,15 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::ports::{RecordError, RoleColumn};
 use sidestep_kernel::{Digest, InputError};
 
-use super::journal::{Journal, read_journal};
 use crate::disk;
 use crate::folder::check_vacant;
 use crate::format::{self, FormatVersion};
 use crate::manifest::{self, OF_SWEEP as MANIFEST, json};
 use crate::staging::Staging;
-use crate::whole::{self, GrowingTable, WholeTable};
+use crate::whole;
 
 const CELLS: &str = "cells.parquet";
-const RESULTS: &str = "results.parquet";
-const TIMINGS: &str = "timings.parquet";
-const SHARES: &str = "shares";
+pub(super) const SHARES: &str = "shares";
 const VARIANTS: &str = "variants";
 const RUNS: &str = "runs";
 const SCENARIO: &str = "scenario.toml";
@@ -41,50 +38,11 @@ pub struct SweepManifest<P> {
     pub plan: P,
 }
 
-/// A share of the cells: number `index` of `count`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Share {
-    /// Its number, from 0.
-    pub index: u32,
-    /// The number of shares.
-    pub count: u32,
-}
-
 /// The folder of a sweep.
 #[derive(Debug, Clone)]
 pub struct SweepFolder<P> {
     path: PathBuf,
     manifest: SweepManifest<P>,
-}
-
-/// The table of runs, and that of the times that they took, while they are written.
-pub struct Completion {
-    results: GrowingTable,
-    timings: GrowingTable,
-}
-
-impl Completion {
-    /// Appends runs to both.
-    ///
-    /// # Errors
-    /// Other columns than it was begun with; an I/O error.
-    pub fn append<R>(
-        &mut self,
-        results: &[&RoleColumn<R>],
-        timings: &[&RoleColumn<R>],
-    ) -> Result<(), RecordError> {
-        self.results.append(results)?;
-        self.timings.append(timings)
-    }
-
-    /// Completes both. The table of timings comes first, because the sweep is done once the results exist.
-    ///
-    /// # Errors
-    /// An I/O error.
-    pub fn finish(self) -> Result<(), RecordError> {
-        self.timings.finish()?;
-        self.results.finish()
-    }
 }
 
 /// A folder that goes with whoever holds it.
@@ -235,128 +193,6 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         self.path.join(RUNS).join(format!("{cell:06}"))
     }
 
-    /// Opens the journal of a share to write, and passes its entries on; `None` if the share is
-    /// done.
-    ///
-    /// # Errors
-    /// A journal that another process writes, or that is damaged.
-    pub fn journal<T: DeserializeOwned>(
-        &self,
-        share: Share,
-        each: impl FnMut(T),
-    ) -> Result<Option<Journal>, InputError> {
-        if self.share_file(share, "parquet").is_file() {
-            return Ok(None);
-        }
-        let path = self.share_file(share, "journal");
-        Journal::open(&path, &self.manifest.program_version, each).map(Some)
-    }
-
-    /// Writes the runs of a share as its part, and deletes the journal.
-    ///
-    /// # Errors
-    /// An I/O error; the journal stays then.
-    pub fn end_share<R: Serialize>(
-        &self,
-        share: Share,
-        journal: Journal,
-        runs: &[&RoleColumn<R>],
-    ) -> Result<(), RecordError> {
-        let version = &self.manifest.program_version;
-        whole::write(&self.share_file(share, "parquet"), runs, version, &[])?;
-        drop(journal);
-        let path = self.share_file(share, "journal");
-        fs::remove_file(&path).map_err(|e| RecordError::new(path.display(), e))
-    }
-
-    /// Passes on the parts of shares that are done, one by one, and those block by block.
-    ///
-    /// # Errors
-    /// A part that cannot be read; blocks before have been passed on.
-    pub fn parts<R: DeserializeOwned + Clone>(
-        &self,
-        mut each: impl FnMut(WholeTable<R>),
-    ) -> Result<(), InputError> {
-        for share in self.shares_with("parquet")? {
-            let path = self.share_file(share, "parquet");
-            let mut version = Ok(());
-            whole::read_blocks(&path, |block| {
-                version = self.check_version(&path, &block);
-                if version.is_ok() {
-                    each(block);
-                }
-            })?;
-            version?;
-        }
-        Ok(())
-    }
-
-    /// Passes on the runs of shares that are in progress or were stopped; not of those with a part,
-    /// nor of `but`.
-    ///
-    /// # Errors
-    /// A journal that cannot be read.
-    pub fn journals<T: DeserializeOwned>(
-        &self,
-        but: Option<Share>,
-        mut each: impl FnMut(T),
-    ) -> Result<(), InputError> {
-        let done = self.shares_with("parquet")?;
-        for share in self.shares_with("journal")? {
-            if !done.contains(&share) && Some(share) != but {
-                let path = self.share_file(share, "journal");
-                read_journal(&path, &self.manifest.program_version, &mut each)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Returns the shares that somebody has begun, in order, and whether each is done.
-    ///
-    /// # Errors
-    /// A folder that cannot be read.
-    pub fn shares(&self) -> Result<Vec<(Share, bool)>, InputError> {
-        // Journals first: a share that ends between both looks is seen as one that is done.
-        let mut shares = self.shares_with("journal")?;
-        let done = self.shares_with("parquet")?;
-        shares.extend(&done);
-        shares.sort();
-        shares.dedup();
-        Ok(shares.into_iter().map(|share| (share, done.contains(&share))).collect())
-    }
-
-    /// Passes on the finished runs of a share that is in progress or was stopped.
-    ///
-    /// # Errors
-    /// A journal that cannot be read, also because the share has ended meanwhile.
-    pub fn journal_of<T: DeserializeOwned>(
-        &self,
-        share: Share,
-        each: impl FnMut(T),
-    ) -> Result<(), InputError> {
-        let path = self.share_file(share, "journal");
-        read_journal(&path, &self.manifest.program_version, each)
-    }
-
-    /// Begins the table of runs, with columns of these names, roles and types, and that of their times.
-    ///
-    /// # Errors
-    /// An I/O error.
-    pub fn completion<R: Serialize>(
-        &self,
-        results: &[&RoleColumn<R>],
-        timings: &[&RoleColumn<R>],
-    ) -> Result<Completion, RecordError> {
-        let plan = serde_json::to_string(self.plan())
-            .map_err(|e| RecordError::new(self.path.display(), e))?;
-        let extra = [("sidestep.plan", plan), ("sidestep.fingerprint", self.fingerprint())];
-        let version = &self.manifest.program_version;
-        let table = |name: &str, columns| {
-            GrowingTable::create(&self.path.join(name), columns, version, &extra)
-        };
-        Ok(Completion { timings: table(TIMINGS, timings)?, results: table(RESULTS, results)? })
-    }
-
     /// Returns an empty folder of its own in this one, for what does not fit in memory while runs are joined. What a
     /// kill has left there is taken away.
     ///
@@ -370,70 +206,6 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         }
         make_folder(&path)?;
         Ok(Scratch(path))
-    }
-
-    /// Whether the table of all runs exists.
-    pub fn is_complete(&self) -> bool {
-        self.results_file().is_file()
-    }
-
-    /// Returns the path of the table of all runs.
-    pub fn results_file(&self) -> PathBuf {
-        self.path.join(RESULTS)
-    }
-
-    /// Reads the table of all runs.
-    ///
-    /// # Errors
-    /// A sweep that is not done, or a damaged table.
-    pub fn results<R: DeserializeOwned + Clone>(&self) -> Result<WholeTable<R>, InputError> {
-        if !self.is_complete() {
-            let remedy = "go on with `sidestep resume DIR`, or run its shares and \
-                          `sidestep sweep collect DIR`";
-            return Err(InputError::new(self.path.display(), "the sweep is not done yet", remedy));
-        }
-        whole::read(&self.results_file()).map_err(|e| {
-            let remedy =
-                "delete it; `sidestep resume DIR` makes it again from the runs in `shares`";
-            InputError::new(e.place(), e.cause(), remedy)
-        })
-    }
-
-    /// Reads the table of the times that the runs took.
-    ///
-    /// # Errors
-    /// A sweep that is not done, or a damaged table.
-    pub fn timings<R: DeserializeOwned + Clone>(&self) -> Result<WholeTable<R>, InputError> {
-        whole::read(&self.path.join(TIMINGS))
-    }
-
-    fn check_version<R>(&self, path: &Path, table: &WholeTable<R>) -> Result<(), InputError> {
-        let (wrote, ours) = (&table.program_version, &self.manifest.program_version);
-        if wrote == ours {
-            return Ok(());
-        }
-        let cause = format!("its runs are of sidestep {wrote}, the sweep is of {ours}");
-        Err(InputError::new(path.display(), cause, "delete it, and run this share again"))
-    }
-
-    fn share_file(&self, share: Share, extension: &str) -> PathBuf {
-        let Share { index, count } = share;
-        self.path.join(SHARES).join(format!("{index}-of-{count}.{extension}"))
-    }
-
-    /// Returns the shares that have a file with this extension, in order.
-    fn shares_with(&self, extension: &str) -> Result<Vec<Share>, InputError> {
-        let folder = self.path.join(SHARES);
-        let failed = |e: std::io::Error| {
-            InputError::new(folder.display(), e.to_string(), "make the folder readable")
-        };
-        let mut shares = Vec::new();
-        for entry in fs::read_dir(&folder).map_err(failed)? {
-            let name = entry.map_err(failed)?.file_name();
-            shares.extend(name.to_str().and_then(|name| share_of(name, extension)));
-        }
-        shares.sort();
-        Ok(shares)
     }
 }
 
@@ -470,12 +242,6 @@ fn read_files(
     Ok(())
 }
 
-/// Returns the share whose file has this name.
-fn share_of(name: &str, extension: &str) -> Option<Share> {
-    let (index, count) = name.strip_suffix(extension)?.strip_suffix('.')?.split_once("-of-")?;
-    Some(Share { index: index.parse().ok()?, count: count.parse().ok()? })
-}
-
 fn variant_folder(folder: &Path, variant: u32) -> PathBuf {
     folder.join(VARIANTS).join(format!("{variant:04}"))
 }
@@ -485,117 +251,4 @@ fn make_folder(path: &Path) -> Result<(), RecordError> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use sidestep_kernel::ports::Values;
-
-    type Folder = SweepFolder<Vec<u32>>;
-
-    #[derive(Debug, thiserror::Error)]
-    #[error("{0}")]
-    struct Failed(String);
-
-    impl From<InputError> for Failed {
-        fn from(e: InputError) -> Self {
-            Self(e.to_string())
-        }
-    }
-
-    impl From<RecordError> for Failed {
-        fn from(e: RecordError) -> Self {
-            Self(e.to_string())
-        }
-    }
-
-    fn cells() -> Vec<RoleColumn<String>> {
-        let values = Values::I64(vec![0, 1].into());
-        vec![RoleColumn { name: "cell".into(), role: "cell".into(), values }]
-    }
-
-    fn create(path: &Path) -> Result<Folder, Failed> {
-        Folder::create(path, "0.1.0", "0.1.0+a", |staging| {
-            let files = [("inputs/a.txt".to_string(), b"a".to_vec())];
-            Folder::write_variant(staging, 0, "seed = 1\n", &files)?;
-            Ok((vec![4, 5], vec!["f".into()], cells()))
-        })
-    }
-
-    #[test]
-    fn a_sweep_goes_from_plan_over_shares_to_one_table() {
-        let place = tempfile::tempdir().unwrap();
-        let path = place.path().join("sweep");
-        let folder = create(&path).unwrap();
-        assert_eq!(fs::read_to_string(folder.scenario(0)).unwrap(), "seed = 1\n");
-        let share = Share { index: 1, count: 2 };
-        let mut journal = folder.journal(share, |_: u32| panic!("a run")).unwrap().unwrap();
-        journal.append(&7u32).unwrap();
-        let runs = |but| {
-            let mut runs: Vec<u32> = Vec::new();
-            folder.journals(but, |run| runs.push(run)).unwrap();
-            runs
-        };
-        assert_eq!((runs(None), runs(Some(share))), (vec![7], vec![]));
-        let cells_again = cells();
-        let refs: Vec<_> = cells_again.iter().collect();
-        folder.end_share(share, journal, &refs).unwrap();
-        let again = folder.journal(share, |_: u32| ()).unwrap();
-        assert!(again.is_none(), "a share that is done is done");
-        assert!(runs(None).is_empty());
-        let mut parts = Vec::new();
-        folder.parts(|part| parts.push(part.columns)).unwrap();
-        assert_eq!(parts, [cells()]);
-        assert!(folder.results::<String>().unwrap_err().cause().contains("not done"));
-        let mut completion = folder.completion(&refs, &refs).unwrap();
-        assert!(!folder.is_complete());
-        completion.append(&refs, &refs).unwrap();
-        completion.append(&refs, &refs).unwrap();
-        completion.finish().unwrap();
-        let again = Folder::open(&path).unwrap();
-        assert_eq!((again.plan(), again.is_complete()), (&vec![4, 5], true));
-        let twice = Values::I64(vec![0, 1, 0, 1].into());
-        assert_eq!(again.results::<String>().unwrap().columns[0].values, twice);
-    }
-
-    #[test]
-    fn a_table_of_runs_that_is_not_finished_and_a_place_to_join_them_leave_nothing() {
-        let place = tempfile::tempdir().unwrap();
-        let folder = create(&place.path().join("sweep")).unwrap();
-        let names = || {
-            let entries = fs::read_dir(folder.path()).unwrap();
-            let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name()).collect();
-            names.sort();
-            names
-        };
-        let before = names();
-        let columns = cells();
-        let refs: Vec<_> = columns.iter().collect();
-        let mut completion = folder.completion(&refs, &refs).unwrap();
-        completion.append(&refs, &refs).unwrap();
-        drop(completion);
-        // A kill leaves its files there.
-        std::mem::forget(folder.scratch().unwrap());
-        fs::write(folder.path().join(SCRATCH).join("old"), "rest").unwrap();
-        let scratch = folder.scratch().unwrap();
-        assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 0);
-        drop(scratch);
-        assert_eq!(names(), before);
-    }
-
-    #[test]
-    fn a_plan_that_fails_leaves_nothing() {
-        let place = tempfile::tempdir().unwrap();
-        let path = place.path().join("a/sweep");
-        let made =
-            Folder::create::<String, _>(&path, "0.1.0", "0.1.0+a", |_| Err(Failed("no".into())));
-        assert!(made.is_err());
-        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 0);
-    }
-
-    #[test]
-    fn nothing_of_yours_is_overwritten() {
-        let place = tempfile::tempdir().unwrap();
-        fs::write(place.path().join("letter.txt"), "dear").unwrap();
-        assert!(create(place.path()).is_err());
-        assert!(Folder::open(place.path()).unwrap_err().cause().contains("no sweep"));
-    }
-}
+mod tests;

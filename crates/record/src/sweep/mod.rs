@@ -16,8 +16,12 @@
 //! killed process leaves at most an incomplete line, which the next one deletes. Only the owner of
 //! a share writes its journal; everything else is written once, and appears by a rename.
 
+mod completion;
 mod folder;
 mod journal;
+mod shares;
 
-pub use folder::{Completion, Scratch, Share, SweepFolder, SweepManifest, fingerprint};
+pub use completion::Completion;
+pub use folder::{Scratch, SweepFolder, SweepManifest, fingerprint};
 pub use journal::{Journal, read_journal};
+pub use shares::Share;

@@ -44,7 +44,7 @@ pub(super) fn grid(table: &Table, caption: Option<&str>) -> Markup {
                     tr {
                         @for (k, cell) in table.cells(row).enumerate() {
                             @if k == 0 { th scope="row" class=[class(numbers[k])] { (breakable(cell)) } }
-                            @else { td class=[class(numbers[k])] { (kept(cell)) } }
+                            @else { td class=[(!numbers[k]).then_some("words")] { (kept(cell)) } }
                         }
                     }
                 }
@@ -53,7 +53,8 @@ pub(super) fn grid(table: &Table, caption: Option<&str>) -> Markup {
     }
 }
 
-/// Returns the class that aligns numbers to the right.
+/// Returns the class that aligns the numbers of heads to the right. Cells need none, which are most of a page: those
+/// of words have one.
 fn class(is_number: bool) -> Option<&'static str> {
     is_number.then_some("number")
 }

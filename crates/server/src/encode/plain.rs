@@ -1,16 +1,16 @@
 //! Views of the kernel in the words of the protocol.
 
 use crate::protocol::{Event, Floor, Look, Problem, Scan, Scene, Shape, StillBody, Who};
+use sidestep::kernel::InputError;
 use sidestep::kernel::view::{self, Body, Entry, Level, Occupancy, Scenery};
-use sidestep::kernel::{InputError, Simulation};
 
-/// Returns what stays as it is.
-pub(crate) fn scene(run: &dyn Simulation, scenery: &Scenery, is_recording: bool) -> Scene {
+/// Returns what stays as it is in a world, by its name and its noun for an agent.
+pub(crate) fn scene((world, agent): (&str, &str), scenery: &Scenery, is_recording: bool) -> Scene {
     let still = |body: &Body| still_body(body, scenery);
     Scene {
         name: scenery.name.clone(),
-        world: run.world().into(),
-        agent: run.agent().into(),
+        world: world.into(),
+        agent: agent.into(),
         dimensions: scenery.dimensions,
         cycle_s: scenery.cycle_s,
         floor: scenery.floor.as_ref().map(floor),

@@ -26,6 +26,7 @@
 //! out and counted.
 
 mod edit;
+mod fleet;
 mod inspected;
 mod request;
 mod shown;
@@ -34,6 +35,7 @@ mod told;
 mod typescript;
 
 pub use edit::Edit;
+pub use fleet::{Fleet, Node};
 pub use inspected::{Fact, Inspection, Mark, MarkShape, Role, Section, Table, Value};
 pub use request::{Call, Request, Speed, Subject, Who};
 pub use shown::{Cast, Event, Floor, FrameText, Look, Scan, Scene, Shape, StillBody};

@@ -189,6 +189,11 @@ pub enum Subject {
         /// Its path, as a listing gave it.
         path: String,
     },
+    /// A fleet that flies elsewhere: watched, not steered.
+    Fleet {
+        /// The endpoint that the command line named.
+        path: String,
+    },
 }
 
 /// The speed at which a run is played.

@@ -1,6 +1,6 @@
 //! The server's messages: replies, and notices without a request.
 
-use super::{Cast, Event, Inspection, Scene, SessionId, Speed};
+use super::{Cast, Event, Fleet, Inspection, Scene, SessionId, Speed};
 use serde::Serialize;
 
 /// The reply to a request.
@@ -265,9 +265,9 @@ pub enum Notice {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Named {
-    /// `scenario`, `recording` or `sweep`.
+    /// `scenario`, `recording`, `sweep` or `fleet`.
     pub kind: String,
-    /// Its path.
+    /// Its path, or the endpoint of a fleet.
     pub path: String,
 }
 
@@ -295,6 +295,8 @@ pub struct Status {
     pub digest: Option<String>,
     /// Of a recording: whether the digest was confirmed, or will be.
     pub banner: Option<String>,
+    /// Of a fleet: its nodes.
+    pub fleet: Option<Box<Fleet>>,
 }
 
 /// The activity of a session.
@@ -308,6 +310,8 @@ pub enum State {
     Paused,
     /// It is on its way to a cycle that was asked for.
     Seeking,
+    /// It goes on elsewhere, and is only watched here.
+    Watched,
     /// It has come to its end.
     Over,
     /// It cannot go on; the notice [`Notice::Ended`] says why.

@@ -27,9 +27,9 @@ fn types() -> String {
     }
     let types = all![
         Request, Call, Edit, Subject, Speed, Who, Reply, Outcome, Answer, Problem, FileEntry,
-        FileKind, MetricName, Notice, Named, Status, State, Scene, Floor, StillBody, Shape, Look,
-        Cast, SweepRun, FrameText, Scan, Event, Inspection, Section, Fact, Value, Table, Mark,
-        Role, MarkShape,
+        FileKind, MetricName, Notice, Named, Status, State, Fleet, Node, Scene, Floor, StillBody,
+        Shape, Look, Cast, SweepRun, FrameText, Scan, Event, Inspection, Section, Fact, Value,
+        Table, Mark, Role, MarkShape,
     ];
     let version = format!(
         "/** Version of requests, replies, notices and frames together. */\nexport const VERSION = {VERSION};\n"

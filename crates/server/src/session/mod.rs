@@ -13,6 +13,7 @@ mod scout;
 mod showing;
 mod stage;
 mod viewer;
+mod watching;
 
 pub(crate) use edit::{edited, model};
 pub(crate) use showing::Showcase;
@@ -31,6 +32,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
+use watching::Watching;
 
 /// The number of requests that wait for a session.
 const MOST_WAITING: usize = 256;
@@ -136,6 +138,13 @@ impl Desk {
     /// Opens what is asked for and plays it, until nobody asks any more or a bug ends it.
     fn work(self, means: Means, opening: Opening, shown: Shown) {
         let Opening { session, id, what, seed } = opening;
+        if let Subject::Fleet { path } = &what {
+            match means.screen(path) {
+                Ok(screen) => Watching::new(session, self.outbox.clone(), screen).work(&self, id),
+                Err(problem) => return self.refuse(id, problem),
+            }
+            return self.close();
+        }
         let opened = self.guarded(|| {
             let stage = Stage::open(means, &what, seed)?.shown_by(shown);
             let (outbox, interrupt) = (self.outbox.clone(), self.interrupt.clone());
@@ -153,6 +162,11 @@ impl Desk {
             Ok(()) | Err(Broken::Unwanted) => player.give_up("the session was closed"),
             Err(Broken::Bug(words)) => player.fail(bug(&words)),
         }
+        self.close();
+    }
+
+    /// Refuses what was asked after the end.
+    fn close(&self) {
         while let Ok((id, _)) = self.orders.try_recv() {
             self.refuse(id, ended());
         }

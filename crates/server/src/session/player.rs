@@ -122,8 +122,8 @@ impl Player {
 
     /// Returns what a page is told that has opened the session.
     pub(super) fn opened(&mut self) -> Answer {
-        let is_recording = self.stage.recorded.is_some();
-        let scene = scene(self.stage.run.as_ref(), &self.scenery, is_recording);
+        let (run, is_recording) = (&self.stage.run, self.stage.recorded.is_some());
+        let scene = scene((run.world(), run.agent()), &self.scenery, is_recording);
         Answer::Opened { session: self.session, scene, status: self.status(Instant::now()) }
     }
 
@@ -379,6 +379,7 @@ impl Player {
             seed: self.stage.run.plan().seed.to_string(),
             digest: digest.map(|(_, digest)| digest.clone()),
             banner,
+            fleet: None,
         }
     }
 

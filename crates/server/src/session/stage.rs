@@ -6,6 +6,7 @@ use crate::encode::problem;
 use crate::files::Files;
 use crate::keyframes::Budget;
 use crate::protocol::{Answer, Problem, Subject};
+use crate::screen::Screen;
 use sidestep::kernel::{Cycle, Simulation};
 use sidestep::scenario::{Meaning, Source, Worlds};
 use sidestep_session::{Error, Recorded, read};
@@ -27,6 +28,22 @@ pub(crate) struct Means {
     pub(crate) budget: Arc<Budget>,
     /// The place for viewers beside the page, if they are served.
     pub(crate) showcase: Option<Arc<Showcase>>,
+    /// The fleets that are watched.
+    pub(crate) screens: Vec<Arc<Screen>>,
+}
+
+impl Means {
+    /// Returns the screen of a fleet.
+    ///
+    /// # Errors
+    /// When none of this name is watched.
+    pub(super) fn screen(&self, endpoint: &str) -> Result<Arc<Screen>, Problem> {
+        let found = self.screens.iter().find(|screen| screen.endpoint == endpoint);
+        found.cloned().ok_or_else(|| {
+            let remedy = format!("start the studio with it: sidestep studio {endpoint}");
+            Problem::new(endpoint, "no fleet of this address is watched", remedy)
+        })
+    }
 }
 
 /// A run, and where it comes from.
@@ -72,6 +89,9 @@ impl Stage {
                 Self::of_scenario(means, source, seed, None)
             }
             Subject::Recording { path } => Self::of_recording(means, path, seed),
+            Subject::Fleet { path } => {
+                Err(Problem::new(path.as_str(), "a fleet has no run here", "report this as a bug"))
+            }
         }
     }
 

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use sidestep::worlds::WORLDS;
 use std::time::Instant;
 
+mod fleets;
 mod recordings;
 
 const ROBOTS: &str = "format = 1\nworld = \"robots\"\nseed = 5\ncycles = 600\n[map]\nbox_size_m = 0.25\nascii = \"\"\"\n\
@@ -33,8 +34,8 @@ struct Page {
 
 fn means(folder: &std::path::Path, workers: usize) -> Means {
     let files = Files::below(&[folder.to_path_buf()]).expect("a folder");
-    let budget = Arc::new(Budget::new(1 << 28, 1 << 28));
-    Means { worlds: WORLDS, files, workers, read_only: false, budget, showcase: None }
+    let (budget, screens) = (Arc::new(Budget::new(1 << 28, 1 << 28)), Vec::new());
+    Means { worlds: WORLDS, files, workers, read_only: false, budget, showcase: None, screens }
 }
 
 impl Page {

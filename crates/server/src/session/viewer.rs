@@ -91,26 +91,45 @@ impl Viewer {
 
     /// Sends a frame if one is due and there is credit.
     pub(super) fn attend(&mut self, run: &mut dyn Simulation, log: &mut Chronicle, now: Instant) {
-        if !self.is_stale || now < self.frame_due {
+        if !self.is_due(now) {
             return;
         }
-        if self.credit == 0 {
-            if std::mem::take(&mut self.has_moved) {
-                self.left_out = self.left_out.saturating_add(1);
-                self.frame_due = (self.frame_due + FRAME).max(now);
-            }
+        if !self.spends(now) {
             if now >= self.events_due {
                 self.drain(run, log, now);
             }
             return;
         }
-        self.frame_due = (self.frame_due + FRAME).max(now);
         self.events_due = now + EVENTS;
         let mut frame =
             run.frame(Look { scans: Scans::Of(self.scans_of.iter().filter_map(body).collect()) });
         log.note(&mut frame);
         self.send(&frame, log);
-        (self.is_stale, self.has_moved) = (false, false);
+    }
+
+    /// Sends a frame that others have made and whose events are noted, if it is due and there is credit.
+    pub(super) fn pass_on(&mut self, frame: &Frame, log: &mut Chronicle, now: Instant) {
+        if self.is_due(now) && self.spends(now) {
+            self.send(frame, log);
+        }
+    }
+
+    fn is_due(&self, now: Instant) -> bool {
+        self.is_stale && now >= self.frame_due
+    }
+
+    /// Whether there is credit for the frame that is due. One that cannot be sent is left out.
+    fn spends(&mut self, now: Instant) -> bool {
+        let has_credit = self.credit > 0;
+        if has_credit {
+            (self.is_stale, self.has_moved) = (false, false);
+        } else if std::mem::take(&mut self.has_moved) {
+            self.left_out = self.left_out.saturating_add(1);
+        } else {
+            return false;
+        }
+        self.frame_due = (self.frame_due + FRAME).max(now);
+        has_credit
     }
 
     fn send(&mut self, frame: &Frame, log: &mut Chronicle) {

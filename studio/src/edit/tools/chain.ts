@@ -1,4 +1,4 @@
-/** Obstacles, starts and targets of chains in the plane. */
+/** Obstacles, starts and targets of chains; tools that put new ones are for the plane. */
 
 import type { Edit, Place } from "../../protocol";
 import { isWithin, numbersOf, sectionsOf, valueAt, type Json, type Path, type Table } from "../keypath";
@@ -7,81 +7,118 @@ import { box, insert, remove, removeFrom, ring, rounded, set, type Item } from "
 /** How near obstacles of no thickness can be taken hold of. */
 const THIN_M = 0.02;
 
-function pointOf(value: Json | undefined): Place | null {
-  const numbers = numbersOf(value, 2);
-  return numbers && numbers.length === 2 ? [numbers[0]!, numbers[1]!, 0] : null;
+/** How places of a scenario are written: in so many numbers, and how finely. */
+interface Script {
+  dimensions: 2 | 3;
+  m_per_px: number;
 }
 
-function pointsOf(value: Json | undefined): Place[] {
-  const points = Array.isArray(value) ? value.map(pointOf) : [];
+function pointOf(value: Json | undefined, { dimensions }: Script): Place | null {
+  const numbers = numbersOf(value, dimensions);
+  return numbers && numbers.length === dimensions ? [numbers[0]!, numbers[1]!, numbers[2] ?? 0] : null;
+}
+
+function pointsOf(value: Json | undefined, script: Script): Place[] {
+  const points = Array.isArray(value) ? value.map((one) => pointOf(one, script)) : [];
   return points.every((one) => one !== null) ? points : [];
 }
 
+function written(at: Place, { dimensions, m_per_px }: Script): number[] {
+  return at.slice(0, dimensions).map((number) => rounded(number, m_per_px));
+}
+
 /** A point that is moved alone. */
-function handle(path: Path, words: string, kind: Item["kind"], at: Place, m_per_px: number, removes: () => Edit[]): Item {
+function handle(path: Path, words: string, kind: Item["kind"], at: Place, script: Script, removes: () => Edit[]): Item {
   return {
     path, words, kind, outline_m: [at], isClosed: false, at_m: at,
-    move: ([x, y]) => [set(path, [rounded(x, m_per_px), rounded(y, m_per_px)])], remove: removes,
+    move: (to) => [set(path, written(to, script))], remove: removes,
   };
 }
 
-/** Everything of a scenario of chains in the plane that has a place of its own. */
-export function chainItems(model: Table, m_per_px: number): Item[] {
-  const obstacles = sectionsOf(model, "obstacles").flatMap(({ path, value }, i) => obstacleItems(path, value, i, m_per_px));
-  const chains = sectionsOf(model, "chains").flatMap(({ path, value }, i) => startItems(path, value, i, m_per_px));
+/** Everything of a scenario of chains that has a place of its own. */
+export function chainItems(model: Table, m_per_px: number, dimensions: 2 | 3 = 2): Item[] {
+  const script = { dimensions, m_per_px };
+  const obstacles = sectionsOf(model, "obstacles").flatMap(({ path, value }, i) => obstacleItems(path, value, i, script));
+  const chains = sectionsOf(model, "chains").flatMap(({ path, value }, i) => startItems(path, value, i, script));
   return [...obstacles, ...chains];
 }
 
-function obstacleItems(path: Path, value: Table, number: number, m_per_px: number): Item[] {
+function obstacleItems(path: Path, value: Table, number: number, script: Script): Item[] {
   const words = `obstacle ${number + 1}`;
-  const radius = typeof value["radius_m"] === "number" ? value["radius_m"] : 0;
   const gone = (): Edit[] => [remove(path)];
-  const way = pointsOf(value["patrol_m"]).map((at, i) =>
-    handle([...path, "patrol_m", i], `way-point ${i + 1} of ${words}`, "goal", at, m_per_px, () => removeFrom(path, "patrol_m", i, value)),
+  const way = pointsOf(value["patrol_m"], script).map((at, i) =>
+    handle([...path, "patrol_m", i], `way-point ${i + 1} of ${words}`, "goal", at, script, () => removeFrom(path, "patrol_m", i, value)),
   );
-  const at = pointOf(value["at_m"]);
-  const sides = numbersOf(value["size_m"], 2);
+  const at = pointOf(value["at_m"], script);
   if (at) {
-    const turn = typeof value["turn_deg"] === "number" ? (value["turn_deg"] * Math.PI) / 180 : 0;
-    const outline_m = sides ? box(at, sides[0]!, sides[1]!, turn) : ring(at, Math.max(radius, THIN_M));
-    const own: Item = { ...handle([...path, "at_m"], words, "body", at, m_per_px, gone), path, outline_m, isClosed: true };
+    const own: Item = { ...handle([...path, "at_m"], words, "body", at, script, gone), path, ...outlineOf(value, at, script) };
     return [own, ...way];
   }
   const key = value["ends_m"] !== undefined ? "ends_m" : "corners_m";
-  const points = pointsOf(value[key]);
+  const points = pointsOf(value[key], script);
   if (points.length < 2) return way;
-  return [whole(path, key, words, points, key === "corners_m", m_per_px), ...corners(path, key, words, points, value, m_per_px), ...way];
+  return [whole(path, key, words, points, key === "corners_m", script), ...corners(path, key, words, points, value, script), ...way];
+}
+
+/** The outline of a ball or a box: in space, its circles or its edges in one stroke. */
+function outlineOf(value: Table, at: Place, { dimensions }: Script): Pick<Item, "outline_m" | "isClosed"> {
+  const radius = Math.max(typeof value["radius_m"] === "number" ? value["radius_m"] : 0, THIN_M);
+  const turn = typeof value["turn_deg"] === "number" ? (value["turn_deg"] * Math.PI) / 180 : 0;
+  const sides = numbersOf(value["size_m"], dimensions);
+  if (dimensions === 3) return { outline_m: sides ? cage(at, sides, turn) : globe(at, radius), isClosed: false };
+  return { outline_m: sides ? box(at, sides[0]!, sides[1]!, turn) : ring(at, radius), isClosed: true };
+}
+
+/** The edges of a box in space, some of them twice. */
+function cage([x, y, z]: Place, [width, depth, height]: readonly number[], turn_rad: number): Place[] {
+  const flat = box([x, y, 0], width!, depth!, turn_rad);
+  const corner = (k: number): Place => [flat[k % 4]![0], flat[k % 4]![1], z + (k < 4 ? -0.5 : 0.5) * height!];
+  return [0, 1, 2, 3, 0, 4, 5, 1, 5, 6, 2, 6, 7, 3, 7, 4].map(corner);
+}
+
+/** Three circles of a ball, each from where the one before ends. */
+function globe([x, y, z]: Place, radius_m: number): Place[] {
+  const steps = 24;
+  const circle = (u: 0 | 1 | 2, v: 0 | 1 | 2): Place[] => Array.from({ length: steps + steps / 4 + 1 }, (_, i) => {
+    const angle = (2 * Math.PI * i) / steps;
+    const place: Place = [x, y, z];
+    place[u] += radius_m * Math.cos(angle);
+    place[v] += radius_m * Math.sin(angle);
+    return place;
+  });
+  return [...circle(0, 1), ...circle(1, 2), ...circle(2, 0)];
 }
 
 /** A wall or a polygon as a whole: all of its points go the same way. */
-function whole(path: Path, key: string, words: string, points: Place[], isClosed: boolean, m_per_px: number): Item {
-  const middle = [0, 1].map((k) => points.reduce((sum, p) => sum + p[k]!, 0) / points.length) as [number, number];
+function whole(path: Path, key: string, words: string, points: Place[], isClosed: boolean, script: Script): Item {
+  const middle = [0, 1, 2].map((k) => points.reduce((sum, p) => sum + p[k]!, 0) / points.length) as Place;
+  const moved = (p: Place, to: Place): Place => [p[0] + to[0] - middle[0], p[1] + to[1] - middle[1], p[2] + to[2] - middle[2]];
   return {
-    path, words, kind: "body", outline_m: points, isClosed, at_m: [middle[0], middle[1], 0],
-    move: ([x, y]) => [set([...path, key], points.map((p) => [rounded(p[0] + x - middle[0], m_per_px), rounded(p[1] + y - middle[1], m_per_px)]))],
+    path, words, kind: "body", outline_m: points, isClosed, at_m: middle,
+    move: (to) => [set([...path, key], points.map((p) => written(moved(p, to), script)))],
     remove: () => [remove(path)],
   };
 }
 
-function corners(path: Path, key: string, words: string, points: Place[], value: Table, m_per_px: number): Item[] {
+function corners(path: Path, key: string, words: string, points: Place[], value: Table, script: Script): Item[] {
   const least = key === "ends_m" ? 2 : 3;
   return points.map((at, i) =>
-    handle([...path, key, i], `corner ${i + 1} of ${words}`, "point", at, m_per_px, () =>
+    handle([...path, key, i], `corner ${i + 1} of ${words}`, "point", at, script, () =>
       points.length > least ? removeFrom(path, key, i, value) : [remove(path)],
     ),
   );
 }
 
-function startItems(path: Path, value: Table, number: number, m_per_px: number): Item[] {
+function startItems(path: Path, value: Table, number: number, script: Script): Item[] {
   const words = typeof value["name"] === "string" ? value["name"] : `chain ${number + 1}`;
-  const at = pointOf(value["at_m"]);
-  const start = at ? [handle([...path, "at_m"], `start of ${words}`, "start", at, m_per_px, () => [remove(path)])] : [];
+  const at = pointOf(value["at_m"], script);
+  const start = at ? [handle([...path, "at_m"], `start of ${words}`, "start", at, script, () => [remove(path)])] : [];
   const tasks = valueAt(value, ["tasks"]);
   const list = Array.isArray(tasks) ? tasks : tasks === undefined ? [] : [tasks];
   const targets = list.flatMap((task, t) => {
     const own = Array.isArray(tasks) ? [...path, "tasks", t] : [...path, "tasks"];
-    return pointsOf(valueAt(task, ["targets_m"])).map((target, i) =>
-      handle([...own, "targets_m", i], `target ${i + 1} of ${words}`, "goal", target, m_per_px, () => removeFrom(own, "targets_m", i, task as Table)),
+    return pointsOf(valueAt(task, ["targets_m"]), script).map((target, i) =>
+      handle([...own, "targets_m", i], `target ${i + 1} of ${words}`, "goal", target, script, () => removeFrom(own, "targets_m", i, task as Table)),
     );
   });
   return [...start, ...targets];
@@ -131,7 +168,7 @@ function nearestEdge(at: Place, corners: Place[]): number {
 export function putPolygon(model: Table, a: Place, b: Place, chosen: Path | null, m_per_px: number): Edit[] {
   const round = ([x, y]: readonly number[]): number[] => [rounded(x!, m_per_px), rounded(y!, m_per_px)];
   const host = chosenObstacle(model, chosen);
-  const corners = pointsOf(host?.value["corners_m"]);
+  const corners = pointsOf(host?.value["corners_m"], { dimensions: 2, m_per_px });
   if (host && corners.length >= 3) {
     return [{ ...insert([...host.path, "corners_m"], round(b)), at: nearestEdge(b, corners) } as Edit];
   }

@@ -42,6 +42,10 @@ const CHAIN: readonly Tool[] = [
   tool("polygon", "△", "Polygon", "Drag one side of a triangle; a click adds a corner to the polygon that is chosen"),
   tool("patrol", "⇄", "Patrol", "Click adds a way-point to the chosen ball or box, which then goes to and fro"),
 ];
+/** In space there is no place for what is new: what is there is moved. */
+const CHAIN_IN_SPACE: readonly Tool[] = [
+  tool("select", "↖", "Select", "Drag moves in the plane of the view, an arrow of the chosen thing along its axis; Delete takes away"),
+];
 const AIRSPACE: readonly Tool[] = [
   SELECT,
   tool("airplane", "✈", "Airplane", "Drag from its start to its first way-point"),
@@ -50,7 +54,7 @@ const AIRSPACE: readonly Tool[] = [
 
 /** The tools that fit a scene; none where nothing of it can be drawn upon. */
 export function toolsOf(scene: Scene): readonly Tool[] {
-  if (scene.dimensions !== 2) return [];
+  if (scene.dimensions !== 2) return scene.world === "chain" ? CHAIN_IN_SPACE : [];
   if (scene.world === "robots") return ROBOTS;
   if (scene.world === "chain") return CHAIN;
   return scene.world === "airspace" ? AIRSPACE : [];

@@ -112,7 +112,7 @@ pub(super) fn hold_out(f: &mut Formatter<'_>, fits: &[Fit]) -> Result {
             fit.held_out,
             tested(format!("{:.2}", fit.chi_square)),
             fit.degrees_of_freedom,
-            tested(format!("{:.4}", fit.p_value)),
+            tested(column_p(fit.p_value)),
             shown(fit.log_loss),
             shown(fit.log_loss_floor)
         )?;
@@ -149,8 +149,16 @@ fn verdicts(fits: &[Fit]) -> Vec<String> {
     words
 }
 
+/// Probabilities below it are not told apart, and none of them is 0.
+const LEAST_P: f64 = 0.0001;
+
 fn shown_p(p: f64) -> String {
-    if p < 0.0001 { "< 0.0001".into() } else { format!("= {p:.4}") }
+    if p < LEAST_P { format!("< {LEAST_P}") } else { format!("= {p:.4}") }
+}
+
+/// Returns a probability for the column of a table.
+fn column_p(p: f64) -> String {
+    if p < LEAST_P { format!("<{LEAST_P}") } else { format!("{p:.4}") }
 }
 
 #[cfg(test)]
@@ -180,6 +188,12 @@ mod tests {
         assert_eq!(told(&[fit(1.0, 0)]), "Too few counts to test: 1 of 1 tables.");
         let lines = told(&[Fit { table: "a_table_of_turns".into(), ..fit(0.00001, 4) }]);
         assert!(lines.lines().all(|line| line.chars().count() <= 80), "{lines}");
+    }
+
+    #[test]
+    fn no_probability_is_told_as_none() {
+        assert_eq!([1e-9, 0.0001, 0.25].map(column_p), ["<0.0001", "0.0001", "0.2500"]);
+        assert_eq!(shown_p(0.0), "< 0.0001");
     }
 
     #[test]

@@ -1,0 +1,85 @@
+//! Fleets that the studio watches: `sidestep-link` hears them, in a thread for each, and a screen shows them.
+
+use crate::exit::Failure;
+use crate::link;
+use sidestep_server::Screen;
+use sidestep_session::fleet::{Failed, Job, Tls, Told, WatchJob};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{Sender, channel};
+
+/// Seconds that a fleet has to answer; after as long a silence it is taken to be gone.
+const PATIENCE_S: f64 = 10.0;
+
+/// Whether the command line names a fleet's endpoint here, e.g. `tcp/127.0.0.1:7600`, rather than a file.
+pub(crate) fn is_endpoint(named: &Path) -> bool {
+    let is_one = named.to_str().and_then(|text| {
+        let address = ["tcp/", "tls/"].iter().find_map(|protocol| text.strip_prefix(protocol))?;
+        let (host, port) = address.rsplit_once(':')?;
+        Some(!host.is_empty() && !host.contains('/') && port.parse::<u16>().is_ok())
+    });
+    is_one == Some(true) && !named.exists()
+}
+
+/// Divides what is named into files and endpoints of fleets.
+pub(crate) fn divided(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
+    let (fleets, files): (Vec<&PathBuf>, Vec<&PathBuf>) =
+        named.iter().partition(|path| is_endpoint(path));
+    let fleets = fleets.into_iter().map(|path| path.display().to_string()).collect();
+    (files.into_iter().cloned().collect(), fleets)
+}
+
+/// Begins to watch a fleet; returns its screen once it has answered.
+///
+/// # Errors
+/// When the program that carries the network is not there, or the fleet does not answer.
+pub(crate) fn watch(endpoint: &str, tls: Option<Tls>) -> Result<Arc<Screen>, Failure> {
+    let job = Job::Watch(WatchJob {
+        build: sidestep_session::build().into(),
+        connect: vec![endpoint.to_string()],
+        tls,
+        patience_s: PATIENCE_S,
+    });
+    let (began, begins) = channel();
+    let endpoint = endpoint.to_string();
+    std::thread::spawn(move || hear(&job, &endpoint, &began));
+    // It says how it began, or why it did not, in any case.
+    begins.recv().unwrap_or(Err(Failure::Interrupted))
+}
+
+/// Puts what is heard on a screen, until the fleet is over or gone.
+fn hear(job: &Job, endpoint: &str, began: &Sender<Result<Arc<Screen>, Failure>>) {
+    let mut screen: Option<Arc<Screen>> = None;
+    let done = link::run(job, |told| match (told, &screen) {
+        (Told::Scene(staged), None) => {
+            let made = Arc::new(Screen::new(endpoint.to_string(), *staged));
+            // Whoever waits is there until it has an answer.
+            let _ = began.send(Ok(made.clone()));
+            screen = Some(made);
+        }
+        (Told::Seen(seen), Some(screen)) => screen.show(*seen),
+        // Said of other jobs, or by the end of this one.
+        _ => {}
+    });
+    match (done, screen) {
+        (Err(failure), Some(screen)) => {
+            let Failed { cause, remedy, .. } = Failed::from(&failure);
+            screen.lose(&cause, &remedy);
+        }
+        (Err(failure), None) => drop(began.send(Err(failure))),
+        (Ok(()), _) => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn endpoints_are_told_from_files() {
+        let named = ["tcp/127.0.0.1:7600", "tls/host:1", "a.toml", "tcp/a", "tcp/a/b:1", "tcp/:1"];
+        let (files, fleets) = divided(&named.map(PathBuf::from));
+        assert_eq!(fleets, ["tcp/127.0.0.1:7600", "tls/host:1"]);
+        assert_eq!(files.len(), 4);
+    }
+}

@@ -1,0 +1,71 @@
+//! The fleet as it is shown to those who watch it.
+
+use crate::wire::window::Window;
+use sidestep::kernel::Cycle;
+use sidestep::kernel::view::{Entry, Frame};
+use sidestep_session::fleet::{FleetNow, Seen, Staged};
+use std::time::Duration;
+
+/// Number of events that a view holds, the last ones.
+const MOST_EVENTS: usize = 200;
+
+/// Time that the last view waits at the end for those who watch.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// What is shown at a window.
+#[derive(Debug)]
+pub(super) struct Shown {
+    window: Window,
+    number: u64,
+    /// The newest frame, without its events.
+    frame: Option<Frame>,
+    events: Vec<Entry>,
+}
+
+impl Shown {
+    pub(super) fn new(window: Window) -> Self {
+        Self { window, number: 0, frame: None, events: Vec::new() }
+    }
+
+    /// Whether somebody watches who has no frame of this cycle.
+    pub(super) fn wants_frame(&self, cycle: Cycle) -> bool {
+        self.frame.as_ref().is_none_or(|frame| frame.cycle != cycle) && self.window.is_watched()
+    }
+
+    /// Takes a frame.
+    pub(super) fn take(&mut self, mut frame: Frame) {
+        self.events.append(&mut frame.log);
+        let too_many = self.events.len().saturating_sub(MOST_EVENTS);
+        self.events.drain(..too_many);
+        frame.log_left_out += too_many as u64;
+        self.frame = Some(frame);
+    }
+
+    /// Shows the newest frame with the nodes as they are now.
+    pub(super) fn show(&mut self, fleet: &FleetNow, is_over: bool) {
+        let Some(frame) = &self.frame else { return };
+        self.number += 1;
+        let frame = Frame { log: self.events.clone(), ..frame.clone() };
+        let seen = Seen { number: self.number, frame, fleet: fleet.clone(), is_over };
+        self.window.show(self.number, json(&seen));
+    }
+
+    /// Whether somebody watches.
+    pub(super) fn is_watched(&self) -> bool {
+        self.window.is_watched()
+    }
+
+    /// Leaves the last view for a while to those who watch.
+    pub(super) fn linger(&self) {
+        self.window.linger(PATIENCE);
+    }
+}
+
+/// Returns the scene as a text.
+pub(super) fn scene(staged: &Staged) -> String {
+    json(staged)
+}
+
+fn json(what: &impl serde::Serialize) -> String {
+    serde_json::to_string(what).expect("what is seen is plain data")
+}

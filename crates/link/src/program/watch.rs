@@ -1,0 +1,93 @@
+//! Somebody who watches a fleet: asks for what is to be seen of it, and tells it on.
+
+use super::lifeline::Lifeline;
+use super::node::wrong_endpoint;
+use super::told::tell;
+use crate::wire::window::Outlook;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use sidestep::kernel::InputError;
+use sidestep_session::Error;
+use sidestep_session::fleet::{Seen, Staged, Told, WatchJob};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+/// Time between two questions.
+const EVERY: Duration = Duration::from_millis(50);
+
+/// Watches a fleet until it is over, or whoever wanted to see it has seen enough.
+///
+/// # Errors
+/// When nobody answers, it is of another build, or it is not heard any more.
+pub(super) fn watch(job: &WatchJob, lifeline: &Lifeline) -> Result<(), Error> {
+    let patience = Duration::from_secs_f64(job.patience_s);
+    let outlook = Outlook::new(&job.connect, job.tls.as_ref(), patience).map_err(wrong_endpoint)?;
+    let mut viewer = Viewer { job, lifeline, patience, heard: Instant::now() };
+    let Some(scene) = viewer.first(|| outlook.scene())? else { return Ok(()) };
+    check_build(&scene, job)?;
+    tell(&Told::Scene(Box::new(read::<Staged>(&scene, job)?)));
+    let mut number = 0;
+    while let Some(text) = viewer.first(|| outlook.view(number))? {
+        if !text.is_empty() {
+            let seen: Seen = read(&text, job)?;
+            let is_over = seen.is_over;
+            number = seen.number;
+            tell(&Told::Seen(Box::new(seen)));
+            if is_over {
+                break;
+            }
+        }
+        sleep(EVERY);
+    }
+    Ok(())
+}
+
+struct Viewer<'a> {
+    job: &'a WatchJob,
+    lifeline: &'a Lifeline,
+    patience: Duration,
+    heard: Instant,
+}
+
+impl Viewer<'_> {
+    /// Asks until there is an answer; `None` when nobody wants it any more.
+    fn first(&mut self, ask: impl Fn() -> Option<String>) -> Result<Option<String>, Error> {
+        while !self.lifeline.has_ended() {
+            if let Some(text) = ask() {
+                self.heard = Instant::now();
+                return Ok(Some(text));
+            }
+            if self.heard.elapsed() > self.patience {
+                let (place, s) = (self.job.connect.join(", "), self.patience.as_secs_f64());
+                let cause = format!("the fleet at {place} was not heard for {s} s");
+                return Err(Error::stopped(cause, "see whether it flies, and watch it again"));
+            }
+            // No answer may come at once, where there is no link.
+            sleep(EVERY);
+        }
+        Ok(None)
+    }
+}
+
+fn read<T: DeserializeOwned>(text: &str, job: &WatchJob) -> Result<T, Error> {
+    serde_json::from_str(text).map_err(|e| {
+        let remedy = "see whether this is the address of a fleet's server";
+        InputError::new(job.connect.join(", "), format!("its view cannot be read: {e}"), remedy)
+            .into()
+    })
+}
+
+/// Refuses a fleet of another build, whose views may have another form.
+fn check_build(scene: &str, job: &WatchJob) -> Result<(), Error> {
+    #[derive(Deserialize)]
+    struct Made {
+        build: String,
+    }
+    let Made { build } = read(scene, job)?;
+    if build == job.build {
+        return Ok(());
+    }
+    let cause = format!("the fleet is of sidestep {build}, and this is {}", job.build);
+    let remedy = "watch it with the build that flies it";
+    Err(InputError::new(job.connect.join(", "), cause, remedy).into())
+}

@@ -1,0 +1,156 @@
+//! The window of a fleet: what is to be seen of it, for who asks at its server by query and reply.
+//!
+//! Nobody is sent anything unasked, and each who watches has one question on the way: so whoever is slow, or has stopped,
+//! sees less and slows nobody. What is shown is made only while somebody asks.
+
+use super::zenoh::{WireError, ZenohWire, asking};
+use sidestep_session::fleet::Tls;
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+use zenoh::qos::CongestionControl;
+use zenoh::query::{Query, Queryable};
+use zenoh::{Session, Wait};
+
+/// The key of what stays as it is; no party has that name.
+const SCENE: &str = "sidestep/scene";
+
+/// The key of the newest view.
+const VIEW: &str = "sidestep/view";
+
+/// Time after a question in which its asker is taken to watch.
+const WATCHED: Duration = Duration::from_secs(3);
+
+/// Time between two looks at whether the last view was fetched.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// Time that an answer may take.
+const ANSWERED_WITHIN: Duration = Duration::from_secs(1);
+
+/// The newest view, and who has it.
+#[derive(Debug, Default)]
+struct Pane {
+    text: String,
+    number: u64,
+    /// The largest number of a view that was fetched.
+    fetched: u64,
+    asked: Option<Instant>,
+}
+
+impl Pane {
+    /// Returns the view if it is newer than the one that the asker has, else nothing.
+    fn ask(&mut self, after: u64) -> String {
+        self.asked = Some(Instant::now());
+        if self.number <= after {
+            return String::new();
+        }
+        self.fetched = self.number;
+        self.text.clone()
+    }
+}
+
+/// The server's side of the window. It stays open until it is dropped.
+pub struct Window {
+    pane: Arc<Mutex<Pane>>,
+    _answers: [Queryable<()>; 2],
+    _session: Session,
+}
+
+impl fmt::Debug for Window {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Window").finish_non_exhaustive()
+    }
+}
+
+fn locked(pane: &Mutex<Pane>) -> MutexGuard<'_, Pane> {
+    pane.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Window {
+    /// Opens a window at a server's wire, with what stays as it is.
+    ///
+    /// # Errors
+    /// When the wire is closed.
+    pub fn open(wire: &ZenohWire, scene: String) -> Result<Self, WireError> {
+        let (session, pane) = (wire.session().clone(), Arc::new(Mutex::new(Pane::default())));
+        let closed =
+            |e: zenoh::Error| WireError::Taken { endpoint: VIEW.into(), reason: e.to_string() };
+        let tell_scene = move |query: Query| reply(&query, scene.clone());
+        let scenes = session.declare_queryable(SCENE).callback(tell_scene).wait();
+        let asked = pane.clone();
+        let tell_view = move |query: Query| {
+            let after = query.parameters().get("after").and_then(|number| number.parse().ok());
+            let text = locked(&asked).ask(after.unwrap_or(0));
+            reply(&query, text);
+        };
+        let views = session.declare_queryable(VIEW).callback(tell_view).wait();
+        let answers = [scenes.map_err(closed)?, views.map_err(closed)?];
+        Ok(Self { pane, _answers: answers, _session: session })
+    }
+
+    /// Whether somebody has asked a short while ago.
+    pub fn is_watched(&self) -> bool {
+        locked(&self.pane).asked.is_some_and(|asked| asked.elapsed() < WATCHED)
+    }
+
+    /// Shows a view; numbers rise.
+    pub fn show(&self, number: u64, text: String) {
+        let mut pane = locked(&self.pane);
+        (pane.number, pane.text) = (number, text);
+    }
+
+    /// Waits a little until somebody has fetched the last view, if anybody watches.
+    pub fn linger(&self, within: Duration) {
+        let until = Instant::now() + within;
+        let is_fetched = || {
+            let pane = locked(&self.pane);
+            pane.fetched == pane.number
+        };
+        while self.is_watched() && !is_fetched() && Instant::now() < until {
+            sleep(LOOK);
+        }
+    }
+}
+
+fn reply(query: &Query, text: String) {
+    // Who has gone meanwhile needs no answer.
+    let _ = query.reply(query.key_expr().clone(), text).wait();
+}
+
+/// The viewer's side of the window.
+pub struct Outlook(Session);
+
+impl fmt::Debug for Outlook {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Outlook").finish_non_exhaustive()
+    }
+}
+
+impl Outlook {
+    /// Connects with a fleet's server, at one of some endpoints.
+    ///
+    /// # Errors
+    /// When none of them answers within some time.
+    pub fn new(connect: &[String], tls: Option<&Tls>, within: Duration) -> Result<Self, WireError> {
+        asking(connect, tls, within).map(Self)
+    }
+
+    /// Asks for what stays as it is; `None` when there is no answer.
+    pub fn scene(&self) -> Option<String> {
+        self.ask(SCENE)
+    }
+
+    /// Asks for a view newer than one with a number: nothing where there is none. `None` when there is no answer.
+    pub fn view(&self, after: u64) -> Option<String> {
+        self.ask(&format!("{VIEW}?after={after}"))
+    }
+
+    fn ask(&self, selector: &str) -> Option<String> {
+        let asked = self.0.get(selector).timeout(ANSWERED_WITHIN);
+        // An answer that cannot be sent soon is lost, and asked for again.
+        let replies = asked.congestion_control(CongestionControl::Drop).wait().ok()?;
+        let reply = replies.recv().ok()?.into_result().ok()?;
+        String::from_utf8(reply.payload().to_bytes().into_owned()).ok()
+    }
+}

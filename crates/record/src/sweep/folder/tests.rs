@@ -1,0 +1,114 @@
+//! A sweep from its plan to its table; and what leaves nothing.
+
+use super::super::shares::Share;
+use super::*;
+use sidestep_kernel::ports::Values;
+
+type Folder = SweepFolder<Vec<u32>>;
+
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Failed(String);
+
+impl From<InputError> for Failed {
+    fn from(e: InputError) -> Self {
+        Self(e.to_string())
+    }
+}
+
+impl From<RecordError> for Failed {
+    fn from(e: RecordError) -> Self {
+        Self(e.to_string())
+    }
+}
+
+fn cells() -> Vec<RoleColumn<String>> {
+    let values = Values::I64(vec![0, 1].into());
+    vec![RoleColumn { name: "cell".into(), role: "cell".into(), values }]
+}
+
+fn create(path: &Path) -> Result<Folder, Failed> {
+    Folder::create(path, "0.1.0", "0.1.0+a", |staging| {
+        let files = [("inputs/a.txt".to_string(), b"a".to_vec())];
+        Folder::write_variant(staging, 0, "seed = 1\n", &files)?;
+        Ok((vec![4, 5], vec!["f".into()], cells()))
+    })
+}
+
+#[test]
+fn a_sweep_goes_from_plan_over_shares_to_one_table() {
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("sweep");
+    let folder = create(&path).unwrap();
+    assert_eq!(fs::read_to_string(folder.scenario(0)).unwrap(), "seed = 1\n");
+    let share = Share { index: 1, count: 2 };
+    let mut journal = folder.journal(share, |_: u32| panic!("a run")).unwrap().unwrap();
+    journal.append(&7u32).unwrap();
+    let runs = |but| {
+        let mut runs: Vec<u32> = Vec::new();
+        folder.journals(but, |run| runs.push(run)).unwrap();
+        runs
+    };
+    assert_eq!((runs(None), runs(Some(share))), (vec![7], vec![]));
+    let cells_again = cells();
+    let refs: Vec<_> = cells_again.iter().collect();
+    folder.end_share(share, journal, &refs).unwrap();
+    let again = folder.journal(share, |_: u32| ()).unwrap();
+    assert!(again.is_none(), "a share that is done is done");
+    assert!(runs(None).is_empty());
+    let mut parts = Vec::new();
+    folder.parts(|part| parts.push(part.columns)).unwrap();
+    assert_eq!(parts, [cells()]);
+    assert!(folder.results::<String>().unwrap_err().cause().contains("not done"));
+    let mut completion = folder.completion(&refs, &refs).unwrap();
+    assert!(!folder.is_complete());
+    completion.append(&refs, &refs).unwrap();
+    completion.append(&refs, &refs).unwrap();
+    completion.finish().unwrap();
+    let again = Folder::open(&path).unwrap();
+    assert_eq!((again.plan(), again.is_complete()), (&vec![4, 5], true));
+    let twice = Values::I64(vec![0, 1, 0, 1].into());
+    assert_eq!(again.results::<String>().unwrap().columns[0].values, twice);
+}
+
+#[test]
+fn a_table_of_runs_that_is_not_finished_and_a_place_to_join_them_leave_nothing() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = create(&place.path().join("sweep")).unwrap();
+    let names = || {
+        let entries = fs::read_dir(folder.path()).unwrap();
+        let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name()).collect();
+        names.sort();
+        names
+    };
+    let before = names();
+    let columns = cells();
+    let refs: Vec<_> = columns.iter().collect();
+    let mut completion = folder.completion(&refs, &refs).unwrap();
+    completion.append(&refs, &refs).unwrap();
+    drop(completion);
+    // A kill leaves its files there.
+    std::mem::forget(folder.scratch().unwrap());
+    fs::write(folder.path().join(SCRATCH).join("old"), "rest").unwrap();
+    let scratch = folder.scratch().unwrap();
+    assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 0);
+    drop(scratch);
+    assert_eq!(names(), before);
+}
+
+#[test]
+fn a_plan_that_fails_leaves_nothing() {
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("a/sweep");
+    let made = Folder::create::<String, _>(&path, "0.1.0", "0.1.0+a", |_| Err(Failed("no".into())));
+    assert!(made.is_err());
+    assert_eq!(fs::read_dir(place.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn nothing_of_yours_is_overwritten() {
+    let place = tempfile::tempdir().unwrap();
+    fs::write(place.path().join("letter.txt"), "dear").unwrap();
+    assert!(create(place.path()).is_err());
+    assert!(Folder::open(place.path()).unwrap_err().cause().contains("no sweep"));
+}

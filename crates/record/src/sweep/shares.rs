@@ -1,0 +1,162 @@
+//! Shares of a sweep: each has a journal while it runs, and a part of the table once it is done.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use sidestep_kernel::InputError;
+use sidestep_kernel::ports::{RecordError, RoleColumn};
+
+use super::folder::{SHARES, SweepFolder};
+use super::journal::{Journal, read_journal};
+use crate::whole::{self, WholeTable};
+
+/// A share of the cells: number `index` of `count`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Share {
+    /// Its number, from 0.
+    pub index: u32,
+    /// The number of shares.
+    pub count: u32,
+}
+
+impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
+    /// Opens the journal of a share to write, and passes its entries on; `None` if the share is
+    /// done.
+    ///
+    /// # Errors
+    /// A journal that another process writes, or that is damaged.
+    pub fn journal<T: DeserializeOwned>(
+        &self,
+        share: Share,
+        each: impl FnMut(T),
+    ) -> Result<Option<Journal>, InputError> {
+        if self.share_file(share, "parquet").is_file() {
+            return Ok(None);
+        }
+        let path = self.share_file(share, "journal");
+        Journal::open(&path, &self.manifest().program_version, each).map(Some)
+    }
+
+    /// Writes the runs of a share as its part, and deletes the journal.
+    ///
+    /// # Errors
+    /// An I/O error; the journal stays then.
+    pub fn end_share<R: Serialize>(
+        &self,
+        share: Share,
+        journal: Journal,
+        runs: &[&RoleColumn<R>],
+    ) -> Result<(), RecordError> {
+        let version = &self.manifest().program_version;
+        whole::write(&self.share_file(share, "parquet"), runs, version, &[])?;
+        drop(journal);
+        let path = self.share_file(share, "journal");
+        fs::remove_file(&path).map_err(|e| RecordError::new(path.display(), e))
+    }
+
+    /// Passes on the parts of shares that are done, one by one, and those block by block.
+    ///
+    /// # Errors
+    /// A part that cannot be read; blocks before have been passed on.
+    pub fn parts<R: DeserializeOwned + Clone>(
+        &self,
+        mut each: impl FnMut(WholeTable<R>),
+    ) -> Result<(), InputError> {
+        for share in self.shares_with("parquet")? {
+            let path = self.share_file(share, "parquet");
+            let mut version = Ok(());
+            whole::read_blocks(&path, |block| {
+                version = self.check_version(&path, &block);
+                if version.is_ok() {
+                    each(block);
+                }
+            })?;
+            version?;
+        }
+        Ok(())
+    }
+
+    /// Passes on the runs of shares that are in progress or were stopped; not of those with a part,
+    /// nor of `but`.
+    ///
+    /// # Errors
+    /// A journal that cannot be read.
+    pub fn journals<T: DeserializeOwned>(
+        &self,
+        but: Option<Share>,
+        mut each: impl FnMut(T),
+    ) -> Result<(), InputError> {
+        let done = self.shares_with("parquet")?;
+        for share in self.shares_with("journal")? {
+            if !done.contains(&share) && Some(share) != but {
+                let path = self.share_file(share, "journal");
+                read_journal(&path, &self.manifest().program_version, &mut each)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the shares that somebody has begun, in order, and whether each is done.
+    ///
+    /// # Errors
+    /// A folder that cannot be read.
+    pub fn shares(&self) -> Result<Vec<(Share, bool)>, InputError> {
+        // Journals first: a share that ends between both looks is seen as one that is done.
+        let mut shares = self.shares_with("journal")?;
+        let done = self.shares_with("parquet")?;
+        shares.extend(&done);
+        shares.sort();
+        shares.dedup();
+        Ok(shares.into_iter().map(|share| (share, done.contains(&share))).collect())
+    }
+
+    /// Passes on the finished runs of a share that is in progress or was stopped.
+    ///
+    /// # Errors
+    /// A journal that cannot be read, also because the share has ended meanwhile.
+    pub fn journal_of<T: DeserializeOwned>(
+        &self,
+        share: Share,
+        each: impl FnMut(T),
+    ) -> Result<(), InputError> {
+        let path = self.share_file(share, "journal");
+        read_journal(&path, &self.manifest().program_version, each)
+    }
+
+    fn check_version<R>(&self, path: &Path, table: &WholeTable<R>) -> Result<(), InputError> {
+        let (wrote, ours) = (&table.program_version, &self.manifest().program_version);
+        if wrote == ours {
+            return Ok(());
+        }
+        let cause = format!("its runs are of sidestep {wrote}, the sweep is of {ours}");
+        Err(InputError::new(path.display(), cause, "delete it, and run this share again"))
+    }
+
+    fn share_file(&self, share: Share, extension: &str) -> PathBuf {
+        let Share { index, count } = share;
+        self.path().join(SHARES).join(format!("{index}-of-{count}.{extension}"))
+    }
+
+    /// Returns the shares that have a file with this extension, in order.
+    fn shares_with(&self, extension: &str) -> Result<Vec<Share>, InputError> {
+        let folder = self.path().join(SHARES);
+        let failed = |e: std::io::Error| {
+            InputError::new(folder.display(), e.to_string(), "make the folder readable")
+        };
+        let mut shares = Vec::new();
+        for entry in fs::read_dir(&folder).map_err(failed)? {
+            let name = entry.map_err(failed)?.file_name();
+            shares.extend(name.to_str().and_then(|name| share_of(name, extension)));
+        }
+        shares.sort();
+        Ok(shares)
+    }
+}
+
+/// Returns the share whose file has this name.
+fn share_of(name: &str, extension: &str) -> Option<Share> {
+    let (index, count) = name.strip_suffix(extension)?.strip_suffix('.')?.split_once("-of-")?;
+    Some(Share { index: index.parse().ok()?, count: count.parse().ok()? })
+}

@@ -1,0 +1,121 @@
+//! Fleets that fly elsewhere: each view once, events once, no order taken, and the loss told.
+
+use super::*;
+use crate::screen::Screen;
+use sidestep::kernel::Simulation;
+use sidestep::kernel::view::Look;
+use sidestep_session::fleet::{FleetNow, NodeNow, Seen, Staged};
+
+const AT: &str = "tcp/127.0.0.1:7600";
+
+/// A flight that somebody else computes.
+struct Elsewhere {
+    run: Box<dyn Simulation>,
+    screen: Arc<Screen>,
+    number: u64,
+    events: Vec<sidestep::kernel::view::Entry>,
+}
+
+impl Elsewhere {
+    fn begin() -> Self {
+        let source = Source::new("s.toml", AIRPLANES, "");
+        let compiled = WORLDS.compile(&source).expect("it is right");
+        let mut run = compiled.start(&source, 1);
+        run.watch();
+        let staged = Staged {
+            build: "b".into(),
+            world: run.world().into(),
+            agent: run.agent().into(),
+            seed: 7,
+            scenery: run.scenery(),
+        };
+        let screen = Arc::new(Screen::new(AT.into(), staged));
+        Self { run, screen, number: 0, events: Vec::new() }
+    }
+
+    /// Flies on and shows it, with all events so far.
+    fn show(&mut self, cycles: u64, is_over: bool) {
+        self.run.advance(cycles);
+        self.number += 1;
+        let mut frame = self.run.frame(Look::BODIES);
+        self.events.append(&mut frame.log);
+        frame.log.clone_from(&self.events);
+        let nodes = (0..6).map(|airplane| NodeNow { airplane, ..NodeNow::default() }).collect();
+        let fleet = FleetNow { cycle: frame.cycle, cycles: 40, nodes, ..FleetNow::default() };
+        self.screen.show(Seen { number: self.number, frame, fleet, is_over });
+    }
+
+    fn page(&self) -> Page {
+        let folder = tempfile::tempdir().expect("a folder");
+        let means = Means { screens: vec![self.screen.clone()], ..means(folder.path(), 1) };
+        let (page, opened) = Page::of(means, Subject::Fleet { path: AT.into() }, folder);
+        let opened = &opened["answer"];
+        assert_eq!(
+            (&opened["is"], &opened["scene"]["agent"]),
+            (&"opened".into(), &"airplane".into())
+        );
+        page
+    }
+}
+
+fn status(page: &mut Page, is_it: impl Fn(&Value) -> bool) -> Value {
+    page.until("a status", |page| {
+        let is_found = |notice: &&Value| notice["notice"] == "status" && is_it(notice);
+        page.notices.iter().rfind(is_found).cloned()
+    })
+}
+
+#[test]
+fn views_are_shown_as_they_are_heard_and_no_event_twice() {
+    let mut elsewhere = Elsewhere::begin();
+    elsewhere.show(0, false);
+    let mut page = elsewhere.page();
+    page.ask(json!({ "do": "credit", "session": 1, "frames": 100 }));
+    page.until("a frame", |page| (!page.frames.is_empty()).then_some(()));
+    for _ in 0..4 {
+        elsewhere.show(9, false);
+        let cycle = elsewhere.run.cycle() as f64;
+        let now = status(&mut page, |status| status["cycle"] == cycle);
+        assert_eq!((&now["state"], &now["cycles_planned"]), (&"watched".into(), &40.0.into()));
+        assert_eq!(now["fleet"]["nodes"].as_array().map(Vec::len), Some(6));
+    }
+    assert!(elsewhere.events.len() > 3, "there is something to tell");
+    let told =
+        page.ask(json!({ "do": "events", "session": 1, "from": 0, "until": 99, "most": 5000 }));
+    assert_eq!(told["entries"].as_array().map(Vec::len), Some(elsewhere.events.len()));
+    elsewhere.show(4, true);
+    status(&mut page, |status| status["state"] == "over");
+}
+
+#[test]
+fn what_would_steer_a_fleet_is_refused_and_its_loss_ends_the_session() {
+    let mut elsewhere = Elsewhere::begin();
+    elsewhere.show(1, false);
+    let mut page = elsewhere.page();
+    for call in [
+        json!({ "do": "play", "session": 1, "speed": "fastest" }),
+        json!({ "do": "step", "session": 1, "cycles": 1 }),
+        json!({ "do": "source", "session": 1 }),
+    ] {
+        let id = page.send(call.clone());
+        let cause = page.wait(id)["problem"]["cause"].clone();
+        assert_eq!(cause, "a fleet is only watched here", "{call}");
+    }
+    elsewhere.screen.lose("it was not heard", "watch it again");
+    let ended = page.until("the end", |page| {
+        page.notices.iter().find(|notice| notice["notice"] == "ended").cloned()
+    });
+    assert_eq!(ended["problem"]["cause"], "it was not heard");
+    status(&mut page, |status| status["state"] == "failed");
+}
+
+#[test]
+fn a_fleet_that_the_command_line_did_not_name_is_no_fleet() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let what = Subject::Fleet { path: AT.into() };
+    let (_, refused) = Page::of(means(folder.path(), 1), what, folder);
+    assert_eq!(
+        refused["problem"]["remedy"],
+        format!("start the studio with it: sidestep studio {AT}")
+    );
+}

@@ -1,0 +1,38 @@
+/** Who hears whom in a fleet, and how its nodes are. */
+
+import { describe, expect, test } from "vitest";
+import { fleetWords, healthOf, linksOf } from "../../src/fleet/links";
+import type { Fleet, Node } from "../../src/protocol";
+
+function node(agent: number, heard: number[], more: Partial<Node> = {}): Node {
+  return {
+    agent, heard, state: "done", epoch: 1, round: 2, flown: 3, late: 0, lives: 1, packets_per_s: 4, bytes_per_s: 5, silent_s: 0.1,
+    ...more,
+  };
+}
+
+function fleet(nodes: Node[], has_begun = true): Fleet {
+  return { has_begun, silent_s: 0, late_cycles: 0, talk_p50_ms: null, talk_p99_ms: null, nodes };
+}
+
+describe("links", () => {
+  test("two that hear each other have one link, and one that is not heard back has a one-sided one", () => {
+    const all = fleet([node(0, [1]), node(1, [0]), node(2, [0])]);
+    expect(linksOf(all, null)).toEqual([{ from: 0, to: 1, isMutual: true }, { from: 0, to: 2, isMutual: false }]);
+    expect(linksOf(all, 1)).toEqual([{ from: 0, to: 1, isMutual: true }]);
+    expect(linksOf(all, 3)).toEqual([]);
+  });
+});
+
+describe("nodes", () => {
+  test("are well, late or away", () => {
+    expect([node(0, []), node(0, [], { silent_s: 3 }), node(0, [], { state: "gone" }), node(0, [], { silent_s: null, state: "awaited" })].map(healthOf))
+      .toEqual(["well", "late", "away", "away"]);
+  });
+
+  test("are told in a few words", () => {
+    expect(fleetWords(fleet([node(0, [])]))).toBe("1 node");
+    expect(fleetWords(fleet([node(0, []), node(1, [], { state: "gone" }), node(2, [], { silent_s: 9 })]))).toBe("3 nodes, 1 late, 1 lost");
+    expect(fleetWords(fleet([node(0, [], { state: "awaited" })], false))).toBe("1 node, 1 awaited");
+  });
+});
