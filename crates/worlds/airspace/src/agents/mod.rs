@@ -14,7 +14,7 @@
 //! | [`intent`] | tells what nobody can see, once, for methods that find headings |
 //! | [`grouping`] | finds who decides together, where nobody announces it |
 //! | [`exchange`] | the shield: whether plans are safe together |
-//! | [`packet`] | the bytes around every message, and what is dropped |
+//! | [`packet`] | the subjects of talks, and packets on their way out |
 //!
 //! No agent waits for ever: one that is not heard is presumed where it was last heard
 //! ([`contact`]).

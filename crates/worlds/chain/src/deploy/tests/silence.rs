@@ -103,19 +103,20 @@ fn a_partition_and_a_radio_that_does_not_reach_stop_the_chain() {
     assert_eq!(short.metrics()["contacts_lost"], 10, "nobody reaches anybody");
 }
 
-/// Losses come in bursts, or packets take their time: the chain goes on, as all of a motion or none of it.
 #[test]
-fn bursts_and_narrow_links_cost_time() {
-    let progress = |network: &str| {
+fn bursts_of_losses_stop_the_chain_for_a_while_and_narrow_links_cost_time_alone() {
+    let moved = |network: &str| {
         let mut run = led(network, "0.5");
         run.advance(300);
-        run.metrics()["progress"].as_f64().expect("a number")
+        let metrics = run.metrics();
+        let count = |name: &str| metrics[name].as_u64().expect("a count");
+        (run.poses().text, count("stood"))
     };
-    let wide = progress("");
-    let bursts = progress("bursts = { loss = 1.0, lasts_s = 0.2, every_s = 2.0 }");
-    let narrow = progress("bandwidth_bit_s = 3e7\npatience_s = 2e-3");
-    assert!(wide > 0.0 && bursts > 0.0 && narrow > 0.0, "{wide} {bursts} {narrow}");
-    assert!(bursts < wide, "{bursts} {wide}");
+    let wide = moved("");
+    let narrow = moved("bandwidth_bit_s = 3e7\npatience_s = 1e-3");
+    assert_eq!((&narrow.0, narrow.1, wide.1), (&wide.0, 0, 0));
+    let bursts = moved("bursts = { loss = 1.0, lasts_s = 0.2, every_s = 2.0 }");
+    assert!(bursts.1 > 10 && bursts.0 != wide.0, "{bursts:?}");
 }
 
 #[test]
