@@ -43,7 +43,9 @@ const ONE_PACKAGE: Part = Part { targets: &[], environment: &[] };
 pub(crate) fn run(chosen: &[String]) -> ExitCode {
     let skipped = Skipped::new();
     let runner: &[&str] = if has_nextest() {
-        &["nextest", "run", "--no-tests", "pass"]
+        // A filter that meets tests of one part alone is no mistake. Nextest wants no word of it where nothing runs.
+        let is_run = !chosen.iter().any(|word| word == "--no-run");
+        if is_run { &["nextest", "run", "--no-tests", "pass"] } else { &["nextest", "run"] }
     } else {
         eprintln!("nextest is not installed: `cargo test` runs one test program after the other");
         &["test", "--no-fail-fast"]
