@@ -6,7 +6,8 @@
 
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
-use sidestep_link::wire::zenoh::{ZenohWire, hold};
+use sidestep_link::wire::endpoint::hold;
+use sidestep_link::wire::zenoh::ZenohWire;
 use sidestep_link::wire::{Party, Wire};
 use sidestep_link::words::{Life, Member};
 use sidestep_session::fleet::{Clock, Common, FleetJob, FleetNow, Flown, Job, Told, Topology};

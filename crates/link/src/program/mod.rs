@@ -66,7 +66,7 @@ fn do_job(job: Job) -> Result<(), Error> {
             fleet::fly(&job, &Lifeline::watch())
         }
         Job::Node(job) => {
-            prepare(&job.common, job.listen.iter().chain(&job.connect))?;
+            prepare(&job.common, job.connect.iter().chain(&job.listen))?;
             Lifeline::end_with();
             node::fly(&job)
         }

@@ -12,7 +12,7 @@ const MOST_EVENTS: usize = 200;
 /// Time that the last view waits at the end for those who watch.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// What is shown at a window.
+/// The view of a fleet that is shown at a window.
 #[derive(Debug)]
 pub(super) struct Shown {
     window: Window,

@@ -1,7 +1,7 @@
 //! Handshakes that only find out whether two parties take each other's certificates: Zenoh goes on trying, and tells
 //! no reason.
 
-use super::zenoh::host_and_port;
+use super::endpoint::host_and_port;
 use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName};
 use rustls::{ClientConfig, ClientConnection, Error, RootCertStore, Stream};

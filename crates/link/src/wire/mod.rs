@@ -5,9 +5,11 @@
 //! ```text
 //! zenoh.rs   between processes      handshake.rs  whose certificate is not taken, and why
 //! memory.rs  between threads        board.rs      a text for whoever asks, by HTTP
+//! endpoint.rs how endpoints are written, and ports that are held
 //! ```
 
 pub mod board;
+pub mod endpoint;
 mod handshake;
 pub mod memory;
 pub mod window;
@@ -15,9 +17,9 @@ pub mod zenoh;
 
 pub use crate::party::Party;
 use crate::words::Member;
+pub use endpoint::WireError;
 use sidestep::kernel::EntityId;
 use std::time::Duration;
-pub use zenoh::WireError;
 
 /// Carries frames between parties. A frame may be lost, and nobody is told.
 pub trait Wire: Send {

@@ -3,7 +3,8 @@
 //! Nobody is sent anything unasked, and each who watches has one question on the way: so whoever is slow, or has stopped,
 //! sees less and slows nobody. What is shown is made only while somebody asks.
 
-use super::zenoh::{WireError, ZenohWire, asking};
+use super::endpoint::WireError;
+use super::zenoh::{ZenohWire, asking};
 use sidestep_session::fleet::Tls;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

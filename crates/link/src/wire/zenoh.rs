@@ -4,13 +4,13 @@
 //! In a mesh it has another one as a *peer*, connected with every other node: packets go the straight way there.
 //! A frame that cannot be sent soon is dropped rather than waited for, so that nobody who has stopped stops others.
 
+use super::endpoint::{Held, WireError, host_and_port, taken, vacant};
 use super::{Party, Wire, handshake};
 use crate::words::Member;
 use sidestep::kernel::EntityId;
 use sidestep_session::fleet::Tls;
 use std::collections::BTreeMap;
 use std::fmt;
-use std::net::{TcpListener, ToSocketAddrs};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
@@ -26,38 +26,6 @@ const LEASE_MS: u64 = 2_000;
 /// Time that opening a link may take at either end, in milliseconds. Zenoh's own, ten seconds, is how long it
 /// takes to come back after a partition.
 const OPENED_WITHIN_MS: u64 = 1_000;
-
-/// The reason why there is no wire.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum WireError {
-    /// An address cannot be listened at.
-    #[error("cannot listen at {endpoint}: {reason}")]
-    Taken {
-        /// The address.
-        endpoint: String,
-        /// The reason.
-        reason: String,
-    },
-    /// An endpoint is not written as one.
-    #[error("`{0}` is no endpoint")]
-    NoEndpoint(String),
-    /// Nobody answers.
-    #[error("nobody answers at {endpoint}: {reason}")]
-    NoAnswer {
-        /// The address.
-        endpoint: String,
-        /// The reason.
-        reason: String,
-    },
-    /// Somebody answers, and one of both does not take the other's certificate.
-    #[error("{endpoint} and this party do not trust each other: {reason}")]
-    Distrust {
-        /// The address.
-        endpoint: String,
-        /// The reason.
-        reason: String,
-    },
-}
 
 /// Settings of a Zenoh session.
 #[derive(Debug, Clone, Default)]
@@ -146,7 +114,7 @@ pub struct ZenohWire {
 /// A session, and who is sent to over it.
 struct Line {
     keys: BTreeMap<Party, KeyExpr<'static>>,
-    _heard: [Subscriber<()>; 2],
+    _heard: Vec<Subscriber<()>>,
     session: Session,
 }
 
@@ -174,8 +142,14 @@ impl Line {
             };
             session.declare_subscriber(key).callback(took).wait().map_err(|e| e.to_string())
         };
-        // Others see them in this order: whoever can reach this party reaches it with what is for most, too.
-        let heard = [hear(ALL)?, hear(&key(me))?];
+        // Others see them in this order: whoever can reach this party reaches it with what is for most, too. Nothing
+        // that is for most nodes is for the server.
+        let for_most = (me != Party::Server).then(|| ALL.to_string());
+        let heard = for_most
+            .into_iter()
+            .chain([key(me)])
+            .map(|key| hear(&key))
+            .collect::<Result<_, _>>()?;
         Ok(Self { keys: BTreeMap::new(), _heard: heard, session })
     }
 
@@ -329,72 +303,6 @@ fn trusted(connect: &[String], tls: Option<&Tls>) -> Result<(), WireError> {
         }
     }
     first
-}
-
-/// Returns an endpoint's host and port, e.g. of `tcp/127.0.0.1:7600`.
-///
-/// # Errors
-/// When it is none.
-pub fn host_and_port(endpoint: &str) -> Result<(&str, u16), WireError> {
-    let no_endpoint = || WireError::NoEndpoint(endpoint.into());
-    let (protocol, address) = endpoint.split_once('/').ok_or_else(no_endpoint)?;
-    let (host, port) = address.rsplit_once(':').ok_or_else(no_endpoint)?;
-    if !["tcp", "tls"].contains(&protocol) || host.is_empty() {
-        return Err(no_endpoint());
-    }
-    Ok((host, port.parse().map_err(|_| no_endpoint())?))
-}
-
-/// Holds a port until somebody else may have it.
-#[derive(Debug)]
-pub struct Held {
-    /// The endpoint, with a port.
-    pub endpoint: String,
-    _port: TcpListener,
-}
-
-/// Lowest port that is tried for who asks for any, and their number: below those that systems give to connections
-/// that go out, of which one could have it first.
-const PORTS: (u16, u16) = (20_000, 12_000);
-
-/// Holds the port of an endpoint; port 0 stands for any free one.
-///
-/// # Errors
-/// When it cannot be had, or the endpoint is none.
-pub fn hold(endpoint: &str) -> Result<Held, WireError> {
-    let (host, port) = host_and_port(endpoint)?;
-    let bare = host.trim_start_matches('[').trim_end_matches(']');
-    let bind = |port: u16| {
-        let addresses = (bare, port).to_socket_addrs().map_err(|e| e.to_string())?;
-        TcpListener::bind(&*addresses.collect::<Vec<_>>()).map_err(|e| e.to_string())
-    };
-    let with = |port: u16| {
-        let start = endpoint.len() - endpoint.rsplit(':').next().map_or(0, str::len);
-        format!("{}{port}", &endpoint[..start])
-    };
-    if port > 0 {
-        let held = bind(port).map_err(|reason| taken(&[endpoint.into()], reason))?;
-        return Ok(Held { endpoint: endpoint.into(), _port: held });
-    }
-    let first = (std::process::id().wrapping_mul(97) % u32::from(PORTS.1)) as u16;
-    let mut why = String::new();
-    for k in 0..PORTS.1 {
-        let port = PORTS.0 + (first + k) % PORTS.1;
-        match bind(port) {
-            Ok(held) => return Ok(Held { endpoint: with(port), _port: held }),
-            Err(reason) => why = reason,
-        }
-    }
-    Err(taken(&[endpoint.into()], why))
-}
-
-/// Checks that an endpoint can be listened at.
-fn vacant(endpoint: &str) -> Result<(), WireError> {
-    hold(endpoint).map(drop)
-}
-
-fn taken(endpoints: &[String], reason: String) -> WireError {
-    WireError::Taken { endpoint: endpoints.join(", "), reason }
 }
 
 #[cfg(test)]

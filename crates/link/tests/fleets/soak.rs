@@ -18,7 +18,7 @@ const SPEED: f64 = 20.0;
 /// Longest time in which a node does not fly: a stop, the lease, the longest wait before it is started again, and joining.
 const MOST_AWAY: Duration = Duration::from_secs(60);
 
-/// What happens to a node.
+/// A fault of a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fault {
     Kill,
@@ -120,7 +120,7 @@ fn network(seconds: u64, draw: impl Fn(u64) -> [u32; 4]) -> String {
     )
 }
 
-/// What is watched while a fleet flies.
+/// Figures that are watched while a fleet flies.
 struct Watch {
     /// Controls that each node has flown, and when that was last seen to rise.
     flown: Vec<(u64, Instant)>,

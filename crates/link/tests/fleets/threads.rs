@@ -2,8 +2,9 @@
 
 use crate::support::{LONG, Nobody, Way, alone, in_threads, superconflict};
 use sidestep::kernel::EntityId;
+use sidestep_link::wire::endpoint::hold;
 use sidestep_link::wire::memory::Exchange;
-use sidestep_link::wire::zenoh::{ZenohWire, hold};
+use sidestep_link::wire::zenoh::ZenohWire;
 use sidestep_link::wire::{Party, Wire};
 use sidestep_link::words::{Clock, Topology};
 use std::time::Duration;

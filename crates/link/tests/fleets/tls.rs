@@ -2,7 +2,8 @@
 
 use crate::processes::{Program, folder, job};
 use crate::support::{alone, superconflict};
-use sidestep_link::wire::zenoh::{ZenohWire, hold};
+use sidestep_link::wire::endpoint::hold;
+use sidestep_link::wire::zenoh::ZenohWire;
 use sidestep_link::wire::{Party, WireError};
 use sidestep_session::fleet::{Clock, FleetJob, Job, NodeJob, Tls, Told, Topology};
 use std::path::{Path, PathBuf};

@@ -3,7 +3,7 @@
 use crate::processes::{Program, folder, job};
 use crate::support::{superconflict, wide};
 use serde_json::Value;
-use sidestep_link::wire::zenoh::hold;
+use sidestep_link::wire::endpoint::hold;
 use sidestep_session::fleet::{Clock, FleetJob, Job, NodeJob, Told, Topology};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Read, Write};

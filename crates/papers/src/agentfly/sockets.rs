@@ -29,7 +29,7 @@ pub struct Measured {
     pub bytes: f64,
 }
 
-/// What flies a scenario by processes: it is given the scenario's text.
+/// Flies a scenario by processes, given its text.
 pub type Flies<'a, E> = dyn FnMut(&str) -> Result<Measured, E> + 'a;
 
 /// The measurements over sockets, or the reason why there are none.

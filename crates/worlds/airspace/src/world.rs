@@ -88,7 +88,7 @@ pub struct AirspaceWorld {
     pub orca: Reactive,
     /// The deployment of the optimizer.
     pub deployment: Deployment,
-    /// How its agents know with whom they decide together.
+    /// The way in which its agents know with whom they decide together.
     pub groups: Grouping,
     /// The network that carries its messages, if it is unreliable.
     pub network: Option<Network>,
@@ -132,7 +132,7 @@ pub struct AirspaceWorld {
     pub(crate) teams: Arc<Teams>,
 }
 
-/// How airplanes know with whom they decide together.
+/// The way in which airplanes know with whom they decide together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Grouping {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 /// The subject of a talk: each cycle has one talk of each at most, in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Topic {
-    /// Who decides together, where nobody announces it.
+    /// The choice of those who decide together, where nobody announces them.
     Group,
     /// The choice of what each wants to fly.
     Decision,

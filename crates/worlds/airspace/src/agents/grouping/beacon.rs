@@ -1,4 +1,4 @@
-//! What airplanes tell about themselves before they know whom they decide with.
+//! Beacons: the words of airplanes about themselves, before they know whom they decide with.
 
 use crate::agents::party::{Unsound, are_places};
 use crate::flight::Pose;

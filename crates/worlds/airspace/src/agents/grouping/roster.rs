@@ -1,4 +1,4 @@
-//! What is known of who sees and who hears whom, and the groups that follow from it.
+//! The knowledge of who sees and who hears whom, and the groups that follow from it.
 
 use super::beacon::{Beacon, Item};
 use sidestep_kernel::EntityId;

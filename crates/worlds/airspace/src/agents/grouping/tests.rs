@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use sidestep_kernel::Seed;
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
 
-/// Who is near whom, and which of those hear whom.
+/// Pairs that are near each other, and those of them that hear each other.
 struct Links {
     near: Vec<Vec<bool>>,
     hears: Vec<Vec<bool>>,

@@ -1,0 +1,101 @@
+//! Endpoints: how they are written, ports that are held, and reasons why there is no wire.
+
+use std::net::{TcpListener, ToSocketAddrs};
+
+/// The reason why there is no wire.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum WireError {
+    /// An address cannot be listened at.
+    #[error("cannot listen at {endpoint}: {reason}")]
+    Taken {
+        /// The address.
+        endpoint: String,
+        /// The reason.
+        reason: String,
+    },
+    /// An endpoint is not written as one.
+    #[error("`{0}` is no endpoint")]
+    NoEndpoint(String),
+    /// Nobody answers.
+    #[error("nobody answers at {endpoint}: {reason}")]
+    NoAnswer {
+        /// The address.
+        endpoint: String,
+        /// The reason.
+        reason: String,
+    },
+    /// Somebody answers, and one of both does not take the other's certificate.
+    #[error("{endpoint} and this party do not trust each other: {reason}")]
+    Distrust {
+        /// The address.
+        endpoint: String,
+        /// The reason.
+        reason: String,
+    },
+}
+
+/// Returns an endpoint's host and port, e.g. of `tcp/127.0.0.1:7600`.
+///
+/// # Errors
+/// When it is none.
+pub fn host_and_port(endpoint: &str) -> Result<(&str, u16), WireError> {
+    let no_endpoint = || WireError::NoEndpoint(endpoint.into());
+    let (protocol, address) = endpoint.split_once('/').ok_or_else(no_endpoint)?;
+    let (host, port) = address.rsplit_once(':').ok_or_else(no_endpoint)?;
+    if !["tcp", "tls"].contains(&protocol) || host.is_empty() {
+        return Err(no_endpoint());
+    }
+    Ok((host, port.parse().map_err(|_| no_endpoint())?))
+}
+
+/// Holds a port until somebody else may have it.
+#[derive(Debug)]
+pub struct Held {
+    /// The endpoint, with a port.
+    pub endpoint: String,
+    _port: TcpListener,
+}
+
+/// Lowest port that is tried for who asks for any, and their number: below those that systems give to connections
+/// that go out, of which one could have it first.
+const PORTS: (u16, u16) = (20_000, 12_000);
+
+/// Holds the port of an endpoint; port 0 stands for any free one.
+///
+/// # Errors
+/// When it cannot be had, or the endpoint is none.
+pub fn hold(endpoint: &str) -> Result<Held, WireError> {
+    let (host, port) = host_and_port(endpoint)?;
+    let bare = host.trim_start_matches('[').trim_end_matches(']');
+    let bind = |port: u16| {
+        let addresses = (bare, port).to_socket_addrs().map_err(|e| e.to_string())?;
+        TcpListener::bind(&*addresses.collect::<Vec<_>>()).map_err(|e| e.to_string())
+    };
+    let with = |port: u16| {
+        let start = endpoint.len() - endpoint.rsplit(':').next().map_or(0, str::len);
+        format!("{}{port}", &endpoint[..start])
+    };
+    if port > 0 {
+        let held = bind(port).map_err(|reason| taken(&[endpoint.into()], reason))?;
+        return Ok(Held { endpoint: endpoint.into(), _port: held });
+    }
+    let first = (std::process::id().wrapping_mul(97) % u32::from(PORTS.1)) as u16;
+    let mut why = String::new();
+    for k in 0..PORTS.1 {
+        let port = PORTS.0 + (first + k) % PORTS.1;
+        match bind(port) {
+            Ok(held) => return Ok(Held { endpoint: with(port), _port: held }),
+            Err(reason) => why = reason,
+        }
+    }
+    Err(taken(&[endpoint.into()], why))
+}
+
+/// Checks that an endpoint can be listened at.
+pub(super) fn vacant(endpoint: &str) -> Result<(), WireError> {
+    hold(endpoint).map(drop)
+}
+
+pub(super) fn taken(endpoints: &[String], reason: String) -> WireError {
+    WireError::Taken { endpoint: endpoints.join(", "), reason }
+}
