@@ -10,10 +10,10 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// Returns an address of this machine that nobody has.
-fn free_address() -> String {
-    let held = hold("tcp/127.0.0.1:0").expect("a free port");
-    held.endpoint.trim_start_matches("tcp/").to_string()
+/// Returns addresses of this machine that nobody has; no two are one, for all are held at once.
+fn free_addresses<const N: usize>() -> [String; N] {
+    let held = [(); N].map(|()| hold("tcp/127.0.0.1:0").expect("a free port"));
+    held.map(|held| held.endpoint.trim_start_matches("tcp/").to_string())
 }
 
 /// Asks an address by HTTP, and returns the first line of the answer, and what follows its head.
@@ -123,7 +123,7 @@ const COMMON: [&str; 6] =
 #[test]
 fn metrics_of_the_server_and_of_a_node_are_prometheus_text_of_what_happens() {
     let folder = folder(&wide(&superconflict(3, "compact-team", 1_000_000, ""), 8_000));
-    let [at_server, at_node] = [free_address(), free_address()];
+    let [at_server, at_node] = free_addresses();
     let mut fleet = job(folder.path(), Topology::Star, Clock::Realtime { speed: 20.0 });
     let common = fleet.common.clone();
     fleet.common.metrics = Some(at_server.clone());
