@@ -2,9 +2,10 @@
 
 use super::*;
 use crate::mail::{Heard, Mail};
+use crate::wire::endpoint::hold;
 use crate::words::Word;
 use std::io::{Read, Write};
-use std::net::TcpStream;
+use std::net::{TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
