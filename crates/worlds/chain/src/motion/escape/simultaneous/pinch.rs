@@ -146,11 +146,11 @@ fn motions(obstacles: &[u32], seed: u64) -> Vec<Vec<Leg>> {
 
 /// Of 24 runs, seeds 1 to 12 with 8 discs and with 16, one episode is longer than 50 ticks. The search tries 1,481 motions
 /// by the same solver at the same speed limit, from 2 s before on, in which nobody leads, with discs where they will be.
-/// So this is no pinch that no motion can leave; but the chain, which takes discs to go straight on, expects to be
-/// inside whether its leader goes on or rests, and then sets out on a way through a disc.
+/// So this is no pinch that no motion can leave; but in the roll-outs, in which discs go straight on, the chain is inside
+/// for as long if its leader rests.
 #[test]
 #[ignore = "a search of a minute"]
-fn the_only_long_pinch_would_be_none_if_the_chain_had_known_where_discs_turn_back() {
+fn the_only_long_pinch_that_is_left_can_be_left_by_resting_in_time() {
     let mut told = Vec::new();
     for (discs, seed) in [(16, 5)] {
         let (world, episodes) = episodes(discs, seed);
