@@ -28,8 +28,11 @@ struct Part {
 const BESIDE: Part =
     Part { targets: &["--lib", "--bins", "--test", "promises"], environment: &CHECKS };
 
-/// Tests from outside. Examples are compiled, so that none falls behind.
-const OUTSIDE: Part = Part { targets: &["--test", "*", "--examples"], environment: &[] };
+/// Tests from outside, some of which run examples.
+const OUTSIDE: Part = Part { targets: &["--test", "*"], environment: &[] };
+
+/// Examples as programs: among the targets of tests, cargo would compile each as a program of tests.
+const PROGRAMS: Part = Part { targets: &["--examples"], environment: &[] };
 
 /// Examples in the documentation.
 const EXAMPLES: Part = Part { targets: &["--doc"], environment: &[] };
@@ -50,7 +53,11 @@ pub(crate) fn run(chosen: &[String]) -> ExitCode {
         eprintln!("nextest is not installed: `cargo test` runs one test program after the other");
         &["test", "--no-fail-fast"]
     };
-    let parts = if names_a_package(chosen) { &[ONE_PACKAGE][..] } else { &[BESIDE, OUTSIDE] };
+    let all = !names_a_package(chosen);
+    if all && !cargo(&["build"], &PROGRAMS, &[]) {
+        return ExitCode::FAILURE;
+    }
+    let parts = if all { &[BESIDE, OUTSIDE][..] } else { &[ONE_PACKAGE] };
     // All are run, whatever the first come to: whoever mends wants to see every failure.
     let failed = parts.iter().filter(|part| !cargo(runner, part, chosen)).count();
     let passed = failed == 0 && (!chosen.is_empty() || cargo(&["test"], &EXAMPLES, &[]));
