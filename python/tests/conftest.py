@@ -1,7 +1,11 @@
 import os
 import pathlib
+import signal
 
 import pytest
+
+# Programs that a shell starts in the background ignore Ctrl-C, which tests send to themselves.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 

@@ -43,9 +43,26 @@ fn parsed(override_text: &str) -> Result<Wanted<'_>, InputError> {
         let remedy = "write --set key=value, e.g. --set robots.count=20";
         return Err(InputError::new(place, "there is no `=`", remedy));
     };
-    // Text needs no quotes on a command line, so a value that is not TOML is text.
-    let value = value.trim().parse().unwrap_or_else(|_| Value::from(value.trim()));
-    Ok((place, key, value))
+    let value = value.trim();
+    match value.parse() {
+        Ok(value) => Ok((place, key, value)),
+        // As text, it would be refused where nobody would see that a number was meant.
+        Err(_) if is_beyond_all_numbers(value) => {
+            let cause = format!("`{value}` is larger than any number that can be held (1.8e308)");
+            Err(InputError::new(
+                place,
+                cause,
+                "write a smaller number, or inf where that makes sense",
+            ))
+        }
+        // Text needs no quotes on a command line, so a value that is not TOML is text.
+        Err(_) => Ok((place, key, Value::from(value))),
+    }
+}
+
+/// Returns whether this is written like a number, of digits, and rounds to infinity.
+fn is_beyond_all_numbers(text: &str) -> bool {
+    text.contains(|c: char| c.is_ascii_digit()) && text.parse().is_ok_and(f64::is_infinite)
 }
 
 #[cfg(test)]
@@ -105,6 +122,17 @@ mod tests {
         "robots.1.count",
     ];
     const VALUES: [&str; 5] = ["7", "word", "[3, 4]", "{ x = 1 }", "\"two words\""];
+
+    #[test]
+    fn a_number_beyond_all_others_is_not_taken_for_text() {
+        for bad in ["seed=1e400", "seed=-1e999", "seed= 1e400 "] {
+            let error = with("seed = 1\n", &[bad]).expect_err(bad);
+            assert!(error.to_string().contains("larger than any number"), "{error}");
+        }
+        for text in ["name=1e400m", "name=infinity", "name=infinite-2"] {
+            assert!(with("name = \"a\"\n", &[text]).is_ok(), "{text}");
+        }
+    }
 
     #[test]
     fn an_override_that_does_not_fit_says_so() {

@@ -221,10 +221,8 @@ impl AirspaceState {
         let named = (0..n).map(|_| Mutex::default()).collect();
         let gusts = world.shield && world.disturbance.heading_rad > 0.0;
         let held = (0..if gusts { n } else { 0 }).map(|_| Held::default()).collect();
-        let turn_rates_rad_s: Box<[Shared<f64>]> = (0..n).map(|_| Shared::default()).collect();
-        for (rate, record) in turn_rates_rad_s.iter().zip(&snapshot.airplanes) {
-            rate.set(record.turn_rate_rad_s);
-        }
+        let turn_rates_rad_s =
+            snapshot.airplanes.iter().map(|record| Shared::new(record.turn_rate_rad_s)).collect();
         let is_external = world.method == Method::External;
         let wishes = remembered(if is_external { n } else { 0 }, &snapshot.wishes);
         let (handed_for, handed) = (Shared::default(), Mutex::default());

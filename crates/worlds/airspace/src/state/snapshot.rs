@@ -77,10 +77,6 @@ impl Snapshot {
         let mut hasher = Hasher::default();
         hasher.u64(self.cycle);
         hasher.u64(self.airplanes.len() as u64);
-        let hash_pose = |hasher: &mut Hasher, pose: &Pose| {
-            let Pose { at: [x, y], heading_rad } = *pose;
-            [x, y, heading_rad].iter().for_each(|v| hasher.u64(v.to_bits()));
-        };
         self.held.iter().for_each(|pose| hash_pose(&mut hasher, pose));
         for airplane in &self.airplanes {
             hash_pose(&mut hasher, &airplane.pose);
@@ -100,23 +96,30 @@ impl Snapshot {
             hasher.u32(b);
         }
         if !self.contacts.is_empty() {
-            let known = postcard::to_stdvec(&self.contacts).expect("contacts are plain data");
-            known.iter().for_each(|&byte| hasher.u8(byte));
+            hash_data(&mut hasher, &self.contacts);
         }
         if !self.resolving.is_empty() {
-            let resolving = postcard::to_stdvec(&self.resolving).expect("conflicts are plain data");
-            resolving.iter().for_each(|&byte| hasher.u8(byte));
+            hash_data(&mut hasher, &self.resolving);
         }
         // Turn rates say nothing about what comes next, unless somebody outside decides by them.
         if !self.wishes.is_empty() {
             self.airplanes.iter().for_each(|a| hasher.u64(a.turn_rate_rad_s.to_bits()));
-            let wishes = postcard::to_stdvec(&self.wishes).expect("wishes are plain data");
-            wishes.iter().for_each(|&byte| hasher.u8(byte));
+            hash_data(&mut hasher, &self.wishes);
         }
         if let Some(handed) = &self.handed {
-            let handed = postcard::to_stdvec(handed).expect("controls are plain data");
-            handed.iter().for_each(|&byte| hasher.u8(byte));
+            hash_data(&mut hasher, handed);
         }
         hasher.finish()
     }
+}
+
+fn hash_pose(hasher: &mut Hasher, pose: &Pose) {
+    let Pose { at: [x, y], heading_rad } = *pose;
+    [x, y, heading_rad].iter().for_each(|v| hasher.u64(v.to_bits()));
+}
+
+/// Adds the bytes of a value as a checkpoint has them.
+fn hash_data(hasher: &mut Hasher, value: &impl Serialize) {
+    let bytes = postcard::to_stdvec(value).expect("parts of a state are plain data");
+    bytes.iter().for_each(|&byte| hasher.u8(byte));
 }
