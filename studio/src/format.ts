@@ -5,9 +5,12 @@ import type { Place, Value, Who } from "./protocol";
 /** Narrow space between a number and its unit. */
 const NARROW = "\u202f";
 
+/** Units that are words, for one of them. */
+const ONE: Record<string, string> = { cycles: "cycle", boxes: "box", bodies: "body", bytes: "byte", messages: "message", connectors: "connector" };
+
 /** A number with at most four significant digits, and its unit. */
 export function withUnit(value: number, unit = ""): string {
-  return unit === "" ? number(value) : `${number(value)}${NARROW}${unit}`;
+  return unit === "" ? number(value) : `${number(value)}${NARROW}${value === 1 ? (ONE[unit] ?? unit) : unit}`;
 }
 
 /** A number with at most four significant digits; whole numbers keep all of theirs, in groups of three. */

@@ -48,7 +48,10 @@ function view(action: Action, session: Session): void {
     left: [PAN_PX, 0], right: [-PAN_PX, 0], up: [0, PAN_PX], down: [0, -PAN_PX],
   };
   const move = moves[action];
-  if (move) stage?.eye.rotate(...move);
+  if (move) {
+    stage?.eye.rotate(...move);
+    stage?.moved();
+  }
   if (action === "nearer" || action === "farther") stage?.zoom(action === "nearer" ? ZOOM : 1 / ZOOM);
   if (action === "fit") stage?.fit();
   if (action === "trails") session.trails = TRAILS[(TRAILS.indexOf(session.trails) + 1) % TRAILS.length]!;

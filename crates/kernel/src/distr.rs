@@ -22,11 +22,16 @@ pub enum RowError {
         value: f64,
     },
     /// The row does not sum to 1 (promise L2).
-    #[error("the row sums to {sum}, {} 1 by {:.6}", if *.sum < 1.0 { "short of" } else { "above" }, (.sum - 1.0).abs())]
+    #[error("the row sums to {}, {} 1 by {}", short(*.sum), if *.sum < 1.0 { "short of" } else { "above" }, short((.sum - 1.0).abs()))]
     Sum {
         /// Its sum.
         sum: f64,
     },
+}
+
+/// Returns a number with six digits behind the point at most: those that adding leaves behind tell nobody anything.
+fn short(value: f64) -> f64 {
+    (1e6 * value).round() / 1e6
 }
 
 /// Checks that `row` is a probability distribution (promise L2).
@@ -132,9 +137,11 @@ mod tests {
     #[test]
     fn a_row_that_does_not_sum_to_one_says_by_how_much() {
         let error = check_row(&[0.5, 0.45]).expect_err("0.95 is not 1");
-        assert_eq!(error.to_string(), "the row sums to 0.95, short of 1 by 0.050000");
+        assert_eq!(error.to_string(), "the row sums to 0.95, short of 1 by 0.05");
         let error = check_row(&[0.5, 0.75]).expect_err("1.25 is not 1");
-        assert_eq!(error.to_string(), "the row sums to 1.25, above 1 by 0.250000");
+        assert_eq!(error.to_string(), "the row sums to 1.25, above 1 by 0.25");
+        let error = check_row(&[0.05, 0.6, 0.05]).expect_err("0.7 is not 1");
+        assert_eq!(error.to_string(), "the row sums to 0.7, short of 1 by 0.3");
         assert_eq!(check_row(&[]), Err(RowError::Empty));
         assert!(matches!(check_row(&[1.5]), Err(RowError::NotAProbability { index: 1, .. })));
         assert!(matches!(check_row(&[f64::NAN]), Err(RowError::NotAProbability { .. })));

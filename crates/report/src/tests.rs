@@ -171,6 +171,20 @@ fn a_page_is_accessible_and_forbids_the_network() {
 }
 
 #[test]
+fn bounds_stand_among_the_numbers_and_words_do_not() {
+    let mut document = Document::new("T", "");
+    let mut table = Table::new("Results", "", &["metric", "p", "verdict"]);
+    table.row(["a", "0.5", "held"].map(String::from));
+    table.row(["b", "< 0.0001", "-"].map(String::from));
+    document.section("Results").tables([table]);
+    let html = render(&document, "figures").unwrap().html;
+    assert!(html.contains("<th scope=\"col\" class=\"number\">p</th>"), "{html}");
+    assert!(html.contains("<td class=\"words\">held</td>"), "{html}");
+    // Section and table are two landmarks.
+    assert!(html.contains("aria-label=\"Table: Results\""), "{html}");
+}
+
+#[test]
 fn a_report_without_figures_carries_no_script_for_them() {
     let rendered = render(&Document::new("T", "Nothing more."), "figures").unwrap();
     assert!(rendered.html.len() < 20_000, "{}", rendered.html.len());

@@ -144,7 +144,8 @@ export class SpaceEye implements Eye {
     this.target.set((lo[0] + hi[0]) / 2, (lo[1] + hi[1]) / 2, (lo[2] + hi[2]) / 2);
     const radius = 0.5 * Math.hypot(hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]);
     const narrow = Math.min(1, this.camera.aspect);
-    this.#distance = Math.max(1e-4, (1.02 * radius) / Math.sin((FIELD_OF_VIEW_DEG * Math.PI) / 360) / narrow);
+    // Room for the names of the axes, which stand beyond the box.
+    this.#distance = Math.max(1e-4, (1.1 * radius) / Math.sin((FIELD_OF_VIEW_DEG * Math.PI) / 360) / narrow);
     this.#update();
   }
 

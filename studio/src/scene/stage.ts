@@ -89,6 +89,8 @@ export class Stage {
   #extent: Extent;
   #size: [number, number] = [1, 1];
   #isFitted = false;
+  /** Whether everything is in sight since nobody has moved the camera: then it stays so in another size. */
+  #isWhole = false;
   #request = 0;
   #bodiesChanged = true;
   #marksChanged = true;
@@ -145,7 +147,7 @@ export class Stage {
     this.#renderer.setSize(width_px, height_px, false);
     this.#overlay.resize(width_px, height_px, Math.min(2, window.devicePixelRatio));
     this.eye.resize(width_px, height_px);
-    if (!this.#isFitted) this.eye.fit(this.#extent);
+    if (!this.#isFitted || this.#isWhole) this.eye.fit(this.#extent);
     this.changed();
   }
 
@@ -178,14 +180,14 @@ export class Stage {
   fit(): void {
     if (this.#frame) this.#extent = extentOf(this.#scene, this.#bodies, this.#frame);
     this.eye.fit(this.#extent);
-    this.#isFitted = this.#frame !== null && this.#size[0] > 1;
+    this.#isFitted = this.#isWhole = this.#frame !== null && this.#size[0] > 1;
     this.changed();
   }
 
   /** Brings the middle of the view nearer by a factor. */
   zoom(factor: number): void {
     this.eye.zoom(factor, this.#size[0] / 2, this.#size[1] / 2);
-    this.changed();
+    this.moved();
   }
 
   /** Brings a body to the middle. */
@@ -193,7 +195,7 @@ export class Stage {
     const at = this.placeOf(index);
     if (!at) return;
     this.eye.center(at);
-    this.changed();
+    this.moved();
   }
 
   /** Brings a body into sight, if it is not. */
@@ -205,7 +207,18 @@ export class Stage {
     if (!isSeen) this.center(index);
   }
 
-  /** The camera has moved. */
+  /** Somebody has moved the camera. */
+  moved(): void {
+    this.#isWhole = false;
+    this.changed();
+  }
+
+  /** Whether the camera stands where somebody has put it. */
+  get isMoved(): boolean {
+    return this.#isFitted && !this.#isWhole;
+  }
+
+  /** Something that is seen has changed. */
   changed(): void {
     this.#viewChanged = true;
     if (this.#request === 0) this.#request = requestAnimationFrame(() => this.#draw());

@@ -18,6 +18,11 @@ export function keepEye(session: number, scene: Scene, eye: Eye): void {
   eyes.set(session, { eye, of: measureOf(scene) });
 }
 
+/** Lets the session be seen as a whole when it is looked at again. */
+export function forgetEye(session: number): void {
+  eyes.delete(session);
+}
+
 export function keptEye(session: number, scene: Scene): Eye | undefined {
   const kept = eyes.get(session);
   return kept?.of === measureOf(scene) ? kept.eye : undefined;

@@ -53,7 +53,8 @@ test("ten thousand robots are shown", { timeout: 4 * WAIT_MS }, async () => {
   const client = await page.context().newCDPSession(page);
   await client.send("Performance.enable");
   await page.getByLabel("Speed", { exact: true }).selectOption(url ? "fastest" : "10");
-  await page.getByRole("button", { name: "Play", exact: true }).click();
+  // A text that is run plays by itself.
+  if (!url) await page.getByRole("button", { name: "Play", exact: true }).click();
   await expect.poll(async () => (await count(page, client)).pictures, { timeout: WAIT_MS }).toBeGreaterThan(20);
   const before = await count(page, client);
   const began = performance.now();

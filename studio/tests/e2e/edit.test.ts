@@ -3,7 +3,7 @@
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from "vitest";
 import type { Edit } from "../../src/protocol";
-import { launch, openNew, openPage, type Look } from "../browser";
+import { launch, openNew, openPage, WAIT_MS, type Look } from "../browser";
 import { Hand } from "../drawing";
 import { FakeServer } from "../fake/server";
 
@@ -289,9 +289,25 @@ describe("forms", () => {
     expect(edits()).toEqual([{ op: "set", key: "sensors.echo.confusion.wall.1", value: 0.6 }]);
     expect(await cell.getAttribute("aria-invalid")).toBe("true");
     await page.getByRole("cell", { name: /the row sums to 0.8/ }).waitFor();
+    const hidden_px = await page.getByRole("list", { name: "Problems" }).evaluate((list) => list.scrollHeight - list.clientHeight);
+    expect(hidden_px, "a problem is not cut").toBe(0);
     await page.getByRole("button", { name: "Scale the row wall to 1" }).click();
     expect(await edited(2)).toEqual({ op: "set", key: "sensors.echo.confusion.wall", value: [0.125, 0.75, 0.125] });
     expect(await page.getByLabel("Sum of wall").textContent()).toBe("1");
+  });
+
+  test("a unit stands apart from its key, and all stays in sight where the window becomes narrow", async () => {
+    await visit("robots");
+    await page.getByRole("tab", { name: "Forms" }).click();
+    await page.getByRole("button", { name: "map", exact: true }).click();
+    await page.getByText("box_size_m (m)", { exact: true }).waitFor();
+    await page.getByRole("tab", { name: "View" }).click();
+    await page.getByRole("button", { name: "Edit", exact: true }).click();
+    const mPerPx = (): Promise<number> => page.locator("canvas.layer").evaluate((canvas: HTMLElement) => Number(canvas.dataset.eye?.split(" ")[2] ?? 0));
+    await expect.poll(mPerPx, { timeout: WAIT_MS }).toBeGreaterThan(0);
+    const wide = await mPerPx();
+    await page.setViewportSize({ width: 400, height: 800 });
+    await expect.poll(mPerPx, { timeout: WAIT_MS }).toBeGreaterThan(1.2 * wide);
   });
 
   test("a problem leads to its field", async () => {

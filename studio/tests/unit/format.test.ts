@@ -16,6 +16,7 @@ test.each([
 test("units stand behind a narrow space", () => {
   expect(withUnit(1.25, "m")).toBe(`1.25${S}m`);
   expect(withUnit(3)).toBe("3");
+  expect([1, 2].map((value) => withUnit(value, "cycles"))).toEqual([`1${S}cycle`, `2${S}cycles`]);
 });
 
 test.each([[0.815, `82${S}%`], [0.0123, `1.2${S}%`], [0, `0${S}%`], [1, `100${S}%`]])("the share %s is %s", (value, words) => {

@@ -95,6 +95,24 @@
       .filter((part) => !part.closest("pre, .scrolled, svg"))
       .map((part) => part.outerHTML.slice(0, 80));
 
+  // Columns of a table whose head and cells do not stand at the same side, or whose words stand at the right.
+  function askew(table) {
+    const side = (cell, isRight) => {
+      const range = document.createRange();
+      range.selectNodeContents(cell.querySelector("button") ?? cell);
+      const box = range.getBoundingClientRect();
+      return isRight ? box.right : box.left;
+    };
+    const told = table.caption?.textContent ?? table.closest(".scrolled")?.getAttribute("aria-label");
+    return [...table.tHead.rows[0].cells].flatMap((head, column) => {
+      const cells = [...table.tBodies[0].rows].slice(0, 20).map((row) => row.cells[column]).filter((cell) => cell?.textContent);
+      const isRight = getComputedStyle(head).textAlign === "right";
+      const stands = (cell) => Math.abs(side(cell, isRight) - side(head, isRight)) <= 1;
+      const isWrong = head.offsetWidth > 0 && (!cells.every(stands) || (isRight && cells.some((cell) => !/\d|^-$/.test(cell.textContent))));
+      return isWrong ? [`${told}: ${head.textContent}`] : [];
+    });
+  }
+
   async function look() {
     const plots = all(".plot .drawn");
     for (
@@ -124,6 +142,7 @@
     found.hidden = all("table[data-shown]").filter(isShort).map((table) => table.dataset.shown);
     found.offered = all(".more:not([hidden])").length;
     found.cards = all("table.cards").length;
+    found.askew = all("table.sortable:not(.cards)").flatMap(askew);
     const more = all(".more:not([hidden])").find((button) => button.closest(".wide").offsetWidth > 0);
     if (more) {
       more.click();

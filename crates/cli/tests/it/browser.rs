@@ -112,6 +112,7 @@ pub(crate) fn assert_sound(browser: &Browser, page: &Path) -> Value {
     for found in [&narrow, &found] {
         assert_eq!(found["cut"], Value::Array(Vec::new()), "columns behind an edge");
         assert_eq!(found["beyond"], Value::Array(Vec::new()), "parts of the page are cut");
+        assert_eq!(found["askew"], Value::Array(Vec::new()), "numbers apart from their heads");
         for (key, unwanted) in [("shown_by_more", false.into()), ("cut_by_more", Value::from(1))] {
             // Only where some table has more columns than room.
             assert_ne!(found[key], unwanted, "{key}: {found}");

@@ -26,6 +26,10 @@ const TARGET_PX: f64 = 3.0;
 const TARGET_LETTERS_PX: f64 = 11.0;
 /// Most targets with numbers: with more there is no room.
 const MOST_NUMBERED: usize = 12;
+/// Width of the seam around what agents are made of in space, and the least thickness of what has one: parts that lie
+/// over each other would be one blot without it.
+const SEAM_PX: f64 = 1.0;
+const LEAST_SEAMED_PX: f64 = 8.0;
 /// Number of balls in space above which those of one size and about one depth are one path, without rims.
 const MOST_BALLS: usize = 400;
 /// Shades of such balls.
@@ -207,8 +211,20 @@ fn rim(canvas: &Canvas, body: &Body, color: Color) -> String {
         Kind::Connector if canvas.is_above() => line(white, 0.6),
         Kind::Airplane => line(white, 0.6),
         Kind::Robot => line(DARK, 0.8),
+        Kind::Connector if is_seamed(canvas, body) => line(white, SEAM_PX),
         Kind::Connector | Kind::Rods => String::new(),
     }
+}
+
+/// Whether a part of an agent in space is thick enough for a seam.
+fn is_seamed(canvas: &Canvas, body: &Body) -> bool {
+    let thickness_m = match body.shape {
+        Shape::Sphere { radius_m } => 2.0 * radius_m,
+        Shape::Line { thickness_m, .. } => thickness_m,
+        _ => 0.0,
+    };
+    let is_part = matches!(body.kind, Kind::Connector | Kind::Rods);
+    is_part && !canvas.is_above() && thickness_m * canvas.px_per_m >= LEAST_SEAMED_PX
 }
 
 fn draw_body(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body) {
@@ -243,11 +259,16 @@ fn draw_body(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body) {
 fn draw_line(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body, points_m: &[Place]) {
     let Shape::Line { thickness_m, .. } = body.shape else { return };
     let (color, opacity) = fill(scene, canvas, body);
-    let width = Num((thickness_m * canvas.px_per_m).max(LEAST_LINE_PX));
+    let width_px = (thickness_m * canvas.px_per_m).max(LEAST_LINE_PX);
+    let width = Num(width_px);
     let hides = if opacity < 1.0 { r#" stroke-opacity="0.45""# } else { "" };
     let data = path_data(points_m.iter().map(|&p| canvas.at(p)));
     // In space the group around all parts says the rest.
     let ends = if canvas.is_above() { format!(" {LINE_LOOK}") } else { String::new() };
+    if is_seamed(canvas, body) {
+        let around = Num(width_px + 2.0 * SEAM_PX);
+        svg.path(&data, format_args!(r##"stroke="#FFFFFF" stroke-width="{around}""##));
+    }
     let look = format!(r#"stroke="{}" stroke-width="{width}"{hides}{ends}"#, hex(color));
     svg.path(&data, look);
 }

@@ -163,3 +163,16 @@ fn every_kind_has_the_colors_of_the_table() {
         }
     }
 }
+
+#[test]
+fn thick_parts_in_space_have_a_seam_and_thin_ones_none() {
+    let rods = |thickness_m: f64| {
+        let points_m = vec![[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]];
+        Body::new(Kind::Rods, 0, Pose::at([0.0; 3]), Shape::Line { points_m, thickness_m })
+    };
+    let seams = |dimensions: u8, thickness_m: f64| {
+        let svg = picture(&open(dimensions), &moment(vec![rods(thickness_m)]));
+        svg.matches(r##"stroke="#FFFFFF" stroke-width"##).count()
+    };
+    assert_eq!([seams(3, 0.1), seams(3, 0.001), seams(2, 0.1)], [1, 0, 0]);
+}

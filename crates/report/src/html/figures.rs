@@ -25,7 +25,7 @@ pub(super) fn figure(figure: &Figure, id: &str, still: Option<&SvgFile>) -> Mark
             @if let Some(numbers) = numbers(figure) {
                 details .numbers {
                     summary { "Numbers" }
-                    (tables::wide(&format!("Numbers of: {}", figure.title), tables::grid(&numbers, None)))
+                    (tables::wide(&format!("numbers of {}", figure.title), tables::grid(&numbers, None)))
                 }
             }
         }

@@ -3,10 +3,10 @@
 (() => {
   "use strict";
 
-  // The number that a cell begins with, `1 234.5 [1 200, 1 300]` or `-`; NaN where there is none.
+  // The number that a cell begins with, `1 234.5 [1 200, 1 300]`, `< 0.0001` or `-`; NaN where there is none.
   function leading(cell) {
-    const found = cell.trim().replaceAll("\u2212", "-").replaceAll("\u2060", "").match(/^[-+]?\d+( \d{3})*(\.\d+)?(e[-+]?\d+)?/i);
-    return found ? Number(found[0].replaceAll(" ", "")) : NaN;
+    const found = cell.trim().replaceAll("\u2212", "-").replaceAll("\u2060", "").match(/^(?:< ?)?([-+]?\d+( \d{3})*(\.\d+)?(e[-+]?\d+)?)/i);
+    return found ? Number(found[1].replaceAll(" ", "")) : NaN;
   }
 
   const words = new Intl.Collator("en", { numeric: true });
@@ -18,8 +18,19 @@
     return words.compare(a, b);
   }
 
+  // Marks the rows that begin as the one above them does, as those of several variants of a metric.
+  function markAgain(body) {
+    let above = null;
+    for (const row of body.rows) {
+      const name = row.cells[0].textContent;
+      row.classList.toggle("again", name !== "" && name === above);
+      above = name;
+    }
+  }
+
   function sortable(table) {
     const body = table.tBodies[0];
+    markAgain(body);
     const rows = [...body.rows];
     const heads = [...table.tHead.rows[0].cells];
     heads.forEach((head, column) => {
@@ -41,6 +52,7 @@
           sorted.sort((a, b) => empty(a) - empty(b) || sign * compare(cell(a), cell(b)));
         }
         body.append(...sorted);
+        markAgain(body);
       });
     });
   }

@@ -82,14 +82,15 @@ fn kept(cell: &str) -> String {
 /// Returns the place of a table: the page's script takes the last columns away where they have no room,
 /// and offers them. Without scripts it scrolls, and so it has a name and can be reached by keyboard.
 pub(super) fn wide(name: &str, inside: Markup) -> Markup {
-    html! { div .wide { div .scrolled role="region" tabindex="0" aria-label=(name) { (inside) } } }
+    // Not the name alone: a section may have the same.
+    html! { div .wide { div .scrolled role="region" tabindex="0" aria-label={ "Table: " (name) } { (inside) } } }
 }
 
-/// Whether every cell that is not empty starts like a number.
+/// Whether every cell that is not empty starts like a number, or like a bound of one: `< 0.0001`.
 fn holds_numbers(table: &Table, k: usize) -> bool {
     let cells = || table.rows.iter().filter_map(|row| row.get(k));
     let is_number = |cell: &str| {
-        let digits = cell.trim_start_matches(['-', '+', '\u{2212}']);
+        let digits = cell.trim_start_matches(['<', ' ', '-', '+', '\u{2212}']);
         cell.is_empty() || cell == "-" || digits.starts_with(|c: char| c.is_ascii_digit())
     };
     cells().any(|cell| !cell.is_empty()) && cells().all(|cell| is_number(cell))

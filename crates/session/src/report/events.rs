@@ -4,6 +4,7 @@ use super::metrics::{digits, left_out};
 use super::recorded::{cell, rows};
 use sidestep::kernel::InputError;
 use sidestep::kernel::ports::Values;
+use sidestep::kernel::ports::table::split_unit;
 use sidestep_document::figure::{Figure, FigureKind, Point, Series, Table};
 use sidestep_document::{Document, document::Text};
 use sidestep_record::{Table as Recorded, read_table};
@@ -15,6 +16,13 @@ const MOST_ROWS: usize = 100;
 const STRETCHES: u64 = 50;
 /// Largest number of kinds of events with a line of their own; palettes have no more colors.
 const MOST_KINDS: usize = 7;
+
+/// Returns the name of a column as words, with its unit.
+fn head(name: &str) -> String {
+    let (words, unit) = split_unit(name);
+    let words = words.replace('_', " ");
+    unit.map_or_else(|| words.clone(), |unit| format!("{words} ({unit})"))
+}
 
 /// Appends the events of the table `name`, if it is a table of events.
 ///
@@ -87,7 +95,8 @@ impl<'a> Events<'a> {
         let mut table =
             Table::new("Events by kind", "", &["event", "count", "first cycle", "last cycle"]);
         for (name, _) in &floats {
-            table.columns.extend([format!("least {name}"), format!("greatest {name}")]);
+            let head = head(name);
+            table.columns.extend([format!("least {head}"), format!("greatest {head}")]);
         }
         for (kind, count) in self.frequent() {
             let end = |cycle: Option<u64>| cycle.map_or("-".into(), |c| c.to_string());

@@ -57,8 +57,8 @@ fn name(plan: &Plan) -> String {
 fn lead(plan: &Plan, table: &RunTable) -> Text {
     let (runs, variants) = (table.runs() as u64, plan.variants.len() as u64);
     Text::marked(&format!(
-        "{} runs of {} variants in the world `{}`. Replicate k of every variant has seed {} + k, so \
-         variants are compared seed by seed. {}",
+        "{} runs of {} variants in the world `{}`. Replicate k of every variant has seed \
+         {}\u{a0}+\u{a0}k, so variants are compared seed by seed. {}",
         count(runs),
         count(variants),
         plan.world,
@@ -242,8 +242,10 @@ fn pictures(
         if took_s(cell.id).is_some_and(|took_s| took_s <= LONGEST_S)
             && let Some(svg) = picture_of(worlds, folder, cell, watcher)?
         {
-            let caption =
-                format!("Seed {}, digest and metrics in row {} of the table.", cell.seed, cell.id);
+            let caption = format!(
+                "Seed {}; its digest and metrics are in row {} of results.parquet.",
+                cell.seed, cell.id
+            );
             pictures.push(Picture { title: name, caption, svg });
         }
     }
