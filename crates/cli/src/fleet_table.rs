@@ -74,7 +74,7 @@ fn table(now: &FleetNow, most_lines: usize) -> String {
     let mut text = heading(now);
     let _ = writeln!(
         text,
-        "{:>9} state    epoch  heard  round   flown   late  silent   msg/s     kB/s",
+        "{:>9}  state    epoch  heard  round   flown   late  silent   msg/s     kB/s",
         now.noun
     );
     for node in nodes.iter().take(room) {
@@ -121,7 +121,7 @@ fn row(node: &NodeNow, all: usize) -> String {
     let heard = format!("{}/{}", node.heard, all.saturating_sub(1));
     let silent = node.silent_s.map_or("-".into(), |s| format!("{s:.1} s"));
     format!(
-        "{:>9} {:<8} {:>5}  {heard:>5}  {:>5} {:>7} {:>6} {silent:>7} {:>7.0} {:>8.1}\n",
+        "{:>9}  {:<8} {:>5}  {heard:>5}  {:>5} {:>7} {:>6} {silent:>7} {:>7.0} {:>8.1}\n",
         node.name,
         node.state.chars().take(8).collect::<String>(),
         node.epoch,
@@ -191,7 +191,7 @@ mod tests {
             let text = table(&now, 10);
             let lines: Vec<&str> = text.lines().collect();
             assert_eq!((lines.len(), lines[1]), (10, line), "{text}");
-            assert!(lines[2].starts_with("connector state"), "{text}");
+            assert!(lines[2].starts_with("connector  state"), "{text}");
         }
     }
 

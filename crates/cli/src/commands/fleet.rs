@@ -48,7 +48,7 @@ enum TopologyName {
     Star,
 }
 
-/// Run a scenario with a process for each airplane, or each connector of a chain.
+/// Run a scenario with a process for each airplane, or for each connector of a chain.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct FleetArgs {

@@ -46,7 +46,7 @@ pub(crate) enum Command {
     Run(run::RunArgs),
     /// Watch, steer, replay and edit in the browser
     Studio(studio::StudioArgs),
-    /// Run a scenario with a process for each airplane, or each connector of a chain
+    /// Run a scenario with a process for each airplane or connector
     Fleet(Box<fleet::FleetArgs>),
     /// Run one airplane or connector of a fleet on this machine
     Node(Box<node::NodeArgs>),

@@ -21,9 +21,14 @@ Examples:
 Give it the scenario, --set, --seed and --cycles of the fleet. It runs its agent until the fleet \
 ends, and ends when it has not heard the server for the time of --lease.";
 
+const USAGE: &str = "\
+sidestep node <SCENARIO> --airplane <ID> --connect <ENDPOINT> [OPTIONS]
+       sidestep node <SCENARIO> --connector <CHAIN.K> --connect <ENDPOINT>";
+
 /// Run one airplane or connector of a fleet on this machine.
 #[derive(Debug, Args)]
-#[command(after_help = EXAMPLES, group = ArgGroup::new("agent").required(true))]
+#[command(after_help = EXAMPLES, override_usage = USAGE)]
+#[command(group = ArgGroup::new("agent").required(true))]
 pub(crate) struct NodeArgs {
     #[command(flatten)]
     scenario: ScenarioArgs,
