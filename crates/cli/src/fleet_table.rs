@@ -66,15 +66,16 @@ impl Shown {
 /// Returns the table of a fleet in so many lines at most: nodes in trouble come first where not all fit.
 fn table(now: &FleetNow, most_lines: usize) -> String {
     let mut nodes: Vec<&NodeNow> = now.nodes.iter().collect();
-    let room = most_lines.saturating_sub(3).max(1);
+    let waits = usize::from(!now.waits_for.is_empty());
+    let room = most_lines.saturating_sub(3 + waits).max(1);
     if nodes.len() > room {
-        nodes.sort_by_key(|node| {
-            (node.state != "gone", std::cmp::Reverse(node.late), node.airplane)
-        });
+        nodes.sort_by_key(|node| (!is_missed(node), std::cmp::Reverse(node.late), node.agent));
     }
     let mut text = heading(now);
-    text.push_str(
-        "airplane  state    epoch  heard  round   flown   late  silent   msg/s     kB/s\n",
+    let _ = writeln!(
+        text,
+        "{:>9}  state    epoch  heard  round   flown   late  silent   msg/s     kB/s",
+        now.noun
     );
     for node in nodes.iter().take(room) {
         text.push_str(&row(node, now.nodes.len()));
@@ -95,17 +96,33 @@ fn heading(now: &FleetNow) -> String {
     let late =
         if now.late_cycles > 0 { format!(", {} late", now.late_cycles) } else { String::new() };
     format!(
-        "cycle {} of {}{late}; talks within {p50} ms (half), {p99} ms (99 %)\n",
-        now.cycle, now.cycles
+        "cycle {} of {}{late}; talks within {p50} ms (half), {p99} ms (99 %)\n{}",
+        now.cycle,
+        now.cycles,
+        waits(now)
     )
+}
+
+/// Returns a line that says for whom the fleet waits, if it does.
+fn waits(now: &FleetNow) -> String {
+    match now.waits_for.as_slice() {
+        [] => String::new(),
+        [first] => format!("waits for {} {first}\n", now.noun),
+        [first, more @ ..] => format!("waits for {} {first}, and {} more\n", now.noun, more.len()),
+    }
+}
+
+/// Whether nothing is heard of a node that was there.
+fn is_missed(node: &NodeNow) -> bool {
+    ["gone", "silent"].contains(&&*node.state)
 }
 
 fn row(node: &NodeNow, all: usize) -> String {
     let heard = format!("{}/{}", node.heard, all.saturating_sub(1));
     let silent = node.silent_s.map_or("-".into(), |s| format!("{s:.1} s"));
     format!(
-        "{:>8}  {:<8} {:>5}  {heard:>5}  {:>5} {:>7} {:>6} {silent:>7} {:>7.0} {:>8.1}\n",
-        node.airplane,
+        "{:>9}  {:<8} {:>5}  {heard:>5}  {:>5} {:>7} {:>6} {silent:>7} {:>7.0} {:>8.1}\n",
+        node.name,
         node.state.chars().take(8).collect::<String>(),
         node.epoch,
         node.round,
@@ -121,9 +138,10 @@ mod tests {
     use super::*;
 
     fn fleet(count: u32) -> FleetNow {
-        let node = |airplane| NodeNow {
-            airplane,
-            state: if airplane == 7 { "gone" } else { "decide" }.into(),
+        let node = |agent: u32| NodeNow {
+            agent,
+            name: agent.to_string(),
+            state: if agent == 7 { "gone" } else { "decide" }.into(),
             epoch: 12,
             heard: 49,
             round: 1234,
@@ -144,6 +162,8 @@ mod tests {
             late_cycles: 1234,
             talk_p50_ms: times.0,
             talk_p99_ms: times.1,
+            noun: "airplane".into(),
+            waits_for: Vec::new(),
             nodes,
         }
     }
@@ -157,6 +177,22 @@ mod tests {
         }
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines[1].chars().count(), lines[2].chars().count(), "{text}");
+    }
+
+    #[test]
+    fn a_fleet_that_waits_says_for_whom_in_as_many_lines_as_there_are() {
+        let names = |names: &[&str]| names.iter().map(|name| name.to_string()).collect();
+        let noun = String::from("connector");
+        for (waits_for, line) in [
+            (names(&["0.3"]), "waits for connector 0.3"),
+            (names(&["0.3", "0.4", "1.0"]), "waits for connector 0.3, and 2 more"),
+        ] {
+            let now = FleetNow { waits_for, noun: noun.clone(), ..fleet(50) };
+            let text = table(&now, 10);
+            let lines: Vec<&str> = text.lines().collect();
+            assert_eq!((lines.len(), lines[1]), (10, line), "{text}");
+            assert!(lines[2].starts_with("connector  state"), "{text}");
+        }
     }
 
     #[test]

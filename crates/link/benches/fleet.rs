@@ -241,7 +241,7 @@ fn watched(job: FleetJob) -> (Child, Receiver<News>) {
             let line: serde_json::Value = serde_json::from_str(&line).expect("JSON");
             let number = |name: &str| line[name].as_u64();
             if let (Some(airplane), Some(cycle), Some(talk)) =
-                (number("airplane"), number("cycle"), line["talk"].as_str())
+                (number("agent"), number("cycle"), line["talk"].as_str())
             {
                 let (airplane, talk, at) = (airplane as u32, talk.to_string(), Instant::now());
                 let _ = tells.send(News::Part { airplane, cycle, talk, at });

@@ -2,15 +2,21 @@
 //!
 //! ```text
 //! wire/      frames between parties: in memory, or by Zenoh (the one file that names sockets)
-//! party.rs   who speaks                              post.rs   letters: numbered, acknowledged, repeated
-//! words.rs   words that parties say to each other
-//! mail.rs    a party's letters and notes             ports.rs  what is asked of a world and of an agent's program
-//! airspace.rs  airplanes: the world, the pilot, and the faults of the network
+//! party.rs     who speaks                            post.rs   letters: numbered, acknowledged, repeated
+//! mail.rs      a party's letters and notes           words.rs  words that parties say to each other
+//! deployed.rs  what is asked of a world              ports.rs  what is asked of an agent's program
+//! worlds.rs    the worlds there are                  stage.rs  the run at the server
+//! airspace.rs  airplanes and their pilots            chain.rs  connectors of chains and their agents
+//! faults.rs    the faults of a scenario's network    heard.rs  whom an agent has heard
 //! program/   the process: job, logs, metrics, other processes
 //! server/    the world's server                      node/     the node of an agent
 //! ```
 
-pub mod airspace;
+mod airspace;
+mod chain;
+pub mod deployed;
+mod faults;
+mod heard;
 pub mod mail;
 pub mod node;
 pub mod party;
@@ -18,5 +24,7 @@ pub mod ports;
 mod post;
 pub mod program;
 pub mod server;
+pub mod stage;
 pub mod wire;
 pub mod words;
+pub mod worlds;

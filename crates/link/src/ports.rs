@@ -1,39 +1,10 @@
-//! Ports of a fleet to its world, and of a node to its agent: both as bytes, so that any world can be flown.
+//! Percepts, controls and packets of agents, and ports to their programs: as bytes, so that any world can be flown.
 
 use crate::words::Begin;
-use sidestep::kernel::view::Frame;
 use sidestep::kernel::{Cycle, EntityId};
 
-/// The world of a fleet, at its server.
-pub trait Stage {
-    /// Returns the agents that have nodes, rising.
-    fn agents(&self) -> Vec<EntityId>;
-
-    /// Returns the cycle that comes next.
-    fn cycle(&self) -> Cycle;
-
-    /// Whether there is no further cycle.
-    fn is_over(&self) -> bool;
-
-    /// Duration of a cycle, in seconds of the scenario.
-    fn cycle_s(&self) -> f64;
-
-    /// Returns what each agent that decides in the cycle to come perceives, by rising id.
-    fn sights(&self) -> Vec<Sight>;
-
-    /// Makes the cycle to come with the controls of some agents; others do what is safe.
-    ///
-    /// # Errors
-    /// When it cannot be recorded. A control that makes no sense is returned with the reason, and its agent does
-    /// what is safe.
-    fn advance(
-        &mut self,
-        controls: Vec<(EntityId, Vec<u8>)>,
-    ) -> Result<Vec<Absurd>, sidestep_session::Error>;
-
-    /// Returns what is to be seen now, with the events since the frame before. Looking changes nothing.
-    fn frame(&mut self) -> Frame;
-}
+/// Controls of agents, serialized.
+pub type Controls = Vec<(EntityId, Vec<u8>)>;
 
 /// All that an agent perceives at the start of a cycle.
 #[derive(Debug, Clone, PartialEq)]

@@ -68,7 +68,7 @@ pub(crate) fn told(now: &FleetNow, silent_s: f64) -> Fleet {
 
 fn node(now: &NodeNow) -> Node {
     Node {
-        agent: now.airplane,
+        agent: now.agent,
         state: now.state.clone(),
         epoch: now.epoch,
         heard: now.heard_of.clone(),

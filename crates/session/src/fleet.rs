@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use sidestep::kernel::view::{Frame, Scenery};
 use sidestep::kernel::words::Lines;
 use sidestep::kernel::{Cycle, EntityId, InputError};
+use std::fmt;
 use std::path::PathBuf;
 
 /// The name of the program.
@@ -19,10 +20,49 @@ pub const PROGRAM: &str = "sidestep-link";
 pub enum Job {
     /// Serve a world to nodes, some of which it starts itself.
     Fleet(FleetJob),
-    /// Fly one airplane of it.
+    /// Run one agent of it.
     Node(NodeJob),
     /// Watch a fleet that flies already.
     Watch(WatchJob),
+}
+
+/// The name of an agent, as people give it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum AgentName {
+    /// An airplane, by its id.
+    Airplane(EntityId),
+    /// A connector of a chain.
+    Connector {
+        /// The chain, by its id.
+        chain: EntityId,
+        /// Its number in the chain.
+        connector: u32,
+    },
+}
+
+impl AgentName {
+    /// Returns the noun for such an agent.
+    pub fn noun(self) -> &'static str {
+        match self {
+            Self::Airplane(_) => "airplane",
+            Self::Connector { .. } => "connector",
+        }
+    }
+
+    /// Returns the option that names it.
+    pub fn option(self) -> String {
+        format!("--{} {self}", self.noun())
+    }
+}
+
+impl fmt::Display for AgentName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Airplane(id) => write!(f, "{id}"),
+            Self::Connector { chain, connector } => write!(f, "{chain}.{connector}"),
+        }
+    }
 }
 
 /// A scenario, and the build that is to fly it.
@@ -58,7 +98,7 @@ pub struct Common {
 pub struct FleetJob {
     /// Settings that nodes have, too.
     pub common: Common,
-    /// Number of nodes that are started here, of the airplanes with the lowest ids; all of them unless given.
+    /// Number of nodes that are started here, of the agents with the lowest ids; all of them unless given.
     pub nodes: Option<usize>,
     /// The course of time.
     pub clock: Clock,
@@ -79,8 +119,8 @@ pub struct FleetJob {
 pub struct NodeJob {
     /// Settings that the server has, too.
     pub common: Common,
-    /// Its airplane.
-    pub airplane: EntityId,
+    /// Its agent.
+    pub agent: AgentName,
     /// Endpoints at one of which the server is.
     pub connect: Vec<String>,
     /// Endpoints at which other nodes reach it, in a mesh.
@@ -222,6 +262,10 @@ pub struct FleetNow {
     pub talk_p50_ms: Option<f64>,
     /// The time in milliseconds below which 99 of 100 of them are.
     pub talk_p99_ms: Option<f64>,
+    /// The noun for an agent, e.g. `airplane`.
+    pub noun: String,
+    /// Names of those for whom all wait, because nothing is heard of their nodes.
+    pub waits_for: Vec<String>,
     /// The nodes, by rising id.
     pub nodes: Vec<NodeNow>,
 }
@@ -229,9 +273,12 @@ pub struct FleetNow {
 /// A node at one moment.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct NodeNow {
-    /// Its airplane.
-    pub airplane: EntityId,
-    /// A word for its state: `awaited`, `joined`, `gone`, or its part in the cycle.
+    /// Its agent, by its id on the network,
+    pub agent: EntityId,
+    /// and by its name, e.g. `3`, or `0.3` of connector 3 of chain 0.
+    pub name: String,
+    /// A word for its state: `awaited`, `joined`, `gone`, `silent` of one that was not heard for a second, or its part in
+    /// the cycle.
     pub state: String,
     /// The process of the node, where it has one.
     pub process: Option<u32>,

@@ -1,4 +1,4 @@
-//! `sidestep fleet`: a world whose airplanes are processes on a network.
+//! `sidestep fleet`: a world whose agents are processes on a network.
 
 use crate::console::{Console, aligned, grouped};
 use crate::exit::{ExitCode, Failure};
@@ -22,6 +22,9 @@ Examples:
   sidestep fleet ring.toml --nodes 0 --listen tcp/10.0.0.1:7600
                                            the airplanes are elsewhere: see
                                            sidestep node --help
+  sidestep fleet chain.toml --set chain.deployment=team
+                                           a process for each connector; where all
+                                           rules are local: see the book
 
 The program sidestep-link does it: `cargo install --path crates/link`. In lockstep a fleet comes \
 out as `sidestep run` does, bit for bit. Ctrl-C ends all of its processes; what is recorded \
@@ -30,9 +33,9 @@ continues with `sidestep resume DIR`.";
 /// The course of time, by its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ClockName {
-    /// The server waits for every airplane: the same results as in one process
+    /// The server waits for every agent: the same results as in one process
     Lockstep,
-    /// Each cycle is a deadline: who is late stays on its orbit
+    /// Each cycle is a deadline: an airplane that is late stays on its orbit, a chain stands
     Realtime,
 }
 
@@ -45,14 +48,14 @@ enum TopologyName {
     Star,
 }
 
-/// Fly a scenario with a process for each airplane.
+/// Run a scenario with a process for each airplane, or for each connector of a chain.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct FleetArgs {
     #[command(flatten)]
     scenario: ScenarioArgs,
 
-    /// Number of nodes to start here, of the airplanes with the lowest ids; the fleet waits for the
+    /// Number of nodes to start here, of the agents with the lowest ids; the fleet waits for the
     /// others [default: all]
     #[arg(long, value_name = "N")]
     nodes: Option<usize>,

@@ -46,9 +46,9 @@ pub(crate) enum Command {
     Run(run::RunArgs),
     /// Watch, steer, replay and edit in the browser
     Studio(studio::StudioArgs),
-    /// Fly a scenario with a process for each airplane
+    /// Run a scenario with a process for each airplane or connector
     Fleet(Box<fleet::FleetArgs>),
-    /// Fly one airplane of a fleet from this machine
+    /// Run one airplane or connector of a fleet on this machine
     Node(Box<node::NodeArgs>),
     /// Validate a scenario and describe it, without running it
     Check(check::CheckArgs),

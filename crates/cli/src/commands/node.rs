@@ -1,13 +1,13 @@
-//! `sidestep node`: one airplane of a fleet, as a process of its own.
+//! `sidestep node`: one agent of a fleet, as a process of its own.
 
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::link::{LinkArgs, run};
 use crate::plan::ScenarioArgs;
-use clap::Args;
+use clap::{ArgGroup, Args};
 use serde_json::json;
 use sidestep::kernel::EntityId;
-use sidestep_session::fleet::{Job, NodeJob};
+use sidestep_session::fleet::{AgentName, Job, NodeJob};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -15,20 +15,31 @@ Examples:
       --listen tcp/10.0.0.4:0
   sidestep node ring.toml --airplane 3 --connect tcp/10.0.0.1:7600
                                    for a fleet with --topology star
+  sidestep node chain.toml --connector 0.3 --connect tcp/10.0.0.1:7600 \\
+      --listen tcp/10.0.0.4:0      connector 3 of chain 0
 
-Give it the scenario, --set, --seed and --cycles of the fleet. It flies its airplane until the \
-fleet ends, and ends when it has not heard the server for the time of --lease.";
+Give it the scenario, --set, --seed and --cycles of the fleet. It runs its agent until the fleet \
+ends, and ends when it has not heard the server for the time of --lease.";
 
-/// Fly one airplane of a fleet from this machine.
+const USAGE: &str = "\
+sidestep node <SCENARIO> --airplane <ID> --connect <ENDPOINT> [OPTIONS]
+       sidestep node <SCENARIO> --connector <CHAIN.K> --connect <ENDPOINT>";
+
+/// Run one airplane or connector of a fleet on this machine.
 #[derive(Debug, Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, override_usage = USAGE)]
+#[command(group = ArgGroup::new("agent").required(true))]
 pub(crate) struct NodeArgs {
     #[command(flatten)]
     scenario: ScenarioArgs,
 
     /// Id of the airplane, from 0 on
-    #[arg(long, value_name = "ID")]
-    airplane: EntityId,
+    #[arg(long, value_name = "ID", group = "agent")]
+    airplane: Option<EntityId>,
+
+    /// The chain and the number of the connector in it, both from 0 on, e.g. 0.3
+    #[arg(long, value_name = "CHAIN.K", group = "agent", value_parser = connector)]
+    connector: Option<AgentName>,
 
     /// Endpoint of the server, e.g. tcp/10.0.0.1:7600; repeatable, if it may be at several
     #[arg(long, value_name = "ENDPOINT", required = true)]
@@ -46,6 +57,22 @@ pub(crate) struct NodeArgs {
     link: LinkArgs,
 }
 
+/// Parses the name of a connector.
+fn connector(text: &str) -> Result<AgentName, String> {
+    let numbers = text.split_once('.').map(|(chain, connector)| (chain.parse(), connector.parse()));
+    match numbers {
+        Some((Ok(chain), Ok(connector))) => Ok(AgentName::Connector { chain, connector }),
+        _ => Err("give the numbers of chain and connector, e.g. 0.3".into()),
+    }
+}
+
+impl NodeArgs {
+    fn agent(&self) -> AgentName {
+        let airplane = self.airplane.map(AgentName::Airplane);
+        airplane.or(self.connector).expect("the command line names one of them")
+    }
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -53,14 +80,21 @@ pub(crate) struct NodeArgs {
 pub(crate) fn node(args: &NodeArgs, console: Console) -> Result<ExitCode, Failure> {
     let job = NodeJob {
         common: args.link.common(args.scenario.file.clone(), args.scenario.all_overrides()),
-        airplane: args.airplane,
+        agent: args.agent(),
         connect: args.connect.clone(),
         listen: args.listen.clone(),
         patience_s: args.patience.clamp(0.1, 86_400.0),
     };
     run(&Job::Node(job), |_| {})?;
-    let airplane = args.airplane;
-    let words = || format!("The fleet has ended; airplane {airplane} has landed its node.\n");
-    console.result_or_short(&json!({ "airplane": airplane }), String::new, words);
+    let agent = args.agent();
+    let words =
+        || format!("The fleet has ended; {} {agent} needs its node no longer.\n", agent.noun());
+    let result = match agent {
+        AgentName::Airplane(id) => json!({ "airplane": id }),
+        AgentName::Connector { chain, connector } => {
+            json!({ "chain": chain, "connector": connector })
+        }
+    };
+    console.result_or_short(&result, String::new, words);
     Ok(ExitCode::Done)
 }

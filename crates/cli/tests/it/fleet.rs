@@ -55,6 +55,39 @@ fn a_fleet_has_the_digest_of_a_run_and_its_folder_is_one_for_all_other_commands(
 }
 
 #[test]
+fn the_shipped_chains_run_as_processes_with_the_digest_of_a_run_and_an_ordinary_folder() {
+    if !is_there() {
+        return;
+    }
+    let place = place();
+    let scenario = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/chain/fleet.toml");
+    let alone = place.json(&["run", scenario]);
+    let fleet = place.json(&["fleet", scenario, "--out", "r"]);
+    assert_eq!(fleet["digest"], alone["digest"]);
+    assert_eq!(fleet["metrics"]["messages"], alone["metrics"]["messages"]);
+    let nodes = fleet["fleet"]["nodes"].as_array().expect("nodes");
+    assert_eq!((nodes.len(), &nodes[4]["name"]), (6, &json!("1.1")));
+    assert_eq!(place.json(&["replay", "r"])["digest"], alone["digest"]);
+    assert_eq!(place.run(&["report", "r"]).code(), 0);
+}
+
+#[test]
+fn a_node_is_told_its_airplane_or_its_connector_and_not_both() {
+    let place = place();
+    let node = |named: &[&str]| {
+        let args = [&["node", "ring.toml", "--connect", "tcp/127.0.0.1:9"], named].concat();
+        let ended = place.run(&args);
+        assert_eq!(ended.code(), 2, "{}", ended.err());
+        ended.err()
+    };
+    let nobody = node(&[]);
+    assert!(nobody.contains("--airplane") && nobody.contains("--connector"), "{nobody}");
+    assert!(node(&["--airplane", "0", "--connector", "0.1"]).contains("cannot be used with"));
+    let wrong = node(&["--connector", "3"]);
+    assert!(wrong.contains("give the numbers of chain and connector, e.g. 0.3"), "{wrong}");
+}
+
+#[test]
 fn ctrl_c_ends_a_fleet_in_good_order() {
     if !is_there() {
         return;

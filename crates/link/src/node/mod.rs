@@ -41,13 +41,16 @@ pub enum NodeError {
     /// The server is not there, or no longer.
     #[error("the server was not heard for {0} s")]
     Silence(u64),
+    /// The server has not heard it for too long, and goes on without it.
+    #[error("{}", .0.cause)]
+    Dismissed(Refusal),
     /// A percept cannot be read.
     #[error("the server has sent a percept that cannot be read: {0}")]
     Percept(String),
 }
 
 /// A listener to the status of a node, told as often as the server is.
-type Looks = Box<dyn FnMut(EntityId, &Status)>;
+type Looks = Box<dyn FnMut(&Status)>;
 
 /// A node that has joined a fleet.
 pub struct Node {
@@ -94,13 +97,13 @@ impl Node {
             status: Status::default(),
             part: Default::default(),
             report_at: Instant::now(),
-            looks: Box::new(|_, _| {}),
+            looks: Box::new(|_| {}),
         }
     }
 
     /// Tells somebody else, too, how the node is, twice a second.
     #[must_use]
-    pub fn watched(self, looks: impl FnMut(EntityId, &Status) + 'static) -> Self {
+    pub fn watched(self, looks: impl FnMut(&Status) + 'static) -> Self {
         Self { looks: Box::new(looks), ..self }
     }
 
@@ -159,6 +162,7 @@ impl Node {
     fn hear(&mut self, Heard { from, word, .. }: Heard) -> Result<bool, NodeError> {
         match (from, word) {
             (Party::Server, Word::End) => return Ok(true),
+            (Party::Server, Word::Refused(refusal)) => return Err(NodeError::Dismissed(refusal)),
             (Party::Server, Word::Roster(members)) => self.meet(members)?,
             (Party::Server, Word::Begin(begin)) => self.begin(begin)?,
             (Party::Server, Word::Tick(tick)) => {
@@ -248,9 +252,9 @@ impl Node {
     /// Logs it when the agent has come to another part of a cycle.
     fn log_part(&mut self) {
         let Doing { word, round, epoch } = self.program.doing();
-        let (airplane, cycle) = (self.agent, self.status.cycle);
+        let (agent, cycle) = (self.agent, self.status.cycle);
         if std::mem::replace(&mut self.part, (cycle, word)) != (cycle, word) {
-            tracing::debug!(airplane, cycle, talk = word, round, epoch, "the talk goes on");
+            tracing::debug!(agent, cycle, talk = word, round, epoch, "the talk goes on");
         }
     }
 
@@ -262,7 +266,7 @@ impl Node {
         }
         self.report_at = now + REPORT;
         self.note_status();
-        (self.looks)(self.agent, &self.status);
+        (self.looks)(&self.status);
         self.mail.note(Party::Server, Word::Status(self.status.clone()));
     }
 

@@ -206,17 +206,27 @@ impl Turn {
         // As in one process, whatever the order in which they came.
         due.sort_by_key(|(from, packet)| (packet.left, *from, packet.sequence));
         self.taken += due.len() as u64;
+        let mut sent = Vec::new();
         for (from, packet) in due {
+            // Where no time passes, each packet is answered for itself, however many have come at once: so there are as
+            // many of them as in one process.
+            if self.time == Time::Still {
+                self.send_all(ends, &mut sent);
+            }
             ends.program.on_packet(from, &packet.payload, self.tick);
         }
         if self.time != Time::Still {
             ends.program.on_timer(self.tick);
         }
-        let mut sent = Vec::new();
-        for packet in ends.program.take_packets() {
-            self.send(packet, ends, &mut sent);
-        }
+        self.send_all(ends, &mut sent);
         sent
+    }
+
+    /// Sends what the program has to say.
+    fn send_all(&mut self, ends: &mut Ends<'_>, sent: &mut Vec<(EntityId, u64)>) {
+        for packet in ends.program.take_packets() {
+            self.send(packet, ends, sent);
+        }
     }
 
     /// Sends a packet to each of its receivers, with the faults that happen to it.

@@ -97,10 +97,10 @@ impl Crew {
     ///
     /// # Errors
     /// When a process cannot be started.
-    pub(super) fn start(jobs: Vec<NodeJob>, restarts: bool) -> Result<Self, Error> {
+    pub(super) fn start(jobs: BTreeMap<EntityId, NodeJob>, restarts: bool) -> Result<Self, Error> {
         let mut crew = Self { mates: BTreeMap::new(), restarts };
-        for job in jobs {
-            let (agent, began) = (job.airplane, Instant::now());
+        for (agent, job) in jobs {
+            let began = Instant::now();
             let mut mate = Mate { job, child: None, began, again_at: None, wait: AGAIN / 2 };
             mate.start()?;
             crew.mates.insert(agent, mate);

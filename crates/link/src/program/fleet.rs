@@ -8,9 +8,10 @@ use super::packets::Packets;
 use super::scenario::Scenario;
 use super::shown::{self, Shown};
 use super::told::tell;
-use crate::airspace::Airspace;
+use crate::deployed::Deployed;
 use crate::mail::Mail;
-use crate::server::{Attendant, Broken, Look, Server, Terms};
+use crate::server::{Attendant, Broken, Look, SILENT, Seat, Server, Terms};
+use crate::stage::Stage;
 use crate::wire::Party;
 use crate::wire::endpoint::{WireError, hold};
 use crate::wire::window::Window;
@@ -19,7 +20,7 @@ use crate::words::{Clock, Logged, Topology, Welcome};
 use sidestep::kernel::ports::RecordError;
 use sidestep::kernel::view::Frame;
 use sidestep::kernel::{Cycle, EntityId, Simulation};
-use sidestep_session::fleet::{FleetJob, FleetNow, NodeJob, NodeNow, Staged, Told};
+use sidestep_session::fleet::{Common, FleetJob, FleetNow, NodeJob, NodeNow, Staged, Told};
 use sidestep_session::{Error, Journey, Keep, Watcher};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -52,27 +53,25 @@ pub(super) fn fly(job: &FleetJob, lifeline: &Lifeline) -> Result<(), Error> {
         build: sidestep_session::build().into(),
         welcome,
         lease: Duration::from_secs_f64(job.common.lease_s),
-        has_faults: scenario.world.network.is_some(),
+        has_faults: scenario.world.has_faults(),
     };
-    let watcher = Watched;
-    let mut stage = Airspace::new(journey, &watcher);
-    let all = scenario.world.airplanes.len();
-    let crew = Crew::start(node_jobs(job, &listen, all), job.clock != Clock::Lockstep)?;
-    let cycles = stage.journey().simulation().plan().cycles;
-    let mut captain = Captain::new(crew, lifeline, cycles, (told, shown));
+    let jobs = node_jobs(job, &listen, scenario.world.as_ref());
+    let restarts = job.clock != Clock::Lockstep || scenario.world.waits_for_lost();
+    let crew = Crew::start(jobs, restarts)?;
+    let mut stage = Stage::new(journey, scenario.world, &Watched);
+    let plan = stage.run().plan().clone();
+    let mut captain = Captain::new(crew, lifeline, plan.cycles, (told, shown));
     captain.packets = job
         .out
         .as_ref()
         .filter(|_| job.packets)
-        .map(|folder| {
-            Packets::begin(folder, &scenario.source.text, stage.journey().simulation().plan().seed)
-        })
+        .map(|folder| Packets::begin(folder, &scenario.source.text, plan.seed))
         .transpose()?;
     let (flown, _) = Server::new(mail, &mut stage, &mut captain, terms).run();
     captain.crew.end();
     let flown = flown.and_then(|()| captain.finish_packets());
     let Captain { now, shown, .. } = captain;
-    let done = finish(stage.into_journey(), &watcher, flown, now);
+    let done = finish(stage.into_journey(), flown, now);
     shown.linger();
     done
 }
@@ -95,21 +94,28 @@ fn endpoints(listen: &[String]) -> Result<Vec<String>, WireError> {
     Ok(held.into_iter().map(|held| held.endpoint).collect())
 }
 
-/// Returns the jobs of the nodes that are started here.
-fn node_jobs(job: &FleetJob, connect: &[String], all: usize) -> Vec<NodeJob> {
+/// Returns the jobs of the nodes that are started here, by their agents' ids.
+fn node_jobs(
+    job: &FleetJob,
+    connect: &[String],
+    world: &dyn Deployed,
+) -> BTreeMap<EntityId, NodeJob> {
     let any = match job.topology {
         // As the server's own: these are on its machine.
         Topology::Mesh => vec![any_port(&connect[0])],
         Topology::Star => Vec::new(),
     };
-    let one = |airplane| NodeJob {
-        common: sidestep_session::fleet::Common { metrics: None, ..job.common.clone() },
-        airplane,
-        connect: connect.to_vec(),
-        listen: any.clone(),
-        patience_s: job.common.lease_s.max(30.0),
+    let one = |agent| {
+        let job = NodeJob {
+            common: Common { metrics: None, ..job.common.clone() },
+            agent: world.name(agent),
+            connect: connect.to_vec(),
+            listen: any.clone(),
+            patience_s: job.common.lease_s.max(30.0),
+        };
+        (agent, job)
     };
-    let count = job.nodes.unwrap_or(all).min(all);
+    let count = job.nodes.unwrap_or(usize::MAX).min(world.count());
     (0..count as EntityId).map(one).collect()
 }
 
@@ -119,17 +125,12 @@ fn any_port(endpoint: &str) -> String {
 }
 
 /// Stores and tells the results.
-fn finish(
-    journey: Journey,
-    watcher: &Watched,
-    flown: Result<(), Broken>,
-    fleet: FleetNow,
-) -> Result<(), Error> {
+fn finish(journey: Journey, flown: Result<(), Broken>, fleet: FleetNow) -> Result<(), Error> {
     if let Err(Broken::World(error)) = flown {
         // What could not be recorded before cannot be now.
         return Err(error);
     }
-    let summary = journey.finish(watcher)?;
+    let summary = journey.finish(&Watched)?;
     let (folder, outcome) = (summary.folder.clone(), summary.outcome.clone());
     let summary = serde_json::to_value(&summary).expect("summaries are plain data");
     tell(&Told::Ended { summary, outcome, fleet });
@@ -212,51 +213,63 @@ impl<'a> Captain<'a> {
     fn look(&mut self, fleet: &Look<'_>) {
         let passed_s = self.reported.elapsed().as_secs_f64().max(1e-3);
         self.reported = Instant::now();
-        let mut nodes = Vec::with_capacity(fleet.seats.len());
-        for (&airplane, seat) in fleet.seats {
-            let status = &seat.status;
-            let (packets, bytes) = self.before.get(&airplane).copied().unwrap_or_default();
-            self.before.insert(airplane, (status.packets, status.bytes));
-            let rate = |now: u64, before: u64| now.saturating_sub(before) as f64 / passed_s;
-            let state = match &seat.member {
-                None => "awaited",
-                Some(_) if seat.is_gone => "gone",
-                Some(_) if !fleet.has_begun => "joined",
-                Some(_) if seat.control.is_some() => "done",
-                Some(_) => &status.doing,
-            };
-            nodes.push(NodeNow {
-                airplane,
-                state: state.into(),
-                process: seat.member.as_ref().map(|_| seat.process),
-                epoch: status.epoch,
-                heard: status.heard.len(),
-                heard_of: status.heard.clone(),
-                round: status.round,
-                flown: seat.flown,
-                late: seat.late,
-                lives: seat.lives,
-                packets: status.packets,
-                bytes: status.bytes,
-                packets_per_s: rate(status.packets, packets),
-                bytes_per_s: rate(status.bytes, bytes),
-                silent_s: fleet
-                    .mail
-                    .silent_for(Party::Node(airplane))
-                    .map(|silent| silent.as_secs_f64()),
-            });
-        }
+        let nodes =
+            fleet.seats.iter().map(|(&agent, seat)| self.node(fleet, (agent, seat), passed_s));
+        let nodes = nodes.collect();
+        let world = fleet.stage.world();
         let quantile_ms = |q: f64| fleet.tally.talked.quantile(q).map(|s| 1e3 * s);
         self.now = FleetNow {
-            cycle: fleet.cycle,
+            cycle: fleet.stage.cycle(),
             cycles: self.cycles,
             has_begun: fleet.has_begun,
             flown_s: self.began.map_or(0.0, |began| began.elapsed().as_secs_f64()),
             late_cycles: fleet.tally.late_cycles,
             talk_p50_ms: quantile_ms(0.5),
             talk_p99_ms: quantile_ms(0.99),
+            noun: world.name(0).noun().into(),
+            waits_for: fleet.waits_for.iter().map(|&agent| world.name(agent).to_string()).collect(),
             nodes,
         };
+    }
+
+    /// Returns a node as it is now, so many seconds after the last look.
+    fn node(
+        &mut self,
+        fleet: &Look<'_>,
+        (agent, seat): (EntityId, &Seat),
+        passed_s: f64,
+    ) -> NodeNow {
+        let status = &seat.status;
+        let before = self.before.insert(agent, (status.packets, status.bytes));
+        let (packets, bytes) = before.unwrap_or_default();
+        let rate = |now: u64, before: u64| now.saturating_sub(before) as f64 / passed_s;
+        let silent = fleet.mail.silent_for(Party::Node(agent));
+        let state = match &seat.member {
+            None => "awaited",
+            Some(_) if seat.is_gone => "gone",
+            Some(_) if silent.is_some_and(|silent| silent > SILENT) => "silent",
+            Some(_) if !fleet.has_begun => "joined",
+            Some(_) if seat.control.is_some() => "done",
+            Some(_) => &status.doing,
+        };
+        NodeNow {
+            agent,
+            name: fleet.stage.world().name(agent).to_string(),
+            state: state.into(),
+            process: seat.member.as_ref().map(|_| seat.process),
+            epoch: status.epoch,
+            heard: status.heard.len(),
+            heard_of: status.heard.clone(),
+            round: status.round,
+            flown: seat.flown,
+            late: seat.late,
+            lives: seat.lives,
+            packets: status.packets,
+            bytes: status.bytes,
+            packets_per_s: rate(status.packets, packets),
+            bytes_per_s: rate(status.bytes, bytes),
+            silent_s: silent.map(|silent| silent.as_secs_f64()),
+        }
     }
 }
 
@@ -283,8 +296,8 @@ impl Attendant for Captain<'_> {
         let member = |agent: EntityId| fleet.seats.get(&agent)?.member.clone();
         let gone = self.crew.look(|agent| member(agent).map(|member| member.listens))?;
         if let Some((agent, reason)) = gone.first().filter(|_| !fleet.has_begun) {
-            let (agent, reason) = (*agent, reason.clone());
-            return Err(Broken::Gone { agent, cycle: fleet.cycle, reason });
+            let (agent, reason) = (fleet.stage.called(*agent), reason.clone());
+            return Err(Broken::Gone { agent, cycle: fleet.stage.cycle(), reason });
         }
         Ok(gone)
     }

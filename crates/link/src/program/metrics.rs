@@ -4,8 +4,8 @@ use crate::server::Look;
 use crate::server::tally::Histogram;
 use crate::wire::board::serve;
 use crate::words::Status;
-use sidestep::kernel::{EntityId, InputError};
-use sidestep_session::fleet::{FleetNow, NodeNow};
+use sidestep::kernel::InputError;
+use sidestep_session::fleet::{AgentName, FleetNow, NodeNow};
 use std::fmt::Write;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -61,17 +61,17 @@ impl Text {
         self.value(&format!("{name}_count"), "", histogram.count());
     }
 
-    /// Adds a metric with a value for each airplane.
+    /// Adds a metric with a value for each agent, which is named by a label.
     fn each(
         &mut self,
         name: &str,
         kind: &str,
         help: &str,
-        values: impl Iterator<Item = (EntityId, f64)>,
+        values: impl Iterator<Item = (String, f64)>,
     ) {
         self.metric(name, kind, help);
-        for (airplane, value) in values {
-            self.value(name, &format!("airplane=\"{airplane}\""), value);
+        for (agent, value) in values {
+            self.value(name, &agent, value);
         }
     }
 }
@@ -118,10 +118,11 @@ pub(super) fn of_fleet(now: &FleetNow, fleet: &Look<'_>) -> String {
 }
 
 fn of_nodes(text: &mut Text, now: &FleetNow, fleet: &Look<'_>) {
-    let each =
-        |value: fn(&NodeNow) -> f64| now.nodes.iter().map(move |node| (node.airplane, value(node)));
+    let each = |value: fn(&NodeNow) -> f64| {
+        now.nodes.iter().map(move |node| (label(&now.noun, &node.name), value(node)))
+    };
     let is_up = |node: &NodeNow| f64::from(!["awaited", "gone"].contains(&&*node.state));
-    text.each("node_up", "gauge", "Whether the node of an airplane is there.", each(is_up));
+    text.each("node_up", "gauge", "Whether the node of an agent is there.", each(is_up));
     text.each(
         "controls_flown_total",
         "counter",
@@ -156,40 +157,48 @@ fn of_nodes(text: &mut Text, now: &FleetNow, fleet: &Look<'_>) {
     text.each(
         "heard",
         "gauge",
-        "Other airplanes that a node has heard in a cycle.",
+        "Other agents that a node has heard in a cycle.",
         each(|node| node.heard as f64),
     );
-    let statuses = fleet.seats.iter().map(|(&airplane, seat)| (airplane, &seat.status));
+    let statuses = now.nodes.iter().filter_map(|node| {
+        Some((label(&now.noun, &node.name), &fleet.seats.get(&node.agent)?.status))
+    });
     of_mail(text, &statuses.collect::<Vec<_>>());
 }
 
-/// Adds what nodes tell of their mail.
-fn of_mail(text: &mut Text, statuses: &[(EntityId, &Status)]) {
-    let retries = statuses.iter().map(|(airplane, status)| (*airplane, status.retries as f64));
+/// Returns the label of an agent.
+fn label(noun: &str, name: &str) -> String {
+    format!("{noun}=\"{name}\"")
+}
+
+/// Adds what nodes tell of their mail, by the labels of their agents.
+fn of_mail(text: &mut Text, statuses: &[(String, &Status)]) {
+    let retries = statuses.iter().map(|(agent, status)| (agent.clone(), status.retries as f64));
     text.each("retries_total", "counter", "Letters that a node has sent again.", retries);
     text.metric(
         "dropped_total",
         "counter",
         "Frames and packets that a node has dropped, by reason.",
     );
-    for (airplane, status) in statuses {
+    for (agent, status) in statuses {
         for (reason, count) in &status.dropped {
-            let labels = format!("airplane=\"{airplane}\",reason=\"{reason}\"");
+            let labels = format!("{agent},reason=\"{reason}\"");
             text.value("dropped_total", &labels, count);
         }
     }
 }
 
 /// Returns the metrics of a node.
-pub(super) fn of_node(airplane: EntityId, status: &Status) -> String {
+pub(super) fn of_node(agent: AgentName, status: &Status) -> String {
     let mut text = Text::default();
-    let one = |value: u64| std::iter::once((airplane, value as f64));
+    let agent = label(agent.noun(), &agent.to_string());
+    let one = |value: u64| std::iter::once((agent.clone(), value as f64));
     text.each("node_cycle", "gauge", "The cycle that a node is in.", one(status.cycle));
     text.each("packets_total", "counter", "Packets that a node has sent.", one(status.packets));
     text.each("packet_bytes_total", "counter", "Bytes of these.", one(status.bytes));
     text.each("epoch", "gauge", "Epoch of the coordinator that a node follows.", one(status.epoch));
     let heard = one(status.heard.len() as u64);
-    text.each("heard", "gauge", "Other airplanes that a node has heard in a cycle.", heard);
-    of_mail(&mut text, &[(airplane, status)]);
+    text.each("heard", "gauge", "Other agents that a node has heard in a cycle.", heard);
+    of_mail(&mut text, &[(agent.clone(), status)]);
     text.0
 }

@@ -2,27 +2,24 @@
 
 use super::metrics::{Board, of_node};
 use super::scenario::Scenario;
-use crate::airspace::{Aboard, Faults};
 use crate::mail::Mail;
 use crate::node::{Asked, Node, NodeError, join};
-use crate::ports::{Channel, Program};
 use crate::wire::Party;
 use crate::wire::endpoint::{Held, WireError, hold};
 use crate::wire::zenoh::ZenohWire;
 use crate::words::{Join, Refusal, Topology};
-use sidestep::kernel::{EntityId, InputError};
+use sidestep::kernel::InputError;
 use sidestep_session::Error;
 use sidestep_session::fleet::NodeJob;
 use std::time::Duration;
 
-/// Flies one airplane until the server ends the fleet.
+/// Runs one agent until the server ends the fleet.
 ///
 /// # Errors
 /// When anything is wrong with the job, or the server is gone.
 pub(super) fn fly(job: &NodeJob) -> Result<(), Error> {
     let scenario = Scenario::read(&job.common.flown)?;
-    let agent = job.airplane;
-    check_airplane(&scenario, agent)?;
+    let agent = scenario.world.find(job.agent)?;
     let ports = job.listen.iter().map(|endpoint| hold(endpoint)).collect::<Result<Vec<Held>, _>>();
     let ports = ports.map_err(wrong_endpoint)?;
     let listens = ports.iter().map(|held| held.endpoint.clone()).collect();
@@ -49,24 +46,13 @@ pub(super) fn fly(job: &NodeJob) -> Result<(), Error> {
         return Err(InputError::new("--listen", cause, remedy).into());
     }
     let scenario = scenario.with(&welcome.overrides)?;
-    let world = scenario.world;
-    let program: Box<dyn Program> = Box::new(Aboard::new(world.clone(), agent, build));
-    let channel = Faults::new(world, agent).map(|faults| Box::new(faults) as Box<dyn Channel>);
+    let ends = (scenario.world.program(agent, build), scenario.world.channel(agent));
     let lease = Duration::from_secs_f64(job.common.lease_s);
-    tracing::info!(airplane = agent, "joined");
-    let node = Node::new(agent, mail, (program, channel), &welcome, lease);
-    let node = node.watched(move |agent, status| board.show(|| of_node(agent, status)));
+    let name = job.agent;
+    tracing::info!(agent, who = format!("{} {name}", name.noun()), "joined");
+    let node = Node::new(agent, mail, ends, &welcome, lease);
+    let node = node.watched(move |status| board.show(|| of_node(name, status)));
     node.run().map(drop).map_err(|e| failed(e, job))
-}
-
-fn check_airplane(scenario: &Scenario, agent: EntityId) -> Result<(), InputError> {
-    let n = scenario.world.airplanes.len();
-    if (agent as usize) < n {
-        return Ok(());
-    }
-    let cause = format!("the scenario has no airplane {agent}");
-    let remedy = format!("give 0 to {}", n.saturating_sub(1));
-    Err(InputError::new(format!("--airplane {agent}"), cause, remedy))
 }
 
 /// Returns the error of a wire that there is not.
@@ -101,6 +87,7 @@ fn failed(error: NodeError, job: &NodeJob) -> Error {
             InputError::new(job.connect.join(", "), cause, remedy).into()
         }
         NodeError::Wire(error) => wrong_endpoint(error),
+        NodeError::Dismissed(Refusal { remedy, .. }) => Error::stopped(cause, remedy),
         NodeError::Silence(_) => {
             Error::stopped(cause, "see whether the server runs, and start both again")
         }

@@ -24,8 +24,10 @@ fn table() -> Table<Row> {
     Table::new("packets")
         .u64("cycle", "cycle of the talk", |(_, packet): &Row| packet.cycle)
         .u64("sent", "tick in which it was sent", |(_, packet)| packet.sent)
-        .u32("sender", "entity id of the airplane that sent it", |(sender, _)| *sender)
-        .u32("receiver", "entity id of the airplane to which it was sent", |(_, packet)| packet.to)
+        .u32("sender", "id on the network of the agent that sent it", |(sender, _)| *sender)
+        .u32("receiver", "id on the network of the agent to which it was sent", |(_, packet)| {
+            packet.to
+        })
         .u32(
             "sequence",
             "number among the sender's, in the talk or, in real time, in the cycle",

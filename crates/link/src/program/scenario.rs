@@ -1,11 +1,11 @@
 //! The scenario that a server and its nodes fly.
 
-use crate::airspace::{fingerprint, world_of};
+use crate::deployed::Deployed;
 use crate::words::{Clock, Fingerprint};
+use crate::worlds::{deployed, fingerprint};
 use sidestep::kernel::InputError;
 use sidestep::scenario::{Compiled, Source};
 use sidestep::worlds::WORLDS;
-use sidestep::worlds::airspace::AirspaceWorld;
 use sidestep_session::fleet::Flown;
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use std::sync::Arc;
 pub(super) struct Scenario {
     pub(super) source: Source,
     pub(super) compiled: Box<dyn Compiled>,
-    pub(super) world: Arc<AirspaceWorld>,
+    pub(super) world: Arc<dyn Deployed>,
 }
 
 impl Scenario {
@@ -27,7 +27,7 @@ impl Scenario {
     }
 
     fn of(source: Source, compiled: Box<dyn Compiled>) -> Result<Self, InputError> {
-        let world = world_of(compiled.as_ref(), &source)?;
+        let world = deployed(compiled.as_ref(), &source)?;
         Ok(Self { source, compiled, world })
     }
 
@@ -59,14 +59,9 @@ impl Scenario {
         if is_recorded {
             needs.push("record.controls=true".to_string());
         }
-        if clock != Clock::Lockstep && self.world.network.is_none() {
-            // As long as may be, since processes are slower to answer than agents in memory.
-            let patience_s = PATIENCE_PART * self.world.timing.dt_s;
-            needs.push(format!("airspace.network.patience_s={patience_s}"));
+        if let Clock::Realtime { speed } = clock {
+            needs.extend(self.world.patience(speed));
         }
         needs
     }
 }
-
-/// Part of a cycle after which an agent asks again: an eighth of the time that a talk has, and a little less.
-const PATIENCE_PART: f64 = 0.05;

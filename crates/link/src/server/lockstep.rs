@@ -1,5 +1,6 @@
 //! Lockstep: the server waits for every control, so that a fleet comes out as one process does, bit for bit.
 
+use super::rounds::Group;
 use super::{Broken, LOOK, Server};
 use std::time::Instant;
 
@@ -7,17 +8,33 @@ impl Server<'_> {
     /// Makes a cycle.
     ///
     /// # Errors
-    /// When a node is gone, the world cannot go on, or somebody asks the fleet to end.
+    /// When a node is gone without which the fleet does not go on, the world cannot go on, or somebody asks the fleet to
+    /// end.
     pub(super) fn cycle_in_lockstep(&mut self) -> Result<(), Broken> {
+        // Time stands still while one is missing: the cycle under way when it was lost was made without it.
+        self.wait_for_all()?;
         let began = Instant::now();
-        let groups = self.hand_out_sights();
-        if self.terms.has_faults {
-            self.count_ticks(&groups)?;
-        }
-        while !self.has_controls(&groups) {
-            self.hear(LOOK)?;
+        loop {
+            let groups = self.hand_out_sights();
+            let is_last = groups.is_empty() || self.stage.further_rounds(groups.len()) == 0;
+            if self.terms.has_faults {
+                self.count_ticks(&groups)?;
+            }
+            while !groups.iter().all(|group| self.has_decided(group)) {
+                self.hear(LOOK)?;
+            }
+            self.take_controls(&groups);
+            if is_last {
+                break;
+            }
         }
         self.tally.talked.add(began.elapsed());
-        self.advance(&groups)
+        self.advance()
+    }
+
+    /// Whether all of a group have sent their controls, or one is gone: then others may wait for it for ever.
+    pub(super) fn has_decided(&self, group: &Group) -> bool {
+        let has_lost = group.iter().any(|&agent| self.is_gone(agent));
+        has_lost || group.iter().all(|&agent| self.has_control(agent))
     }
 }

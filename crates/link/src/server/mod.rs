@@ -3,22 +3,26 @@
 //! ```text
 //! muster.rs    who may join, until all are there     seat.rs      what is known of a node
 //! lockstep.rs  waits for every control               realtime.rs  each cycle is a deadline
+//! rounds.rs    sights out and controls in            missing.rs   who is not heard
 //! ticks.rs     counted time, on a network with faults
 //! ```
 //!
 //! It names no socket: what it says and hears goes over [`Mail`].
 
 mod lockstep;
+mod missing;
 mod muster;
 mod realtime;
+mod rounds;
 mod seat;
 pub mod tally;
 mod ticks;
 
 use crate::mail::{Heard, Mail};
-use crate::ports::{Sight, Stage};
+use crate::stage::Stage;
 use crate::wire::Party;
-use crate::words::{Clock, Control, Fingerprint, Logged, Ticked, Welcome, Word};
+use crate::words::{Clock, Fingerprint, Logged, Ticked, Welcome, Word};
+pub use missing::SILENT;
 pub use seat::Seat;
 use sidestep::kernel::view::Frame;
 use sidestep::kernel::{Cycle, EntityId};
@@ -54,10 +58,10 @@ pub enum Broken {
     #[error("interrupted")]
     Stopped,
     /// A node is gone, and lockstep does not go on without it.
-    #[error("the node of agent {agent} is gone in cycle {cycle}: {reason}")]
+    #[error("the node of {agent} is gone in cycle {cycle}: {reason}")]
     Gone {
-        /// Its agent.
-        agent: EntityId,
+        /// Its agent, as people call it.
+        agent: String,
         /// The cycle.
         cycle: Cycle,
         /// The reason.
@@ -76,10 +80,12 @@ pub struct Look<'a> {
     pub tally: &'a Tally,
     /// The mail of the server.
     pub mail: &'a Mail,
-    /// The cycle that comes next.
-    pub cycle: Cycle,
+    /// The stage.
+    pub stage: &'a Stage,
     /// Whether all nodes are there.
     pub has_begun: bool,
+    /// Agents for which all wait, because nothing is heard of their nodes.
+    pub waits_for: &'a [EntityId],
 }
 
 /// Somebody who looks after the fleet while the server waits.
@@ -128,12 +134,14 @@ pub struct Tally {
 /// The server of a fleet.
 pub struct Server<'a> {
     mail: Mail,
-    stage: &'a mut dyn Stage,
+    stage: &'a mut Stage,
     attendant: &'a mut dyn Attendant,
     terms: Terms,
     seats: BTreeMap<EntityId, Seat>,
     tally: Tally,
     has_begun: bool,
+    /// Agents for which all wait, because nothing is heard of their nodes.
+    waits_for: Vec<EntityId>,
     beat_at: Instant,
     look_at: Instant,
     /// Reports of nodes that have done a tick.
@@ -146,11 +154,11 @@ impl<'a> Server<'a> {
     /// Returns a server to which nobody has joined yet.
     pub fn new(
         mail: Mail,
-        stage: &'a mut dyn Stage,
+        stage: &'a mut Stage,
         attendant: &'a mut dyn Attendant,
         terms: Terms,
     ) -> Self {
-        let seats = stage.agents().into_iter().map(|agent| (agent, Seat::default())).collect();
+        let seats = stage.agents().map(|agent| (agent, Seat::default())).collect();
         let (beat_at, look_at) = (Instant::now(), Instant::now());
         let (tally, ticked, packets) = (Tally::default(), Vec::new(), Vec::new());
         Self {
@@ -161,6 +169,7 @@ impl<'a> Server<'a> {
             seats,
             tally,
             has_begun: false,
+            waits_for: Vec::new(),
             beat_at,
             look_at,
             ticked,
@@ -202,10 +211,11 @@ impl<'a> Server<'a> {
             }
         }
         self.attendant.take_packets(std::mem::take(&mut self.packets));
+        self.waits_for.clear();
         self.show();
-        let Self { mail, seats, tally, has_begun, stage, .. } = self;
-        let cycle = stage.cycle();
-        self.attendant.look_back(&Look { seats, tally, mail, cycle, has_begun: *has_begun });
+        let Self { mail, seats, tally, has_begun, stage, waits_for, .. } = self;
+        let has_begun = *has_begun;
+        self.attendant.look_back(&Look { seats, tally, mail, stage, has_begun, waits_for });
     }
 
     /// Agents whose nodes are there, rising.
@@ -240,37 +250,23 @@ impl<'a> Server<'a> {
             seated.into_iter().for_each(|agent| self.mail.note(Party::Node(agent), Word::Beat));
         }
         self.show();
-        let Self { mail, seats, tally, has_begun, stage, .. } = self;
-        let look = Look { seats, tally, mail, cycle: stage.cycle(), has_begun: *has_begun };
+        let Self { mail, seats, tally, has_begun, stage, waits_for, .. } = self;
+        let has_begun = *has_begun;
+        let look = Look { seats, tally, mail, stage, has_begun, waits_for };
         let mut gone = self.attendant.attend(&look)?;
         let lease = self.terms.lease;
-        let is_silent =
-            |agent| self.mail.silent_for(Party::Node(agent)).is_some_and(|silent| silent > lease);
-        let silent = self.seated().filter(|&agent| is_silent(agent));
+        let silent = self.seated().filter(|&agent| self.is_silent(agent, lease));
         let reason = || format!("not heard for {} s", lease.as_secs_f64());
         gone.extend(silent.map(|agent| (agent, reason())));
-        gone.into_iter().try_for_each(|(agent, reason)| self.lose(agent, reason))
+        gone.into_iter().try_for_each(|(agent, reason)| self.lose(agent, reason))?;
+        self.note_waits();
+        Ok(())
     }
 
     /// Shows the world to those who watch it.
     fn show(&mut self) {
         if self.attendant.wants_frame(self.stage.cycle()) {
             self.attendant.take_frame(self.stage.frame());
-        }
-    }
-
-    /// Notes that a node is gone.
-    fn lose(&mut self, agent: EntityId, reason: String) -> Result<(), Broken> {
-        let Some(seat) = self.seats.get_mut(&agent).filter(|seat| seat.life().is_some()) else {
-            return Ok(());
-        };
-        seat.is_gone = true;
-        self.mail.part(Party::Node(agent));
-        tracing::warn!(airplane = agent, cycle = self.stage.cycle(), reason, "a node is gone");
-        let cycle = self.stage.cycle();
-        match self.terms.welcome.clock {
-            Clock::Lockstep if self.has_begun => Err(Broken::Gone { agent, cycle, reason }),
-            _ => Ok(()),
         }
     }
 
@@ -281,7 +277,7 @@ impl<'a> Server<'a> {
             return;
         }
         let Some(seat) = self.seats.get_mut(&agent).filter(|seat| seat.life() == Some(life)) else {
-            return;
+            return self.dismiss(agent, life);
         };
         match word {
             Word::Ready => seat.is_ready = true,
@@ -295,74 +291,5 @@ impl<'a> Server<'a> {
             // Of a node that says what only others say.
             _ => {}
         }
-    }
-
-    fn on_control(&mut self, agent: EntityId, Control { cycle, control }: Control) {
-        let Some(seat) = self.seats.get_mut(&agent) else { return };
-        if cycle == self.stage.cycle() {
-            seat.control = Some(control);
-        }
-    }
-
-    /// Hands each agent that decides its percept; returns the groups of those who decide together.
-    fn hand_out_sights(&mut self) -> Vec<Vec<EntityId>> {
-        self.seats.values_mut().for_each(|seat| seat.control = None);
-        let mut groups = Vec::new();
-        for Sight { agent, group, begin } in self.stage.sights() {
-            self.mail.letter(Party::Node(agent), Word::Begin(begin));
-            if group.first() == Some(&agent) {
-                groups.push(group);
-            }
-        }
-        groups
-    }
-
-    /// Lets the world go on with the controls that are there, and counts those that are not.
-    fn advance(&mut self, groups: &[Vec<EntityId>]) -> Result<(), Broken> {
-        let mut controls = Vec::new();
-        for agent in groups.iter().flatten() {
-            let Some(seat) = self.seats.get_mut(agent) else { continue };
-            match seat.control.take() {
-                Some(control) => {
-                    seat.flown += 1;
-                    controls.push((*agent, control));
-                }
-                None => {
-                    let (cycle, talk) = (self.stage.cycle(), &*seat.status.doing);
-                    tracing::info!(airplane = agent, cycle, talk, "a control is late");
-                    seat.late += 1;
-                    self.tally.late_controls += 1;
-                }
-            }
-        }
-        let began = Instant::now();
-        let cycle = self.stage.cycle();
-        controls.sort_unstable_by_key(|(agent, _)| *agent);
-        for absurd in self.stage.advance(controls)? {
-            tracing::warn!(
-                airplane = absurd.agent,
-                cycle,
-                reason = absurd.reason,
-                "an absurd control"
-            );
-            self.tally.absurd_controls += 1;
-            if let Some(seat) = self.seats.get_mut(&absurd.agent) {
-                seat.absurd += 1;
-                seat.flown -= 1;
-            }
-        }
-        self.tally.advanced.add(began.elapsed());
-        // A node may tell of a cycle until it hears of the next one.
-        let past = self.packets.extract_if(.., |(_, packet)| packet.cycle < cycle).collect();
-        self.attendant.take_packets(past);
-        Ok(())
-    }
-
-    /// Whether all of these agents have sent their controls.
-    fn has_controls(&self, groups: &[Vec<EntityId>]) -> bool {
-        groups
-            .iter()
-            .flatten()
-            .all(|agent| self.seats.get(agent).is_some_and(|seat| seat.control.is_some()))
     }
 }

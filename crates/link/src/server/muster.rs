@@ -1,8 +1,8 @@
 //! The muster: nodes join, until every agent has one and all have heard each other.
 
-use super::{Broken, LOOK, Server};
+use super::{Broken, Server};
 use crate::wire::Party;
-use crate::words::{Clock, Join, Life, Member, Refusal, Word};
+use crate::words::{Join, Life, Member, Refusal, Word};
 use sidestep::kernel::EntityId;
 
 impl Server<'_> {
@@ -11,9 +11,7 @@ impl Server<'_> {
     /// # Errors
     /// When somebody asks the fleet to end.
     pub(super) fn muster(&mut self) -> Result<(), Broken> {
-        while !self.seats.values().all(|seat| seat.is_ready && !seat.is_gone) {
-            self.hear(LOOK)?;
-        }
+        self.wait_for_all()?;
         tracing::info!(nodes = self.seats.len(), "all nodes are there");
         Ok(())
     }
@@ -22,13 +20,7 @@ impl Server<'_> {
     pub(super) fn on_join(&mut self, agent: EntityId, life: Life, join: Join) {
         if let Some((reason, refusal)) = self.refusal(agent, life, &join) {
             let Refusal { cause, remedy } = &refusal;
-            tracing::warn!(
-                airplane = agent,
-                process = join.process,
-                cause,
-                remedy,
-                "a node is refused"
-            );
+            tracing::warn!(agent, process = join.process, cause, remedy, "a node is refused");
             *self.tally.refused.entry(reason).or_default() += 1;
             self.mail.reply(Party::Node(agent), life, Word::Refused(refusal));
             return;
@@ -44,7 +36,8 @@ impl Server<'_> {
         if let Some(seat) = self.seats.get_mut(&agent) {
             seat.take(member, join.process);
         }
-        tracing::info!(airplane = agent, process = join.process, "a node has joined");
+        let who = self.stage.called(agent);
+        tracing::info!(agent, who, process = join.process, "a node has joined");
         self.tell_roster();
     }
 
@@ -64,10 +57,10 @@ impl Server<'_> {
             Some((word, Refusal { cause, remedy: remedy.into() }))
         };
         let Some(seat) = self.seats.get(&agent).filter(|_| join.agent == agent) else {
-            let last = self.seats.keys().last().copied().unwrap_or_default();
-            let remedy = format!("give --airplane 0 to {last}");
-            return refused("unknown", format!("the fleet has no airplane {agent}"), &remedy);
+            let remedy = self.stage.world().which();
+            return refused("unknown", format!("the fleet has no agent {agent}"), &remedy);
         };
+        let who = self.stage.called(agent);
         if join.build != self.terms.build {
             let cause = format!(
                 "the server is of sidestep {}, this node of {}",
@@ -88,18 +81,19 @@ impl Server<'_> {
         }
         let is_other = seat.life().is_some_and(|taken| taken != life);
         if is_other {
-            let cause = format!("airplane {agent} has a node already (process {})", seat.process);
-            return refused("taken", cause, "give the --airplane of one that has none");
+            let cause = format!("{who} has a node already (process {})", seat.process);
+            let noun = self.stage.world().name(agent).noun();
+            return refused("taken", cause, &format!("give the --{noun} of one that has none"));
         }
         let is_back = seat.lives > 0 && seat.life().is_none();
-        if is_back && self.has_begun && self.terms.welcome.clock == Clock::Lockstep {
+        if is_back && self.has_begun && !self.takes_back() {
             let cause = "the fleet flies in lockstep, and has begun".to_string();
             return refused("begun", cause, "start the fleet again");
         }
         let moved = seat.member.as_ref().filter(|_| is_back && self.has_begun);
         if moved.is_some_and(|member| member.listens != join.listens) {
             let cause = format!(
-                "the other nodes look for airplane {agent} at {}",
+                "the other nodes look for {who} at {}",
                 seat.member.as_ref().map(|member| member.listens.join(", ")).unwrap_or_default()
             );
             return refused("moved", cause, "give the same --listen as before");

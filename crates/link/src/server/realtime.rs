@@ -19,29 +19,50 @@ impl Server<'_> {
     /// # Errors
     /// When the world cannot go on, or somebody asks the fleet to end.
     pub(super) fn fly_in_real_time(&mut self, speed: f64) -> Result<(), Broken> {
-        let cycle = Duration::from_secs_f64(self.stage.cycle_s() / speed).max(SHORTEST);
+        let cycle = Duration::from_secs_f64(self.stage.world().cycle_s() / speed).max(SHORTEST);
         let mut due = Instant::now();
         while !self.stage.is_over() {
             self.note_lateness(due.elapsed(), cycle);
             let began = Instant::now();
-            let groups = self.hand_out_sights();
             // A server that was stopped for a while does not hurry to catch up.
             due = (due + cycle).max(began + cycle / 2);
-            let mut talked = None;
-            loop {
-                if talked.is_none() && self.has_controls(&groups) {
-                    talked = Some(began.elapsed());
-                }
-                let left = due.saturating_duration_since(Instant::now());
-                if left.is_zero() {
+            self.talk_until(due)?;
+            let left = || due.saturating_duration_since(Instant::now());
+            while !left().is_zero() {
+                self.hear(left())?;
+            }
+            self.advance()?;
+        }
+        Ok(())
+    }
+
+    /// Lets all talk whose turn it is in a cycle, round after round. Each round has an equal part of the time that is left:
+    /// who is late costs those after it no more.
+    fn talk_until(&mut self, due: Instant) -> Result<(), Broken> {
+        let began = Instant::now();
+        loop {
+            let groups = self.hand_out_sights();
+            let further = self.stage.further_rounds(groups.len());
+            let left = due.saturating_duration_since(Instant::now());
+            let ends = Instant::now() + left / (further as u32 + 1);
+            let is_there =
+                |server: &Self, agent| server.is_gone(agent) || server.has_control(agent);
+            let mut is_in_time = true;
+            while !groups.iter().flatten().all(|&agent| is_there(self, agent)) {
+                let left = ends.saturating_duration_since(Instant::now());
+                is_in_time = !left.is_zero();
+                if !is_in_time {
                     break;
                 }
                 self.hear(left)?;
             }
-            self.tally.talked.add(talked.unwrap_or(cycle));
-            self.advance(&groups)?;
+            self.take_controls(&groups);
+            if groups.is_empty() || further == 0 {
+                let talked = if is_in_time { began.elapsed() } else { due - began };
+                self.tally.talked.add(talked);
+                return Ok(());
+            }
         }
-        Ok(())
     }
 
     fn note_lateness(&mut self, late: Duration, cycle: Duration) {

@@ -5,6 +5,7 @@
 //! nodes go on for which something happens next. No node goes on to a tick before all packets that arrive by then
 //! are there: the server tells it how many they are.
 
+use super::rounds::Group;
 use super::{Broken, LOOK, Server};
 use crate::wire::Party;
 use crate::words::{Tick, Ticked, Word};
@@ -89,12 +90,16 @@ impl Server<'_> {
     /// Lets nodes talk, tick by tick, until each of them has a control.
     ///
     /// # Errors
-    /// When a node is gone, or somebody asks the fleet to end.
-    pub(super) fn count_ticks(&mut self, groups: &[Vec<EntityId>]) -> Result<(), Broken> {
+    /// When a node is gone without which the fleet does not go on, or somebody asks the fleet to end.
+    pub(super) fn count_ticks(&mut self, groups: &[Group]) -> Result<(), Broken> {
         let cycle = self.stage.cycle();
         let mut talks: Vec<Talk> = groups.iter().map(|group| Talk::new(group)).collect();
         while talks.iter().any(|talk| !talk.is_over) {
             self.hear(LOOK)?;
+            for talk in &mut talks {
+                // Others may wait for ever for one that is gone.
+                talk.is_over |= talk.courses.keys().any(|&agent| self.is_gone(agent));
+            }
             for (agent, report) in std::mem::take(&mut self.ticked) {
                 let of = |talk: &&mut Talk| talk.courses.contains_key(&agent);
                 if let Some(talk) = talks.iter_mut().find(of)

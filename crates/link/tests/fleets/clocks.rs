@@ -3,7 +3,7 @@
 use crate::processes::{Program, folder, job};
 use crate::support::{alone, superconflict, wide};
 use serde_json::Value;
-use sidestep_session::fleet::{Clock, FleetJob, Job, NodeJob, Told, Topology};
+use sidestep_session::fleet::{AgentName, Clock, FleetJob, Job, NodeJob, Told, Topology};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -107,8 +107,9 @@ fn a_node_whose_machine_runs_since_another_day_flies_with_the_rest() {
         Told::Listens(endpoints) => Some(endpoints),
         _ => None,
     });
-    let (airplane, listen, patience_s) = (2, vec!["tcp/127.0.0.1:0".into()], 30.0);
-    let node = Job::Node(NodeJob { common, airplane, connect, listen, patience_s });
+    let agent = AgentName::Airplane(2);
+    let (listen, patience_s) = (vec!["tcp/127.0.0.1:0".into()], 30.0);
+    let node = Job::Node(NodeJob { common, agent, connect, listen, patience_s });
     let mut command = Command::new("unshare");
     command.args(shifted).arg(env!("CARGO_BIN_EXE_sidestep-link"));
     let node = Program::start_by(command, &node);

@@ -2,7 +2,9 @@
 
 use crate::processes::{Program, folder, job};
 use crate::support::{alone, superconflict};
-use sidestep_session::fleet::{Clock, Common, FleetJob, Flown, Job, NodeJob, Told, Topology};
+use sidestep_session::fleet::{
+    AgentName, Clock, Common, FleetJob, Flown, Job, NodeJob, Told, Topology,
+};
 use std::net::TcpListener;
 use std::path::Path;
 
@@ -21,7 +23,7 @@ fn with(job: &FleetJob, key: &str) -> FleetJob {
 }
 
 /// Does a job that is wrong, and returns what is said.
-fn refused(job: &Job) -> String {
+pub(crate) fn refused(job: &Job) -> String {
     let (code, failed) = Program::start(job).end();
     let failed = failed.expect("it says why");
     let said = format!("{}: {}; {}", failed.place, failed.cause, failed.remedy);
@@ -78,13 +80,14 @@ fn nodes_that_do_not_belong_to_a_fleet_are_refused_and_the_one_that_does_complet
     });
     program.fleet("the first node", |now| now.nodes[0].state == "joined");
     let node = |fleet: &FleetJob, airplane| {
+        let agent = AgentName::Airplane(airplane);
         let common = fleet.common.clone();
         let (connect, listen, patience_s) = (connect.clone(), Vec::new(), 30.0);
-        Job::Node(NodeJob { common, airplane, connect, listen, patience_s })
+        Job::Node(NodeJob { common, agent, connect, listen, patience_s })
     };
     let wrong = [
         (node(&fleet, 0), "has a node already"),
-        (node(&fleet, 7), "give 0 to 1"),
+        (node(&fleet, 7), "give --airplane 0 to 1"),
         (node(&with(&fleet, "seed=6"), 1), "another scenario"),
         (node(&flown(&fleet, |flown| flown.build = "0.0.0".into()), 1), "0.0.0"),
     ];
@@ -107,7 +110,7 @@ fn a_node_whose_server_is_not_there_gives_up_in_time() {
     let nobody = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("bound");
     let job = NodeJob {
         common: fleet(folder.path()).common,
-        airplane: 0,
+        agent: AgentName::Airplane(0),
         connect: vec![format!("tcp/{nobody}")],
         listen: Vec::new(),
         patience_s: 0.5,

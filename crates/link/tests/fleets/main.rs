@@ -1,5 +1,6 @@
 //! Fleets: in threads, over sockets, and as processes.
 
+mod chains;
 mod clocks;
 mod faults;
 mod input;

@@ -2,7 +2,7 @@
 
 use crate::processes::{Program, folder, job};
 use crate::support::{alone, superconflict, wide};
-use sidestep_session::fleet::{Clock, FleetJob, Job, NodeJob, Told, Topology};
+use sidestep_session::fleet::{AgentName, Clock, FleetJob, Job, NodeJob, Told, Topology};
 use std::process::Command;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -89,7 +89,8 @@ fn start(machines: &Machines, mut fleet: FleetJob) -> (Program, Vec<Program>) {
     let node = |airplane| {
         let (common, connect) = (common.clone(), connect.clone());
         let listen = vec![format!("tcp/{}:0", ADDRESSES[1])];
-        let job = NodeJob { common, airplane, connect, listen, patience_s: 30.0 };
+        let agent = AgentName::Airplane(airplane);
+        let job = NodeJob { common, agent, connect, listen, patience_s: 30.0 };
         Program::start_in(&machines.names[1], &Job::Node(job))
     };
     (server, [2, 3].map(node).into())

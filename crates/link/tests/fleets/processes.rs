@@ -259,6 +259,6 @@ fn lockstep_does_not_go_on_without_a_node_that_is_killed() {
     let (code, failed) = program.end();
     let cause = failed.expect("it says why").cause;
     assert_eq!(code, Some(1));
-    assert!(cause.contains("agent 2 is gone") && cause.contains("signal: 9"), "{cause}");
+    assert!(cause.contains("airplane 2 is gone") && cause.contains("signal: 9"), "{cause}");
     wait_until_gone(&fleet, Duration::ZERO);
 }

@@ -136,7 +136,7 @@ impl Watch {
             if node.flown > *flown {
                 (*flown, *since) = (node.flown, Instant::now());
             }
-            assert!(since.elapsed() < MOST_AWAY, "airplane {} hangs: {now:?}", node.airplane);
+            assert!(since.elapsed() < MOST_AWAY, "airplane {} hangs: {now:?}", node.agent);
         }
     }
 }

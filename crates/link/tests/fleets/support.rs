@@ -4,14 +4,17 @@ use serde_json::Value;
 use sidestep::kernel::{Cycle, EntityId};
 use sidestep::scenario::{Compiled, Source};
 use sidestep::worlds::WORLDS;
-use sidestep_link::airspace::{Aboard, Airspace, Faults, fingerprint, world_of};
+use sidestep_link::deployed::Deployed;
 use sidestep_link::mail::Mail;
 use sidestep_link::node::{Asked, Node, NodeError, join};
-use sidestep_link::ports::{Channel, Doing, Outgoing, Program};
+use sidestep_link::ports::{Doing, Outgoing, Program};
 use sidestep_link::server::{Attendant, Broken, Look, Server, Tally, Terms};
+use sidestep_link::stage::Stage;
 use sidestep_link::wire::{Party, Wire};
 use sidestep_link::words::{Clock, Join, Status, Topology, Welcome};
+use sidestep_link::worlds::{deployed, fingerprint};
 use sidestep_session::{Journey, Keep, Unwatched};
+use std::sync::Arc;
 use std::thread::{JoinHandle, spawn};
 use std::time::Duration;
 
@@ -25,6 +28,34 @@ pub(crate) fn superconflict(n: usize, deployment: &str, cycles: u64, more: &str)
          deployment = \"{deployment}\"\nmax_rounds = 40\n{more}\n\
          [airspace.generator]\nkind = \"superconflict\"\nn = {n}\nradius_m = 1500.0\n"
     )
+}
+
+/// Returns the part of a scenario that all with chains have in common.
+fn chains(cycles: u64, more: &str) -> String {
+    format!(
+        "format = 1\nworld = \"chain\"\nname = \"chain\"\nseed = 3\ncycles = {cycles}\n[chain]\ndt_s = 0.05\n\
+         self_collision = false\nbacktracks = 0\nescape = \"off\"\ndeployment = \"team\"\n{more}"
+    )
+}
+
+/// Returns the text of a scenario: two chains in each other's way, in the plane, past a disc.
+pub(crate) fn two_chains(connectors: usize, cycles: u64, network: &str) -> String {
+    let more = format!(
+        "{network}\n[[obstacles]]\nat_m = [2, -1]\nradius_m = 0.3\n\
+         [[chains]]\nconnectors = {connectors}\nat_m = [0, 0]\nrod_m = [0.3, 0.35]\ncount = 2\napart_m = [0.0, 0.5]\n\
+         [[chains.tasks]]\nkind = \"wander\"\nwithin_m = [[-3, -3], [4, 3]]\npatience_s = 100\n"
+    );
+    chains(cycles, &more)
+}
+
+/// Returns the text of a scenario: a chain in space among balls.
+pub(crate) fn chain_in_space(connectors: usize, cycles: u64, network: &str) -> String {
+    let more = format!(
+        "dimensions = 3\n{network}\n[[fields]]\nlo_m = [-1, -2, -2]\nhi_m = [4, 2, 2]\npart = 0.1\nradius_m = 0.3\n\
+         [[chains]]\nconnectors = {connectors}\nat_m = [-1.5, 0, 0]\nalong = [-1, 0, 0]\nrod_m = [0.25, 0.3]\n\
+         radius_m = 0.05\n[[chains.tasks]]\nkind = \"wander\"\nwithin_m = [[-2, -2, -2], [4, 2, 2]]\npatience_s = 100\n"
+    );
+    chains(cycles, &more)
 }
 
 /// Returns the same on a circle of another size, so that it takes longer.
@@ -90,8 +121,8 @@ pub(crate) struct Way<'a> {
     pub(crate) liar: Option<EntityId>,
 }
 
-/// A pilot aboard a node that says nonsense instead of its control.
-struct Liar(Aboard);
+/// The program of an agent that says nonsense instead of its control.
+struct Liar(Box<dyn Program>);
 
 impl Program for Liar {
     fn begin(&mut self, cycle: Cycle, sight: &[u8]) -> Result<u64, String> {
@@ -135,11 +166,11 @@ impl Program for Liar {
     }
 }
 
-/// Flies a scenario with a thread for each airplane.
+/// Flies a scenario with a thread for each agent.
 pub(crate) fn in_threads(text: &str, way: Way<'_>) -> (Came, Result<(), Broken>, Tally) {
     let (source, compiled) = compiled(text);
     let scenario = fingerprint(compiled.as_ref(), &source).expect("a fingerprint");
-    let world = world_of(compiled.as_ref(), &source).expect("an airspace");
+    let world = deployed(compiled.as_ref(), &source).expect("agents of their own");
     let welcome = Welcome {
         clock: way.clock,
         topology: way.topology,
@@ -151,13 +182,13 @@ pub(crate) fn in_threads(text: &str, way: Way<'_>) -> (Came, Result<(), Broken>,
         build: "test".into(),
         welcome,
         lease: way.lease,
-        has_faults: world.network.is_some(),
+        has_faults: world.has_faults(),
     };
     let journey =
         Journey::start(compiled.as_ref(), &source, 1, Keep::default(), None).expect("started");
-    let mut stage = Airspace::new(journey, &Unwatched);
+    let mut stage = Stage::new(journey, world.clone(), &Unwatched);
     let mail = Mail::new(Party::Server, (way.wire)(Party::Server));
-    let nodes: Vec<JoinHandle<Result<Status, NodeError>>> = (0..world.airplanes.len() as EntityId)
+    let nodes: Vec<JoinHandle<Result<Status, NodeError>>> = (0..world.count() as EntityId)
         .map(|agent| {
             let mail = Mail::new(Party::Node(agent), (way.wire)(Party::Node(agent)));
             let (listens, scenario) = ((way.listens)(agent), scenario.clone());
@@ -180,13 +211,12 @@ pub(crate) fn in_threads(text: &str, way: Way<'_>) -> (Came, Result<(), Broken>,
 fn node(
     mut mail: Mail,
     question: Join,
-    world: std::sync::Arc<sidestep::worlds::airspace::AirspaceWorld>,
+    world: Arc<dyn Deployed>,
     (lease, is_liar): (Duration, bool),
 ) -> Result<Status, NodeError> {
     let agent = question.agent;
     let welcome = join(&mut mail, &Asked { join: question, patience: LONG })?;
-    let aboard = Aboard::new(world.clone(), agent, "test");
-    let program: Box<dyn Program> = if is_liar { Box::new(Liar(aboard)) } else { Box::new(aboard) };
-    let channel = Faults::new(world, agent).map(|faults| Box::new(faults) as Box<dyn Channel>);
-    Node::new(agent, mail, (program, channel), &welcome, lease).run()
+    let program = world.program(agent, "test");
+    let program: Box<dyn Program> = if is_liar { Box::new(Liar(program)) } else { program };
+    Node::new(agent, mail, (program, world.channel(agent)), &welcome, lease).run()
 }

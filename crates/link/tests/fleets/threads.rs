@@ -18,7 +18,7 @@ const BAD_NETWORK: &str = "network = { loss = 0.1, duplication = 0.1, max_delay_
     partitions = [{ sides = [[0, 1], [2, 3]], from_s = 20, until_s = 50 }], \
     one_way = [{ sender = 0, receiver = 3, from_s = 60 }] }";
 
-fn over_memory(text: &str) -> crate::support::Came {
+pub(crate) fn over_memory(text: &str) -> crate::support::Came {
     let exchange = Exchange::default();
     let way = Way {
         clock: Clock::Lockstep,

@@ -5,7 +5,7 @@ use crate::support::{alone, superconflict};
 use sidestep_link::wire::endpoint::hold;
 use sidestep_link::wire::zenoh::ZenohWire;
 use sidestep_link::wire::{Party, WireError};
-use sidestep_session::fleet::{Clock, FleetJob, Job, NodeJob, Tls, Told, Topology};
+use sidestep_session::fleet::{AgentName, Clock, FleetJob, Job, NodeJob, Tls, Told, Topology};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -73,7 +73,13 @@ fn with_certificates_a_fleet_flies_as_ever_and_whoever_has_none_of_its_authority
     let node = |tls: Option<Tls>, patience_s| {
         let common = fleet(folder.path(), tls).common;
         let (connect, listen) = (connect.clone(), vec!["tls/127.0.0.1:0".into()]);
-        Program::start(&Job::Node(NodeJob { common, airplane: 1, connect, listen, patience_s }))
+        Program::start(&Job::Node(NodeJob {
+            common,
+            agent: AgentName::Airplane(1),
+            connect,
+            listen,
+            patience_s,
+        }))
     };
     let theirs = Tls { authority: ours.authority.clone(), ..others.clone() };
     for (tls, cause) in [

@@ -4,7 +4,7 @@ use crate::processes::{Program, folder, job};
 use crate::support::{superconflict, wide};
 use serde_json::Value;
 use sidestep_link::wire::endpoint::hold;
-use sidestep_session::fleet::{Clock, FleetJob, Job, NodeJob, Told, Topology};
+use sidestep_session::fleet::{AgentName, Clock, FleetJob, Job, NodeJob, Told, Topology};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -134,9 +134,8 @@ fn metrics_of_the_server_and_of_a_node_are_prometheus_text_of_what_happens() {
         _ => None,
     });
     let common = sidestep_session::fleet::Common { metrics: Some(at_node.clone()), ..common };
-    let (airplane, listen, patience_s) = (2, Vec::new(), 30.0);
-    let _node =
-        Program::start(&Job::Node(NodeJob { common, airplane, connect, listen, patience_s }));
+    let (agent, listen, patience_s) = (AgentName::Airplane(2), Vec::new(), 30.0);
+    let _node = Program::start(&Job::Node(NodeJob { common, agent, connect, listen, patience_s }));
     let now = server.fleet("some cycles", |now| now.cycle > 4 && now.nodes[2].flown > 2);
     let (status, text) = ask(&at_server, "GET");
     assert_eq!(status, "HTTP/1.1 200 OK");
@@ -193,7 +192,7 @@ fn logs_until(program: &Program, holds: impl Fn(&Value) -> bool) -> Vec<Value> {
 }
 
 #[test]
-fn logs_are_json_on_request_and_say_of_what_cycle_talk_and_airplane_they_are() {
+fn logs_are_json_on_request_and_say_of_what_cycle_talk_and_agent_they_are() {
     let folder = folder(&wide(&superconflict(3, "compact-team", 1_000_000, ""), 3_500));
     let mut fleet = job(folder.path(), Topology::Mesh, Clock::Realtime { speed: 20.0 });
     (fleet.common.json_log, fleet.common.log) = (true, "debug".into());
@@ -204,10 +203,10 @@ fn logs_are_json_on_request_and_say_of_what_cycle_talk_and_airplane_they_are() {
         assert!(line["level"].as_str().is_some_and(|level| !level.is_empty()), "{line}");
     }
     let joined = lines.iter().filter(|line| line["message"] == "a node has joined");
-    let joined: BTreeSet<u64> = joined.filter_map(|line| line["airplane"].as_u64()).collect();
+    let joined: BTreeSet<u64> = joined.filter_map(|line| line["agent"].as_u64()).collect();
     assert_eq!(joined, BTreeSet::from([0, 1, 2]));
     for airplane in 0..3 {
-        let own = lines.iter().filter(|line| line["airplane"] == airplane && line["cycle"] == 2);
+        let own = lines.iter().filter(|line| line["agent"] == airplane && line["cycle"] == 2);
         let talks: Vec<&str> = own.filter_map(|line| line["talk"].as_str()).collect();
         assert_eq!(talks.last(), Some(&"done"), "airplane {airplane}: {talks:?}");
     }
@@ -239,8 +238,8 @@ fn the_table_of_packets_has_a_row_for_each_that_was_counted() {
         assert_eq!(bytes, fleet.nodes.iter().map(|node| node.bytes).sum::<u64>(), "{network}");
         let senders = column("sender");
         for node in &fleet.nodes {
-            let own = senders.iter().filter(|sender| **sender == u64::from(node.airplane)).count();
-            assert_eq!(own as u64, node.packets, "airplane {} {network}", node.airplane);
+            let own = senders.iter().filter(|sender| **sender == u64::from(node.agent)).count();
+            assert_eq!(own as u64, node.packets, "airplane {} {network}", node.agent);
         }
         let (sent, arrives, copies) = (column("sent"), column("arrives"), column("copies"));
         for k in 0..table.rows() {

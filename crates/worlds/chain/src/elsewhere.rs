@@ -4,18 +4,23 @@
 //! connector's sight to its agent, hands the decisions over ([`ChainWorld::hand_over`]), and repeats
 //! that until nobody is shown anything more: chains that may meet move one after the other. Then it
 //! advances the run by a cycle. A chain for which nothing was handed over talks in memory.
+//!
+//! A run that is to be recorded and computed again is handed over all that was decided in a cycle, as bytes, before it
+//! advances ([`sidestep_kernel::Simulation::hand_over`]): in such a cycle no chain talks in memory, and one whose
+//! connectors said nothing stands.
 
-use super::agents::{Control, Ended, Shown};
-use super::motion::replan::Climbed;
+use super::agents::{Control, Handed, Shown};
+use super::deploy::Deployment;
 use super::perceive::Looking;
-use super::rods::veto::Veto;
 use super::scratch::Scratch;
 use super::state::ChainState;
 use super::world::ChainWorld;
 use super::{act, claim, join};
 use sidestep_kernel::conflict::Groups;
+use sidestep_kernel::control::OrderError;
 use sidestep_kernel::ports::ManualClock;
 use sidestep_kernel::{Cycle, EntityId, InputError, Slot, Turn};
+use std::collections::BTreeSet;
 
 impl<const D: usize> ChainWorld<D> {
     /// Returns what the connectors of chains perceive in the cycle to come, `now`: of those chains whose
@@ -50,16 +55,16 @@ impl<const D: usize> ChainWorld<D> {
         scratch.shown.unwrap_or_default()
     }
 
-    /// Hands over the decisions of a chain's agents for the cycle to come, `now`, by connector; none of one
-    /// that has not come to a decision. Unless all who take part in a motion agree, nobody moves.
+    /// Hands over the decisions of a chain's agents for the cycle to come. Unless all who take part in a motion
+    /// agree, nobody moves; nor does anybody where an agent is gone.
     ///
     /// # Errors
     /// When the chain does not exist, or a decision is not that of its connector in this cycle.
     pub fn hand_over(
         &self,
         state: &ChainState<D>,
-        (chain, now): (EntityId, Cycle),
-        controls: Vec<Option<Control<D>>>,
+        chain: EntityId,
+        handed: Handed<D>,
     ) -> Result<(), InputError> {
         let wrong = |cause: String, remedy: &str| {
             Err(InputError::new(format!("decisions of chain {chain}"), cause, remedy))
@@ -67,45 +72,117 @@ impl<const D: usize> ChainWorld<D> {
         let Some(spec) = self.chains.get(chain as usize) else {
             return wrong(format!("there are {} chains", self.chains.len()), "count from 0");
         };
-        let n = spec.start.points().len();
-        if controls.len() != n {
-            let cause = format!("{} decisions for {n} connectors", controls.len());
-            return wrong(cause, "give one for each, or none of it");
+        if let Err((cause, remedy)) = handed.check(spec.start.points().len()) {
+            return wrong(cause, remedy);
         }
-        for (k, control) in controls.iter().enumerate() {
-            let Some(control) = control else { continue };
-            if control.connector as usize != k || control.cycle != now {
-                let Control { connector, cycle, .. } = control;
-                let cause = format!("number {k} is of connector {connector}, cycle {cycle}");
-                return wrong(cause, "give them by connector, of the cycle to come");
-            }
-            if !is_right(control, n) {
-                let cause = format!("that of connector {k} names connectors that do not exist");
-                return wrong(cause, "hand over what agents of this chain have decided");
-            }
-        }
-        state.body_mut(chain as usize).handed = Some(controls);
+        state.body_mut(chain as usize).handed = Some(handed);
         Ok(())
     }
-}
 
-/// Whether a decision is about connectors of a chain of `n`.
-fn is_right<const D: usize>(control: &Control<D>, n: usize) -> bool {
-    let is_there = |k: u32| (k as usize) < n;
-    let is_veto = |veto: &Veto<D>| veto.by < n && veto.from < n;
-    let ended = match &control.ended {
-        Some(Ended::Climbed { climbed, objection, .. }) => {
-            let climbed = match climbed {
-                Climbed::PulledBack { by, .. } => *by < n,
-                Climbed::Stuck { vetoes } => vetoes.iter().all(is_veto),
-                Climbed::Vetoed(veto) => is_veto(veto),
-                _ => true,
-            };
-            climbed && objection.as_ref().is_none_or(is_veto)
+    /// Reads the decision of a connector for cycle `now`, by its id on the network; none if its agent is gone
+    /// ([`Handed::GONE`]).
+    ///
+    /// # Errors
+    /// With the cause, when it is no decision, or none of this connector in this cycle.
+    pub fn read_control(
+        &self,
+        now: Cycle,
+        id: EntityId,
+        bytes: &[u8],
+    ) -> Result<Option<Control<D>>, String> {
+        let Some((chain, connector)) = self.connector_of(id) else {
+            return Err("there is no such connector; give ids of connectors".into());
+        };
+        if bytes == Handed::<D>::GONE {
+            return Ok(None);
         }
-        Some(Ended::Stands { missing }) => is_there(*missing),
-        Some(Ended::Rested) | None => true,
-    };
-    let led = control.led.is_none_or(|led| led.first <= led.last && is_there(led.last));
-    ended && led && control.missing.iter().flatten().all(|&k| is_there(k))
+        let read = postcard::take_from_bytes::<Control<D>>(bytes).ok();
+        let Some((control, _)) = read.filter(|(_, rest)| rest.is_empty()) else {
+            return Err("its bytes are none of a decision of this build".into());
+        };
+        let n = self.connectors(chain);
+        let mut alone = Handed::nothing(now, n as usize);
+        alone.controls[connector as usize] = Some(control);
+        alone.check(n as usize).map_err(|(cause, _)| cause)?;
+        Ok(alone.controls.swap_remove(connector as usize))
+    }
+
+    /// Reads the decisions of connectors for cycle `now`, by their ids on the network; returns those of each chain.
+    ///
+    /// # Errors
+    /// When one of them is none of its connector in this cycle.
+    pub fn read_controls(
+        &self,
+        now: Cycle,
+        controls: &[(EntityId, Vec<u8>)],
+    ) -> Result<Vec<Handed<D>>, OrderError> {
+        let lengths = self.chains.iter().map(|spec| spec.start.points().len());
+        let mut all: Vec<_> = lengths.map(|n| Handed::nothing(now, n)).collect();
+        let mut known = BTreeSet::new();
+        for (id, bytes) in controls {
+            let refused = |cause: String| OrderError::Control { who: self.called(*id), cause };
+            let control = self.read_control(now, *id, bytes).map_err(refused)?;
+            if !known.insert(*id) {
+                return Err(refused("there are two of it; give one for each connector".into()));
+            }
+            let Some((chain, connector)) = self.connector_of(*id) else { continue };
+            let handed = &mut all[chain as usize];
+            match control {
+                Some(control) => handed.controls[connector as usize] = Some(control),
+                None => handed.gone.push(connector),
+            }
+        }
+        Ok(all)
+    }
+
+    /// Notes what connectors do in cycle `now`, by their ids on the network: no chain talks in memory in it.
+    ///
+    /// # Errors
+    /// When the chains are not deployed as teams, or a decision is none of its connector; nothing is noted then.
+    pub(crate) fn note_controls(
+        &self,
+        state: &ChainState<D>,
+        now: Cycle,
+        controls: &[(EntityId, Vec<u8>)],
+    ) -> Result<(), OrderError> {
+        if self.deployment == Deployment::Direct {
+            let cause =
+                "one process moves the chains (deployment = \"direct\"); set deployment = \"team\"";
+            return Err(OrderError::NobodyOutside { cause: cause.into() });
+        }
+        for (chain, handed) in self.read_controls(now, controls)?.into_iter().enumerate() {
+            state.body_mut(chain).handed = Some(handed);
+        }
+        Ok(())
+    }
+
+    /// Returns the number of connectors of a chain; 0 of one that does not exist.
+    pub fn connectors(&self, chain: EntityId) -> u32 {
+        self.chains.get(chain as usize).map_or(0, |spec| spec.start.points().len() as u32)
+    }
+
+    /// Returns the id on the network of a connector of a chain, if there is one.
+    pub fn id_of(&self, chain: EntityId, connector: u32) -> Option<EntityId> {
+        (connector < self.connectors(chain)).then(|| self.first_id(chain) + connector)
+    }
+
+    /// Returns the chain of a connector and its number there, by its id on the network.
+    pub fn connector_of(&self, id: EntityId) -> Option<(EntityId, u32)> {
+        let mut k = id;
+        for chain in 0..self.chains.len() as EntityId {
+            match k.checked_sub(self.connectors(chain)) {
+                Some(beyond) => k = beyond,
+                None => return Some((chain, k)),
+            }
+        }
+        None
+    }
+
+    /// Returns what people call a connector.
+    fn called(&self, id: EntityId) -> String {
+        match self.connector_of(id) {
+            Some((chain, k)) => format!("connector {k} of chain {chain}"),
+            None => format!("connector of id {id}"),
+        }
+    }
 }

@@ -110,6 +110,11 @@ impl Rows {
         self.record.every
     }
 
+    /// Whether controls from outside of the run are to be kept.
+    pub(super) fn keep_controls(&self) -> bool {
+        self.record.controls
+    }
+
     /// Starts to keep rows, for those tables that will have some.
     pub(super) fn begin<const D: usize>(&mut self, world: &ChainWorld<D>) {
         let record = self.record;

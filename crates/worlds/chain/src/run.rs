@@ -12,7 +12,7 @@ use super::words;
 use super::world::ChainWorld;
 use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
-use sidestep_kernel::control::{CellsMut, Order, Teams};
+use sidestep_kernel::control::{CellsMut, Order, OrderError, Teams};
 use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
 use sidestep_kernel::view::{Frame, Inspection, Log, Look, PlaceRows, Scenery, Who};
 use sidestep_kernel::words::{Lines, Said};
@@ -205,6 +205,19 @@ impl<const D: usize> World for ChainWorld<D> {
 
     fn order(&self, state: &mut ChainState<D>, order: &Order<'_>) {
         self.note_order(state, order);
+    }
+
+    fn hand_over(
+        &self,
+        state: &mut ChainState<D>,
+        now: Cycle,
+        controls: &[(EntityId, Vec<u8>)],
+    ) -> Result<(), OrderError> {
+        self.note_controls(state, now, controls)
+    }
+
+    fn keeps_controls(&self, books: &Books) -> bool {
+        books.rows.keep_controls()
     }
 
     fn observe(&self, state: &ChainState<D>, now: Cycle, team: usize, room: &mut [CellsMut<'_>]) {

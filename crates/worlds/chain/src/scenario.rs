@@ -247,6 +247,8 @@ pub struct RecordSection {
     pub movers: bool,
     /// One row per event.
     pub events: bool,
+    /// Decisions of connectors whose agents are processes of their own.
+    pub controls: bool,
     /// One cycle in this many is recorded; events are recorded in all.
     #[serde(deserialize_with = "Whole::<1>::read")]
     #[schemars(with = "Whole<1>")]
@@ -263,6 +265,7 @@ impl Default for RecordSection {
             robots: true,
             movers: true,
             events: true,
+            controls: false,
             every: 1,
             checkpoint_every: 1000,
         }

@@ -1,6 +1,6 @@
 //! The changing state of a run, and its snapshot.
 
-use super::agents::control::Control;
+use super::agents::handed::Handed;
 use super::driver::external::External;
 use super::driver::{Driving, Task};
 use super::formation::{Robot, Solid};
@@ -68,8 +68,8 @@ pub struct Body<const D: usize> {
     pub(crate) plan: Option<Plan<D>>,
     /// The nearest lost connectors below and above, as each connector knows; empty while nobody is lost.
     pub(crate) missing: Vec<Missing>,
-    /// Decisions of its agents for this cycle, if they run elsewhere.
-    pub(crate) handed: Option<Vec<Option<Control<D>>>>,
+    /// Decisions of its agents for a cycle, if they run elsewhere.
+    pub(crate) handed: Option<Handed<D>>,
     /// Motions that the chain has yet to follow; none whenever somebody looks.
     pub(crate) put_off: PutOff<D>,
 }
@@ -138,6 +138,8 @@ pub struct Snapshot {
     pub(crate) externals: Vec<(u32, External)>,
     /// Lost connectors, as those of their chain know, of chains in which somebody is lost; by id.
     pub(crate) missing: Vec<(u32, Vec<Missing>)>,
+    /// Decisions for the cycle that comes next, by id, if those were handed over by agents elsewhere; serialized.
+    pub(crate) handed: Vec<(u32, Vec<u8>)>,
 }
 
 /// The nearest lost connectors below and above, as a connector knows.
@@ -196,6 +198,12 @@ impl<const D: usize> Body<D> {
             let at = in_dimensions(self.chain.points()[task.agent]);
             LeaderState::at(Pose { at, heading_rad: atan2(y, x) })
         })
+    }
+
+    /// Returns the decisions that were handed over for a cycle, serialized.
+    fn handed_in(&self, cycle: Cycle) -> Option<Vec<u8>> {
+        let handed = self.handed.as_ref().filter(|handed| handed.cycle == cycle)?;
+        Some(postcard::to_stdvec(handed).expect("decisions are plain data"))
     }
 
     fn record(&self) -> ChainRecord {
@@ -308,6 +316,13 @@ impl<const D: usize> ChainState<D> {
             }
             body.missing = missing.clone();
         }
+        for (slot, handed) in &snapshot.handed {
+            let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
+            let (n, now) = (body.chain.points().len(), snapshot.cycle);
+            let read = postcard::from_bytes::<Handed<D>>(handed).ok();
+            let handed = read.filter(|read| read.cycle == now && read.check(n).is_ok());
+            body.handed = Some(handed.ok_or(CheckpointError::Damaged)?);
+        }
         Ok(Self::of(bodies.into_iter()))
     }
 
@@ -342,6 +357,12 @@ impl<const D: usize> ChainState<D> {
         self.cells[slot].body.read().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Whether the decisions of a chain's agents for a cycle were handed over, and are not carried out yet.
+    pub fn has_handed_over(&self, slot: usize, cycle: Cycle) -> bool {
+        let body = self.leading(slot);
+        body.handed.as_ref().is_some_and(|handed| handed.cycle == cycle)
+    }
+
     /// Locks one chain for writing.
     pub(crate) fn body_mut(&self, slot: usize) -> RwLockWriteGuard<'_, Body<D>> {
         self.cells[slot].body.write().unwrap_or_else(PoisonError::into_inner)
@@ -374,6 +395,7 @@ impl<const D: usize> ChainState<D> {
         let stood = slots.clone().map(|slot| (slot as EntityId, self.body(slot).stood));
         let externals = slots.clone().map(|slot| (slot as EntityId, self.body(slot).external));
         let missing = slots.clone().map(|slot| (slot as EntityId, self.body(slot).missing.clone()));
+        let handed = slots.clone().map(|slot| (slot as EntityId, self.body(slot).handed_in(cycle)));
         Snapshot {
             cycle,
             chains: slots.clone().map(|slot| self.body(slot).record()).collect(),
@@ -383,6 +405,7 @@ impl<const D: usize> ChainState<D> {
             stood: stood.filter(|(_, cycles)| *cycles > 0).collect(),
             externals: externals.filter(|(_, external)| !external.is_none()).collect(),
             missing: missing.filter(|(_, missing)| !missing.is_empty()).collect(),
+            handed: handed.filter_map(|(slot, handed)| Some((slot, handed?))).collect(),
         }
     }
 
@@ -440,6 +463,7 @@ impl Snapshot {
         add_any(&mut hasher, &self.stood);
         add_any(&mut hasher, &self.externals);
         add_any(&mut hasher, &self.missing);
+        add_any(&mut hasher, &self.handed);
         hasher.finish()
     }
 }

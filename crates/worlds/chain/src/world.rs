@@ -60,7 +60,7 @@ pub struct ChainWorld<const D: usize> {
     /// Obstacles that move.
     pub movers: Arc<Movers<D>>,
     /// Duration of a cycle, s.
-    pub(crate) dt_s: f64,
+    pub dt_s: f64,
     /// Cycles of the run, by which the progress of an endless task is measured.
     pub(crate) cycles: Cycle,
     /// Rules by which chains react.
@@ -75,9 +75,9 @@ pub struct ChainWorld<const D: usize> {
     /// Chains that observe, and may be ordered, alike.
     pub(crate) teams: Arc<Teams>,
     /// Deployment of the rules.
-    pub(crate) deployment: Deployment,
+    pub deployment: Deployment,
     /// The network that carries the agents' messages, if it is unreliable.
-    pub(crate) network: Option<Network>,
+    pub network: Option<Network>,
     /// Digest of the scenario's text and seed, by which agents know each other's packets.
     pub fingerprint: u64,
 }

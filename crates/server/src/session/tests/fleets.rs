@@ -40,7 +40,7 @@ impl Elsewhere {
         let mut frame = self.run.frame(Look::BODIES);
         self.events.append(&mut frame.log);
         frame.log.clone_from(&self.events);
-        let nodes = (0..6).map(|airplane| NodeNow { airplane, ..NodeNow::default() }).collect();
+        let nodes = (0..6).map(|agent| NodeNow { agent, ..NodeNow::default() }).collect();
         let fleet = FleetNow { cycle: frame.cycle, cycles: 40, nodes, ..FleetNow::default() };
         self.screen.show(Seen { number: self.number, frame, fleet, is_over });
     }

@@ -3,7 +3,7 @@
 
 use super::Acting;
 use crate::agents::side::Side;
-use crate::agents::{Ended, Role, Wish};
+use crate::agents::{Ended, Handed, Role, Wish};
 use crate::deploy::kind::Deployment;
 use crate::deploy::settled;
 use crate::driver::Task;
@@ -59,7 +59,8 @@ impl<const D: usize> Acting<'_, D> {
         let leader = self.task().map_or(0, |task| task.agent);
         let (who, obstacles) = ((self.slot, self.now), &self.scratch.obstacles);
         let sights = self.world.sights(who, self.body, obstacles, (leader, role));
-        let controls = match (self.body.handed.take(), &mut self.scratch.shown) {
+        let handed = self.body.handed.take().filter(|handed| handed.cycle == self.now);
+        let Handed { controls, gone, .. } = match (handed, &mut self.scratch.shown) {
             (Some(handed), _) => handed,
             (None, Some(shown)) => {
                 shown.push((self.slot, sights));
@@ -67,7 +68,10 @@ impl<const D: usize> Acting<'_, D> {
             }
             (None, None) => self.world.talked(who, sights),
         };
-        if let Some(points) = settled(&self.body.chain, &controls) {
+        // Where somebody is gone nobody moves, also where the motion would not have come to it.
+        if gone.is_empty()
+            && let Some(points) = settled(&self.body.chain, &controls)
+        {
             self.body.chain.points_mut().copy_from_slice(&points);
         }
         let all = || controls.iter().flatten();
@@ -75,13 +79,14 @@ impl<const D: usize> Acting<'_, D> {
         let mut missing = self.body.missing.clone();
         missing.resize(controls.len(), Missing::default());
         all().for_each(|control| missing[control.connector as usize] = control.missing);
+        miss(&mut missing, &gone);
         self.note_missing(missing);
         let leads = controls.into_iter().nth(leader)??;
         if leads.is_late {
             self.body.tally.deadlines_missed += 1;
             self.tell(EventKind::Deadline, leader, 0.0);
         }
-        leads.ended
+        leads.ended.filter(|_| gone.is_empty())
     }
 
     /// Notes who is lost, and tells of each that a neighbor has lost, or has heard again.
@@ -96,6 +101,18 @@ impl<const D: usize> Acting<'_, D> {
         }
         let nobody = missing.iter().all(|sides| sides == &[None; 2]);
         self.body.missing = if nobody { Vec::new() } else { missing };
+    }
+}
+
+/// Lets the neighbors miss those who are gone.
+fn miss(missing: &mut [Missing], gone: &[u32]) {
+    let n = missing.len() as u32;
+    for &k in gone {
+        for side in Side::ALL {
+            if let Some(neighbor) = side.of(k, n) {
+                missing[neighbor as usize][side.other() as usize] = Some(k);
+            }
+        }
     }
 }
 

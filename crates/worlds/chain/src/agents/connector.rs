@@ -208,6 +208,16 @@ impl<const D: usize> ConnectorAgent<D> {
         self.first_id + self.me
     }
 
+    /// Returns a word for its part in the present cycle, for people.
+    pub fn part(&self) -> &'static str {
+        match () {
+            () if self.is_done() => "done",
+            () if self.climbing.is_some() || self.leading.is_some() => "lead",
+            () if self.following.is_some() => "follow",
+            () => "wait",
+        }
+    }
+
     /// Begins a cycle, whose talk starts in a tick. Packets are to be taken after it.
     ///
     /// # Errors
@@ -220,7 +230,8 @@ impl<const D: usize> ConnectorAgent<D> {
         let [below, above] = sight.neighbors;
         let track = |side| if side == Side::Below { below } else { above };
         self.beside = Both::of(|side| track(side).map(|place| Track::at(place.0)));
-        let [below, above] = sight.missing;
+        // Where messages never get lost nobody finds out that somebody is back: who was gone is there again.
+        let [below, above] = self.radio.map_or([None; 2], |_| sight.missing);
         self.missing = Both::of(|side| if side == Side::Below { below } else { above });
         (self.following, self.leading, self.climbing) = (None, None, None);
         (self.goes_in, self.led, self.ended) = (None, None, None);

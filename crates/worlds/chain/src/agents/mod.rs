@@ -5,7 +5,7 @@
 //! packets out, and at the end of a cycle what its connector does ([`Control`]).
 //!
 //! ```text
-//! sight.rs, control.rs     in and out of a cycle
+//! sight.rs, control.rs     in and out of a cycle; handed.rs: all decisions of a chain
 //! connector.rs             the agent: one connector, its links, and the part it plays
 //!   connector/follow.rs    as a slave of a master,
 //!   connector/lead.rs      as the initiator of one motion,
@@ -25,6 +25,7 @@
 
 mod connector;
 pub(crate) mod control;
+pub(crate) mod handed;
 mod link;
 mod message;
 pub(crate) mod side;
@@ -33,6 +34,7 @@ pub(crate) mod traffic;
 
 pub use connector::{ConnectorAgent, Outgoing};
 pub use control::{Control, Ended, Goes, Led};
+pub use handed::Handed;
 pub use message::Motion;
 pub use sight::{Role, Seen, Shown, Sight, Wish};
 pub use traffic::Traffic;

@@ -2,7 +2,7 @@
 
 use crate::motion::replan::{Memory, Situation};
 use crate::rods::chain::is_in_range;
-use crate::rods::geometry::{Core, Cuboid, Point};
+use crate::rods::geometry::{Core, Cuboid, Point, distance};
 use crate::rods::obstacle::Obstacle;
 use crate::rods::veto::Source;
 use crate::rods::wire::Place;
@@ -105,6 +105,11 @@ impl Seen {
 }
 
 impl<const D: usize> Sight<D> {
+    /// Returns the distances to the neighbors below and above, where there is one, meters.
+    pub fn apart_m(&self) -> [Option<f64>; 2] {
+        self.neighbors.map(|place| place.map(|Place(at)| distance(self.at.0, at)))
+    }
+
     /// Returns the obstacles that are seen.
     ///
     /// # Errors

@@ -17,22 +17,22 @@ mod sense;
 #[cfg(test)]
 mod tests;
 
-use crate::agents::{ConnectorAgent, Control, Sight};
+use crate::agents::{ConnectorAgent, Handed, Sight};
 use crate::world::ChainWorld;
 pub use kind::Deployment;
 pub(crate) use outcome::settled;
 use sidestep_kernel::{Cycle, EntityId};
 
 impl<const D: usize> ChainWorld<D> {
-    /// Lets the agents of a chain talk in a cycle; returns their decisions, by connector, of those that
-    /// have come to one.
+    /// Lets the agents of a chain talk in a cycle; returns their decisions.
     pub(crate) fn talked(
         &self,
         (chain, now): (EntityId, Cycle),
         sights: Vec<Sight<D>>,
-    ) -> Vec<Option<Control<D>>> {
+    ) -> Handed<D> {
         let mut agents = self.agents_of(chain);
-        drive::run(drive::Talk::new(self, chain, now), &mut agents, sights)
+        let controls = drive::run(drive::Talk::new(self, chain, now), &mut agents, sights);
+        Handed { cycle: now, controls, gone: Vec::new() }
     }
 
     fn agents_of(&self, chain: EntityId) -> Vec<ConnectorAgent<D>> {

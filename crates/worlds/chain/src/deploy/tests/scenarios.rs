@@ -1,9 +1,12 @@
 //! Whole scenarios, deployed as a team and as one process.
 
-use crate::agents::ConnectorAgent;
+use crate::agents::{ConnectorAgent, Handed};
 use crate::scenario::Compiled;
 use crate::{ChainRun, chain_run};
 use serde_json::Value;
+use sidestep_kernel::control::ControlBook;
+use sidestep_kernel::ports::{MemoryRecorder, Recorder};
+use sidestep_kernel::view::Look;
 use sidestep_kernel::{Digest, Simulation};
 use sidestep_scenario::Source;
 
@@ -134,7 +137,8 @@ fn talk_elsewhere(run: &ChainRun<2>, cycle: u64) {
                 }
             }
             let controls = agents.iter().map(ConnectorAgent::control).collect();
-            run.world().hand_over(run.state(), (chain, cycle), controls).expect("decisions");
+            let handed = Handed { cycle, controls, gone: Vec::new() };
+            run.world().hand_over(run.state(), chain, handed).expect("decisions");
         }
     }
 }
@@ -156,6 +160,72 @@ fn agents_that_run_elsewhere_have_the_same_digest_and_as_many_packets() {
     }
 }
 
+/// Hands over what was decided elsewhere, but of some connectors in some cycles, as a process would.
+fn hand_over(run: &mut ChainRun<2>) {
+    let cycle = run.cycle();
+    talk_elsewhere(run, cycle);
+    let mut controls = Vec::new();
+    for (chain, first_id) in [(0, 0), (1, run.world().first_id(1))] {
+        let handed = run.state().body(chain).handed.clone().filter(|handed| handed.cycle == cycle);
+        for (id, control) in (first_id..).zip(handed.into_iter().flat_map(|all| all.controls)) {
+            let bytes = |one| postcard::to_stdvec(&one).expect("plain data");
+            // Some come too late, and of some the process is gone.
+            match (cycle * 7 + u64::from(id)) % 61 {
+                0 => {}
+                1 => controls.push((id, Handed::<2>::GONE.to_vec())),
+                _ => controls.extend(control.map(|one| (id, bytes(one)))),
+            }
+        }
+    }
+    Simulation::hand_over(run, &controls).expect("decisions");
+}
+
+#[test]
+fn a_recorded_run_with_missing_decisions_is_computed_again_to_its_digest() {
+    let text = format!("{}[record]\ncontrols = true\n", text("team", TWO));
+    let start = || compiled(&text).start(&Source::new("s", text.clone(), ""), 1);
+    let mut driven = start();
+    driven.begin_recording();
+    let mut rows = MemoryRecorder::new(&driven.schemas());
+    for _ in 0..60 {
+        hand_over(&mut driven);
+        driven.advance(1);
+        driven.record(&mut rows).expect("memory suffices");
+    }
+    rows.finish().expect("memory suffices");
+    let book = ControlBook::recorded(&rows).expect("controls are recorded");
+    let mut again = start();
+    again.retrace(book.clone());
+    again.advance(25);
+    let checkpoint = again.checkpoint();
+    again.advance(35);
+    assert_eq!(again.digest(), driven.digest());
+    let mut resumed = start();
+    resumed.retrace(book);
+    resumed.restore(&checkpoint).expect("the same scenario");
+    resumed.advance(35);
+    assert_eq!(resumed.digest(), driven.digest());
+    let mut whole = start();
+    whole.advance(60);
+    assert_ne!(whole.digest(), driven.digest(), "somebody was missing");
+}
+
+#[test]
+fn a_checkpoint_has_the_decisions_that_were_handed_over() {
+    let text = text("team", TWO);
+    let start = || compiled(&text).start(&Source::new("s", text.clone(), ""), 1);
+    let mut driven = start();
+    hand_over(&mut driven);
+    let mut resumed = start();
+    resumed.restore(&driven.checkpoint()).expect("the same scenario");
+    assert_eq!(resumed.digest(), driven.digest());
+    driven.advance(2);
+    resumed.advance(2);
+    assert_eq!(resumed.digest(), driven.digest());
+    let wrong = Simulation::hand_over(&mut driven, &[(0, vec![1, 2, 3])]).expect_err("no decision");
+    assert!(wrong.to_string().contains("connector 0 of chain 0"), "{wrong}");
+}
+
 #[test]
 fn a_chain_stands_in_a_cycle_in_which_a_decision_does_not_come() {
     let text = text("team", FIELD);
@@ -165,17 +235,91 @@ fn a_chain_stands_in_a_cycle_in_which_a_decision_does_not_come() {
     let before = elsewhere.state().body(0).chain.points().to_vec();
     let (chain, sights) = elsewhere.world().sights_at(elsewhere.state(), 1).remove(0);
     let world = elsewhere.world().clone();
-    let none = vec![None; sights.len()];
-    world.hand_over(elsewhere.state(), (chain, 1), none).expect("no decisions");
+    let nothing = Handed::nothing(1, sights.len());
+    world.hand_over(elsewhere.state(), chain, nothing).expect("no decisions");
     elsewhere.advance(1);
     assert_eq!(elsewhere.state().body(0).chain.points(), before);
     talk_elsewhere(&elsewhere, 2);
     elsewhere.advance(1);
     assert_ne!(elsewhere.state().body(0).chain.points(), before, "and goes on");
-    let wrong = world.hand_over(elsewhere.state(), (7, 3), Vec::new()).expect_err("no such chain");
+    let nothing = || Handed::nothing(3, 0);
+    let wrong = world.hand_over(elsewhere.state(), 7, nothing()).expect_err("no such chain");
     assert!(wrong.to_string().contains("count from 0"), "{wrong}");
-    let few = world.hand_over(elsewhere.state(), (0, 3), Vec::new()).expect_err("too few");
+    let few = world.hand_over(elsewhere.state(), 0, nothing()).expect_err("too few");
     assert!(few.to_string().contains("0 decisions for 12"), "{few}");
+}
+
+/// Hands over what connectors of the first chain do, of whom some are gone.
+fn hand_over_without(run: &mut ChainRun<2>, gone: &[u32]) {
+    let cycle = run.cycle();
+    talk_elsewhere(run, cycle);
+    let handed = run.state().body(0).handed.clone().expect("it has talked");
+    let mut controls = Vec::new();
+    for (id, control) in (0..).zip(handed.controls) {
+        match control {
+            _ if gone.contains(&id) => controls.push((id, Handed::<2>::GONE.to_vec())),
+            Some(control) => {
+                controls.push((id, postcard::to_stdvec(&control).expect("plain data")));
+            }
+            None => {}
+        }
+    }
+    Simulation::hand_over(run, &controls).expect("decisions");
+}
+
+#[test]
+fn a_chain_stands_in_a_cycle_in_which_an_agent_is_gone_says_whose_and_goes_on() {
+    let network = format!("network = {{ loss = 0.05 }}\n{FIELD}");
+    for more in [FIELD, &network] {
+        let text = text("team", more);
+        let mut run = compiled(&text).start(&Source::new("s", text.clone(), ""), 1);
+        run.watch();
+        run.advance(3);
+        let points = |run: &ChainRun<2>| run.state().body(0).chain.points().to_vec();
+        let before = points(&run);
+        // The last follower: no motion in the open comes to it.
+        hand_over_without(&mut run, &[11]);
+        run.advance(1);
+        assert_eq!(points(&run), before, "{more}");
+        let said = |run: &mut ChainRun<2>| {
+            let log = run.frame(Look::BODIES).log;
+            log.into_iter().map(|entry| format!("{entry:?}")).collect::<Vec<_>>().join("\n")
+        };
+        let lost = said(&mut run);
+        assert!(lost.contains("is not heard by connector 10: the chain stands"), "{lost}");
+        hand_over_without(&mut run, &[]);
+        run.advance(1);
+        let back = said(&mut run);
+        assert!(back.contains("is heard by connector 10 again"), "{back}");
+        run.advance(1);
+        assert_ne!(points(&run), before, "it goes on");
+    }
+}
+
+#[test]
+fn bytes_that_are_no_decision_are_refused_and_connectors_are_known_by_their_ids() {
+    let text = text("team", TWO);
+    let run = compiled(&text).start(&Source::new("s", text.clone(), ""), 1);
+    let world = run.world();
+    assert_eq!(world.id_of(1, 3), Some(11));
+    assert_eq!(world.connector_of(11), Some((1, 3)));
+    assert_eq!((world.id_of(1, 8), world.id_of(2, 0)), (None, None));
+    assert_eq!((world.connector_of(15), world.connector_of(16)), (Some((1, 7)), None));
+    let refused = |id, bytes: &[u8]| world.read_control(0, id, bytes).expect_err("no decision");
+    assert!(refused(16, Handed::<2>::GONE).contains("no such connector"));
+    assert!(refused(3, &[1, 2, 3]).contains("none of a decision of this build"));
+    assert_eq!(world.read_control(0, 3, Handed::<2>::GONE), Ok(None));
+    talk_elsewhere(&run, 0);
+    let handed = run.state().body(1).handed.clone().expect("it has talked");
+    let control = handed.controls[3].clone().expect("a decision");
+    let bytes = postcard::to_stdvec(&control).expect("plain data");
+    assert_eq!(world.read_control(0, 11, &bytes), Ok(Some(control)));
+    let of = |now, id| world.read_control(now, id, &bytes).expect_err("of another");
+    assert!(of(0, 12).contains("is of connector 3"));
+    assert!(of(1, 11).contains("cycle 0"));
+    let twice = [(11, bytes.clone()), (11, bytes)];
+    let twice = world.read_controls(0, &twice).expect_err("two of one");
+    assert!(twice.to_string().contains("there are two of it"), "{twice}");
 }
 
 #[test]

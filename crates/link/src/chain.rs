@@ -1,0 +1,238 @@
+//! Connectors of chains: their world at the server, and the agent of one at each node.
+
+use crate::deployed::Deployed;
+use crate::faults::Faults;
+use crate::heard::{Heard, dropped};
+use crate::ports::{Absurd, Channel, Controls, Doing, Outgoing, Program, Sight};
+use crate::words::Begin;
+use sidestep::kernel::{Cycle, EntityId, Simulation};
+use sidestep::worlds::chain::agents::{
+    ConnectorAgent, Handed, Outgoing as Packet, Sight as Percept,
+};
+use sidestep::worlds::chain::{ChainRun, ChainWorld, Deployment};
+use sidestep_session::fleet::AgentName;
+use std::any::Any;
+use std::sync::Arc;
+
+/// Part of a cycle after which a connector asks again: an eighth of the time that a talk has, and a little less.
+const PATIENCE_PART: f64 = 0.1;
+
+/// Seconds of real time in which a process answers: who asks sooner asks for nothing.
+const ANSWERS_S: f64 = 2e-3;
+
+/// Connectors that may be nodes, of chains in `D` dimensions.
+pub(crate) struct Connectors<const D: usize> {
+    world: Arc<ChainWorld<D>>,
+}
+
+impl<const D: usize> Connectors<D> {
+    /// Returns the connectors of a world; an error has the cause and the remedy.
+    pub(crate) fn new(world: Arc<ChainWorld<D>>) -> Result<Self, (&'static str, &'static str)> {
+        if world.deployment == Deployment::Direct {
+            let cause = "one process moves the chains (deployment = \"direct\")";
+            return Err((cause, "add --set chain.deployment=team"));
+        }
+        Ok(Self { world })
+    }
+
+    fn run<'a>(&self, run: &'a dyn Simulation) -> &'a ChainRun<D> {
+        let run: &dyn Any = run;
+        run.downcast_ref().expect("it is a run of these chains")
+    }
+
+    /// Returns the chain of a connector and its number there.
+    fn place(&self, agent: EntityId) -> (EntityId, u32) {
+        self.world.connector_of(agent).expect("agents are the connectors of the world")
+    }
+
+    /// Returns the neighbors that a connector's radio does not reach, rising.
+    fn beyond(&self, agent: EntityId, percept: &Percept<D>) -> Vec<EntityId> {
+        let range_m = self.world.network.as_ref().map_or(f64::INFINITY, |network| network.range_m);
+        let neighbors = [agent.wrapping_sub(1), agent + 1].into_iter().zip(percept.apart_m());
+        let is_beyond = |apart_m: Option<f64>| apart_m.is_some_and(|apart_m| apart_m > range_m);
+        neighbors.filter(|(_, apart_m)| is_beyond(*apart_m)).map(|(id, _)| id).collect()
+    }
+}
+
+impl<const D: usize> Deployed for Connectors<D> {
+    fn count(&self) -> usize {
+        let chains = 0..;
+        let lengths = chains.map(|chain| self.world.connectors(chain) as usize);
+        lengths.take_while(|&n| n > 0).sum()
+    }
+
+    fn name(&self, agent: EntityId) -> AgentName {
+        let (chain, connector) = self.place(agent);
+        AgentName::Connector { chain, connector }
+    }
+
+    fn id(&self, name: AgentName) -> Option<EntityId> {
+        match name {
+            AgentName::Connector { chain, connector } => self.world.id_of(chain, connector),
+            AgentName::Airplane(_) => None,
+        }
+    }
+
+    fn cycle_s(&self) -> f64 {
+        self.world.dt_s
+    }
+
+    fn has_faults(&self) -> bool {
+        self.world.network.is_some()
+    }
+
+    fn patience(&self, speed: f64) -> Option<String> {
+        // A bus answers in microseconds, and a process does not: who repeats so soon says everything many times.
+        let is_long = |given_s: f64| given_s / speed >= ANSWERS_S;
+        let given_s = self.world.network.as_ref().map(|network| network.patience_s);
+        let patience_s = PATIENCE_PART * self.cycle_s();
+        let is_kept = given_s.is_some_and(|given_s| is_long(given_s) || given_s >= patience_s);
+        (!is_kept).then(|| format!("chain.network.patience_s={patience_s}"))
+    }
+
+    fn waits_for_lost(&self) -> bool {
+        true
+    }
+
+    fn sights(&self, run: &dyn Simulation) -> Vec<Sight> {
+        let run = self.run(run);
+        let mut sights = Vec::new();
+        for (chain, percepts) in self.world.sights_at(run.state(), run.cycle()) {
+            let n = percepts.len() as u32;
+            let first = self.world.id_of(chain, 0).expect("a chain has connectors");
+            let group: Vec<EntityId> = (first..first + n).collect();
+            for (&agent, percept) in group.iter().zip(&percepts) {
+                let sight = postcard::to_stdvec(percept).expect("percepts are plain data");
+                let beyond = self.beyond(agent, percept);
+                let begin = Begin { cycle: percept.cycle, sight, beyond };
+                sights.push(Sight { agent, group: group.clone(), begin });
+            }
+        }
+        sights.sort_unstable_by_key(|sight| sight.agent);
+        sights
+    }
+
+    fn further_rounds(&self, run: &dyn Simulation, groups: usize) -> usize {
+        let run = self.run(run);
+        let waits = |chain: &usize| !run.state().has_handed_over(*chain, run.cycle());
+        let waiting = (0..run.state().len()).filter(waits).count();
+        waiting.saturating_sub(groups)
+    }
+
+    fn take(
+        &self,
+        run: &dyn Simulation,
+        groups: &[Vec<EntityId>],
+        controls: &mut Controls,
+        gone: &[EntityId],
+    ) -> Vec<Absurd> {
+        let run = self.run(run);
+        let absurd = self.absurd(run, controls);
+        controls.retain(|(agent, _)| {
+            !gone.contains(agent) && absurd.iter().all(|one| one.agent != *agent)
+        });
+        // Also of one that had decided before: what it has said since may be lost with it.
+        controls.extend(gone.iter().map(|&id| (id, Handed::<D>::GONE.to_vec())));
+        let read = self.world.read_controls(run.cycle(), controls).expect("all were read");
+        let mut read: Vec<Option<Handed<D>>> = read.into_iter().map(Some).collect();
+        for group in groups {
+            let (chain, _) = self.place(group[0]);
+            let handed = read[chain as usize].take().expect("a chain talks once in a cycle");
+            self.world.hand_over(run.state(), chain, handed).expect("all were read");
+        }
+        absurd
+    }
+
+    fn absurd(&self, run: &dyn Simulation, controls: &Controls) -> Vec<Absurd> {
+        let now = run.cycle();
+        let why = |(agent, bytes): &(EntityId, Vec<u8>)| {
+            let reason = match self.world.read_control(now, *agent, bytes) {
+                Err(reason) => reason,
+                // Only the server says that somebody is gone.
+                Ok(None) => "it is no decision".into(),
+                Ok(Some(_)) => return None,
+            };
+            Some(Absurd { agent: *agent, reason })
+        };
+        controls.iter().filter_map(why).collect()
+    }
+
+    fn program(&self, agent: EntityId, build: &str) -> Box<dyn Program> {
+        let (chain, connector) = self.place(agent);
+        let first_tick = {
+            let world = self.world.clone();
+            Box::new(move |cycle| world.talk_of(cycle).0)
+        };
+        let agent = ConnectorAgent::new(&self.world, chain, connector).of_build(build);
+        Box::new(Aboard { first_tick, agent, heard: Heard::default() })
+    }
+
+    fn channel(&self, agent: EntityId) -> Option<Box<dyn Channel>> {
+        let world = self.world.clone();
+        let talks = move |cycle| vec![world.talk_of(cycle)];
+        Some(Box::new(Faults::new(self.world.ether()?, agent, talks)))
+    }
+}
+
+/// The agent of a connector, at a node. Of the world it knows the clock, and what the agent does.
+struct Aboard<const D: usize> {
+    /// Returns the first tick of a cycle's talk.
+    first_tick: Box<dyn Fn(Cycle) -> u64 + Send>,
+    agent: ConnectorAgent<D>,
+    heard: Heard,
+}
+
+impl<const D: usize> Program for Aboard<D> {
+    fn begin(&mut self, cycle: Cycle, sight: &[u8]) -> Result<u64, String> {
+        let percept: Percept<D> = postcard::from_bytes(sight).map_err(|e| e.to_string())?;
+        if percept.cycle != cycle {
+            return Err("it is of another cycle".into());
+        }
+        let tick = (self.first_tick)(cycle);
+        self.agent.begin(percept, tick).map_err(|e| e.to_string())?;
+        self.heard.begin();
+        Ok(tick)
+    }
+
+    fn on_packet(&mut self, from: EntityId, payload: &[u8], tick: u64) {
+        self.heard.note(from);
+        self.agent.on_packet(from, payload, tick);
+    }
+
+    fn on_timer(&mut self, tick: u64) {
+        self.agent.on_timer(tick);
+    }
+
+    fn next_timer(&self) -> Option<u64> {
+        self.agent.next_timer()
+    }
+
+    fn take_packets(&mut self) -> Vec<Outgoing> {
+        let outgoing = |packet: Packet| {
+            let Packet { to, sequence, payload } = packet;
+            Outgoing { to: vec![to], sequence, payload }
+        };
+        self.agent.take_packets().into_iter().map(outgoing).collect()
+    }
+
+    fn control(&self) -> Option<Vec<u8>> {
+        let control = self.agent.control()?;
+        Some(postcard::to_stdvec(&control).expect("decisions are plain data"))
+    }
+
+    fn is_done(&self) -> bool {
+        self.agent.is_done()
+    }
+
+    fn doing(&self) -> Doing {
+        Doing { word: self.agent.part(), ..Doing::default() }
+    }
+
+    fn heard(&self) -> Vec<EntityId> {
+        self.heard.all()
+    }
+
+    fn dropped(&self) -> Vec<(String, u64)> {
+        dropped(&self.agent.refused())
+    }
+}

@@ -1,0 +1,79 @@
+//! A world whose agents may be processes: all that a server and its nodes ask of it.
+
+use crate::ports::{Absurd, Channel, Controls, Program, Sight};
+use sidestep::kernel::{EntityId, InputError, Simulation};
+use sidestep_session::fleet::AgentName;
+
+/// A world whose agents have programs of their own.
+pub trait Deployed: Send + Sync {
+    /// Number of agents; their ids on the network are those below.
+    fn count(&self) -> usize;
+
+    /// Returns the name of an agent.
+    fn name(&self, agent: EntityId) -> AgentName;
+
+    /// Returns the id of a named agent; none if there is no such agent.
+    fn id(&self, name: AgentName) -> Option<EntityId>;
+
+    /// Duration of a cycle, in seconds of the scenario.
+    fn cycle_s(&self) -> f64;
+
+    /// Whether packets may be lost, delayed or doubled.
+    fn has_faults(&self) -> bool;
+
+    /// Returns the change of the scenario, as `key=value`, with which agents do not wait for ever for one that is gone
+    /// where time passes so many times as fast; none where they do not anyway.
+    fn patience(&self, speed: f64) -> Option<String>;
+
+    /// Whether a fleet in lockstep waits for a node that is gone. Otherwise it ends.
+    fn waits_for_lost(&self) -> bool {
+        false
+    }
+
+    /// Returns what agents perceive whose turn it is in the cycle to come, by rising id.
+    fn sights(&self, run: &dyn Simulation) -> Vec<Sight>;
+
+    /// Returns the largest number of rounds of this cycle that may follow one of so many groups; none where all decide
+    /// at once.
+    fn further_rounds(&self, _: &dyn Simulation, _: usize) -> usize {
+        0
+    }
+
+    /// Takes the controls of a round whose groups are given, where rounds that follow depend on them; those that make no
+    /// sense are left out. Of agents that are gone it is noted that they are.
+    fn take(
+        &self,
+        _run: &dyn Simulation,
+        _groups: &[Vec<EntityId>],
+        _controls: &mut Controls,
+        _gone: &[EntityId],
+    ) -> Vec<Absurd> {
+        Vec::new()
+    }
+
+    /// Returns the controls of the cycle to come that make no sense.
+    fn absurd(&self, run: &dyn Simulation, controls: &Controls) -> Vec<Absurd>;
+
+    /// Returns the program of an agent, which talks with those of the same build alone.
+    fn program(&self, agent: EntityId, build: &str) -> Box<dyn Program>;
+
+    /// Returns the faults of the scenario's network, for what an agent sends; none where it loses nothing.
+    fn channel(&self, agent: EntityId) -> Option<Box<dyn Channel>>;
+
+    /// Returns the id of a named agent.
+    ///
+    /// # Errors
+    /// When there is no such agent.
+    fn find(&self, name: AgentName) -> Result<EntityId, InputError> {
+        self.id(name).ok_or_else(|| {
+            let cause = format!("the scenario has no {} {name}", name.noun());
+            InputError::new(name.option(), cause, self.which())
+        })
+    }
+
+    /// Returns words for the agents that there are, by the option that names one.
+    fn which(&self) -> String {
+        let last = self.name(self.count().saturating_sub(1) as EntityId);
+        format!("give {} to {last}", self.name(0).option())
+    }
+}

@@ -1,0 +1,46 @@
+//! The faults of a scenario's network, for what one agent sends.
+
+use crate::ports::{Arrival, Channel, Sent};
+use sidestep::kernel::network::Ether;
+use sidestep::kernel::ports::Envelope;
+use sidestep::kernel::{Cycle, EntityId};
+
+/// First ticks of a cycle's talks, each with its time in seconds after the start of the run.
+type Talks = Box<dyn Fn(Cycle) -> Vec<(u64, f64)> + Send>;
+
+/// The faults of the scenario's network, for what one agent sends.
+pub(crate) struct Faults {
+    ether: Ether,
+    sender: EntityId,
+    talks: Talks,
+}
+
+impl Faults {
+    /// Returns the faults of a network, whose talks in each cycle are given.
+    pub(crate) fn new(
+        ether: Ether,
+        sender: EntityId,
+        talks: impl Fn(Cycle) -> Vec<(u64, f64)> + Send + 'static,
+    ) -> Self {
+        Self { ether, sender, talks: Box::new(talks) }
+    }
+}
+
+impl Channel for Faults {
+    fn arrivals(&mut self, sent: &Sent) -> Vec<Arrival> {
+        let &Sent { to, tick, sequence, bytes } = sent;
+        let payload = vec![0; bytes];
+        let sender = self.sender;
+        let packet = Envelope { cycle: tick, sender, sequence, receiver: to, payload };
+        let arrivals = self.ether.arrivals(packet).into_iter();
+        arrivals.map(|(leaves, arrives)| Arrival { leaves, arrives }).collect()
+    }
+
+    fn tick_s(&self) -> f64 {
+        self.ether.tick_s()
+    }
+
+    fn begin(&mut self, cycle: Cycle) {
+        self.ether.begin((self.talks)(cycle));
+    }
+}

@@ -1,0 +1,87 @@
+//! Nodes of which nothing is heard: gone ones, and silent ones, for which a fleet in lockstep waits.
+
+use super::{Broken, LOOK, Server};
+use crate::wire::Party;
+use crate::words::{Clock, Life, Refusal, Word};
+use sidestep::kernel::EntityId;
+use std::time::Duration;
+
+/// Time after which a node of which nothing is heard is silent: it says something twice a second.
+pub const SILENT: Duration = Duration::from_secs(1);
+
+impl Server<'_> {
+    /// Whether nothing was heard of a node that is there for longer than some time.
+    pub(super) fn is_silent(&self, agent: EntityId, time: Duration) -> bool {
+        self.mail.silent_for(Party::Node(agent)).is_some_and(|silent| silent > time)
+    }
+
+    /// Whether the node of an agent is gone.
+    pub(super) fn is_gone(&self, agent: EntityId) -> bool {
+        self.seats.get(&agent).is_none_or(|seat| seat.life().is_none())
+    }
+
+    /// Whether the fleet is in lockstep.
+    fn is_in_lockstep(&self) -> bool {
+        self.terms.welcome.clock == Clock::Lockstep
+    }
+
+    /// Whether the fleet goes on with a node that is back after all had begun.
+    pub(super) fn takes_back(&self) -> bool {
+        !self.is_in_lockstep() || self.stage.world().waits_for_lost()
+    }
+
+    /// Notes that a node is gone.
+    ///
+    /// # Errors
+    /// When the fleet does not go on without it.
+    pub(super) fn lose(&mut self, agent: EntityId, reason: String) -> Result<(), Broken> {
+        let Some(seat) = self.seats.get_mut(&agent).filter(|seat| seat.life().is_some()) else {
+            return Ok(());
+        };
+        seat.is_gone = true;
+        self.mail.part(Party::Node(agent));
+        let (who, cycle) = (self.stage.called(agent), self.stage.cycle());
+        tracing::warn!(agent, who, cycle, reason, "a node is gone");
+        match self.has_begun && !self.takes_back() {
+            true => Err(Broken::Gone { agent: who, cycle, reason }),
+            false => Ok(()),
+        }
+    }
+
+    /// Tells a node that was taken to be gone, and still speaks, that its place is lost.
+    pub(super) fn dismiss(&mut self, agent: EntityId, life: Life) {
+        let Some(seat) = self.seats.get(&agent) else { return };
+        let is_lost = seat.is_gone && seat.member.as_ref().is_some_and(|one| one.life == life);
+        if is_lost {
+            let cause = "the server had not heard this node for a while, and has given it up";
+            let remedy = "start it again";
+            let refusal = Refusal { cause: cause.into(), remedy: remedy.into() };
+            self.mail.reply(Party::Node(agent), life, Word::Refused(refusal));
+        }
+    }
+
+    /// Waits until all nodes are there and ready, also those that were gone.
+    ///
+    /// # Errors
+    /// When somebody asks the fleet to end.
+    pub(super) fn wait_for_all(&mut self) -> Result<(), Broken> {
+        while !self.seats.values().all(|seat| seat.is_ready && !seat.is_gone) {
+            self.hear(LOOK)?;
+        }
+        Ok(())
+    }
+
+    /// Notes for whom a fleet in lockstep waits, and tells of those who are new.
+    pub(super) fn note_waits(&mut self) {
+        if !self.is_in_lockstep() || !self.has_begun {
+            return;
+        }
+        let is_missed = |agent: &EntityId| self.is_gone(*agent) || self.is_silent(*agent, SILENT);
+        let waits_for: Vec<EntityId> = self.seats.keys().copied().filter(is_missed).collect();
+        for &agent in waits_for.iter().filter(|agent| !self.waits_for.contains(agent)) {
+            let (who, cycle) = (self.stage.called(agent), self.stage.cycle());
+            tracing::warn!(agent, who, cycle, "all wait for a node of which nothing is heard");
+        }
+        self.waits_for = waits_for;
+    }
+}
