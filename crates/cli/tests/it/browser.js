@@ -107,7 +107,8 @@
     return [...table.tHead.rows[0].cells].flatMap((head, column) => {
       const cells = [...table.tBodies[0].rows].slice(0, 20).map((row) => row.cells[column]).filter((cell) => cell?.textContent);
       const isRight = getComputedStyle(head).textAlign === "right";
-      const stands = (cell) => Math.abs(side(cell, isRight) - side(head, isRight)) <= 1;
+      // A head without words stands nowhere.
+      const stands = (cell) => head.textContent === "" || Math.abs(side(cell, isRight) - side(head, isRight)) <= 1;
       const isWrong = head.offsetWidth > 0 && (!cells.every(stands) || (isRight && cells.some((cell) => !/\d|^-$/.test(cell.textContent))));
       return isWrong ? [`${told}: ${head.textContent}`] : [];
     });

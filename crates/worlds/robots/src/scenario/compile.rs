@@ -139,8 +139,10 @@ impl<'a> Compiler<'a> {
     fn new(source: &Source, own: &'a Behaviours) -> Result<Self, InputError> {
         let source = Arc::new(source.clone());
         let (head, file) = source.parse_world::<RobotsFile>()?;
-        let (map, office_doors) = load_map(&source, &file.map)?;
         let (sensors, effectors) = known_tables(&source, &file)?;
+        // Of a scenario whose map is wrong, too, this is told.
+        check_names(&source, &file, &sensors, &effectors)?;
+        let (map, office_doors) = load_map(&source, &file.map)?;
         idle::refuse(&source, &file, own, !office_doors.is_empty())?;
         let kinds = Kinds::new(&source, &file)?;
         check_tables(&kinds, &sensors, &effectors)?;
@@ -284,6 +286,35 @@ fn check_tables(kinds: &Kinds, sensors: &Sensors, effectors: &Effectors) -> Resu
 
 type Sensors = BTreeMap<String, Located<SensorSection>>;
 type Effectors = BTreeMap<String, Located<EffectorSection>>;
+
+/// Refuses robots with sensors or effectors that nobody knows.
+fn check_names(
+    source: &Source,
+    file: &RobotsFile,
+    sensors: &Sensors,
+    effectors: &Effectors,
+) -> Result<(), InputError> {
+    for robots in file.robots.0.iter().map(Spanned::get_ref) {
+        let mut names = robots.sensors.iter();
+        names.try_for_each(|name| named(source, sensors, name, "sensor").map(drop))?;
+        let mut name = robots.effector.iter();
+        name.try_for_each(|name| named(source, effectors, name, "effector").map(drop))?;
+    }
+    Ok(())
+}
+
+fn named<'m, T>(
+    source: &Source,
+    all: &'m BTreeMap<String, Located<T>>,
+    name: &Spanned<String>,
+    what: &str,
+) -> Result<&'m Located<T>, InputError> {
+    all.get(name.get_ref()).ok_or_else(|| {
+        let known: Vec<&str> = all.keys().map(String::as_str).collect();
+        let cause = format!("unknown {what} `{}`", name.get_ref());
+        source.error(name.span(), cause, nearest(name.get_ref(), &known))
+    })
+}
 
 /// Returns the sensors and effectors that a scenario may name: ours, those of its profiles, its own.
 fn known_tables(

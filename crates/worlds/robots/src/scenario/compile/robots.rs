@@ -118,27 +118,14 @@ impl Compiler<'_> {
     }
 
     fn sensor_model(&self, name: &Spanned<String>) -> Result<SensorModel, InputError> {
-        let section = self.lookup(&self.sensors, name, "sensor")?;
+        let section = named(&self.source, &self.sensors, name, "sensor")?;
         tables::sensor(name.get_ref(), section, &self.kinds, true)
     }
 
     fn effector(&self, name: Option<&Spanned<String>>) -> Result<EffectorModel, InputError> {
         let Some(name) = name else { return Ok(EffectorModel::perfect()) };
-        let section = self.lookup(&self.effectors, name, "effector")?;
+        let section = named(&self.source, &self.effectors, name, "effector")?;
         tables::effector(name.get_ref(), section)
-    }
-
-    fn lookup<'m, T>(
-        &self,
-        all: &'m BTreeMap<String, Located<T>>,
-        name: &Spanned<String>,
-        what: &str,
-    ) -> Result<&'m Located<T>, InputError> {
-        all.get(name.get_ref()).ok_or_else(|| {
-            let known: Vec<&str> = all.keys().map(String::as_str).collect();
-            let cause = format!("unknown {what} `{}`", name.get_ref());
-            self.source.error(name.span(), cause, nearest(name.get_ref(), &known))
-        })
     }
 
     fn behaviour(
