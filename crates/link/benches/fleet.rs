@@ -204,8 +204,10 @@ fn conflict(n: u32) {
         let packets: u64 = fleet.nodes.iter().map(|node| node.packets).sum();
         println!(
             "a super-conflict of {n}, {} cycles: one process {alone_s:.2} s, {n} processes {fleet_s:.2} s, \
-             {packets} packets; talks p50 {:?} ms, p99 {:?} ms",
-            alone.cycles, fleet.talk_p50_ms, fleet.talk_p99_ms
+             {packets} packets; talks p50 {:.0} ms, p99 {:.0} ms",
+            alone.cycles,
+            fleet.talk_p50_ms.unwrap_or(f64::NAN),
+            fleet.talk_p99_ms.unwrap_or(f64::NAN)
         );
     }
     ratios.sort_by(f64::total_cmp);
