@@ -139,7 +139,23 @@ pub(crate) fn label(value: f64, digits: usize) -> String {
     if value.abs() >= 999_999.5 || digits > 5 {
         return scientific(value, 2);
     }
-    minus(&format!("{value:.digits$}"))
+    let number = format!("{:.digits$}", value.abs());
+    let (whole, rest) = number.split_at(number.find('.').unwrap_or(number.len()));
+    // Four digits are read at a glance.
+    let whole = if whole.len() > 4 { grouped(whole) } else { whole.into() };
+    minus(&format!("{}{whole}{rest}", if value < 0.0 { "-" } else { "" }))
+}
+
+/// Returns the digits of a number with its thousands separated by spaces: `1 234 567`.
+pub(crate) fn grouped(digits: &str) -> String {
+    let mut grouped = String::new();
+    for (k, digit) in digits.chars().enumerate() {
+        if k > 0 && (digits.len() - k).is_multiple_of(3) {
+            grouped.push(' ');
+        }
+        grouped.push(digit);
+    }
+    grouped
 }
 
 /// Returns `value` as mantissa (at most `digits` decimals) times a power of ten.
@@ -199,6 +215,16 @@ mod tests {
         assert_eq!(labels(&Ticks::linear(-3.0, 7.0, 6)), ["−2", "0", "2", "4", "6"]);
         assert_eq!(labels(&Ticks::linear(0.0, 2.0e6, 2)), ["0", "10⁶", "2×10⁶"]);
         assert_eq!(labels(&Ticks::linear(0.0, 3e-7, 3)), ["0", "10⁻⁷", "2×10⁻⁷", "3×10⁻⁷"]);
+    }
+
+    #[test]
+    fn thousands_are_set_apart_from_five_digits_on() {
+        let last = |most: f64| Ticks::linear(0.0, most, 2).major.pop().map(|(_, label)| label);
+        assert_eq!(last(4000.0).as_deref(), Some("4000"));
+        assert_eq!(last(300_000.0).as_deref(), Some("200 000"));
+        assert_eq!(label(-12_345.5, 1), "−12 345.5");
+        let digits = ["0", "123", "1234", "123456", "1234567"].map(grouped);
+        assert_eq!(digits, ["0", "123", "1 234", "123 456", "1 234 567"]);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use super::trails::agents;
 use super::{Scene, bodies};
 use crate::legend::{Entry, Symbol};
 use crate::style::{body_dashes, hex};
+use crate::ticks::grouped;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{
     Body, Frame, Kind, Occupancy, Scenery, Trail, UNKNOWN, WALL, color_of,
@@ -25,9 +26,10 @@ pub fn describe(scenery: &Scenery, frame: &Frame, trails: &[Trail]) -> String {
     let (scene, all, to) = (Scene::new(scenery, frame, trails), agents.len(), frame.cycle);
     let of: BTreeSet<u32> = scene.trails.iter().map(|trail| trail.of.1).collect();
     let from = scene.trails.first().map_or(0, |trail| trail.span[0]);
-    let (plural, to, from) = (plural(*kind, all), grouped(to), grouped(from));
+    let said = |cycle: Cycle| grouped(&cycle.to_string());
+    let (plural, to, from) = (plural(*kind, all), said(to), said(from));
     match of.len() {
-        0 => format!("{} {plural} before cycle {to}.", grouped(all as Cycle)),
+        0 => format!("{} {plural} before cycle {to}.", grouped(&all.to_string())),
         1 if all == 1 => format!("Track of one {plural}, cycles {from} to {to}."),
         n if n == all => format!("Tracks of all {n} {plural}, cycles {from} to {to}."),
         n => format!(
@@ -39,19 +41,6 @@ pub fn describe(scenery: &Scenery, frame: &Frame, trails: &[Trail]) -> String {
 fn plural(kind: Kind, n: usize) -> String {
     let one = if kind == Kind::Connector { "chain" } else { kind.name() };
     if n == 1 { one.into() } else { format!("{one}s") }
-}
-
-/// Returns a number with its thousands separated by spaces: `1 234 567`.
-fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut grouped = String::new();
-    for (k, digit) in digits.chars().enumerate() {
-        if k > 0 && (digits.len() - k).is_multiple_of(3) {
-            grouped.push(' ');
-        }
-        grouped.push(digit);
-    }
-    grouped
 }
 
 /// Returns the legend: only entries for things in the picture.
@@ -127,16 +116,5 @@ pub(super) fn name(scene: &Scene<'_>, kind: Kind, number: u32) -> String {
     match own {
         Some((_, _, name)) => name.clone(),
         None => format!("{} {number}", plural(kind, 1)),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn thousands_are_set_apart() {
-        let cases = [0, 12, 123, 1234, 123_456, 1_234_567].map(grouped);
-        assert_eq!(cases, ["0", "12", "123", "1 234", "123 456", "1 234 567"]);
     }
 }
