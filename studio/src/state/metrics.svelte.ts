@@ -71,6 +71,11 @@ function padded(column: (number | null)[], length: number): (number | null)[] {
   return [...column.slice(0, length), ...Array<null>(missing).fill(null)];
 }
 
+/** A metric's name with its unit. */
+export function metricWords({ words, unit }: MetricName): string {
+  return unit ? `${words}, ${unit}` : words;
+}
+
 function sameNames(a: MetricName[], b: MetricName[]): boolean {
   return a.length === b.length && a.every((name, i) => name.key === b[i]!.key);
 }
