@@ -260,18 +260,32 @@ struct Killed {
     done: BTreeSet<u32>,
 }
 
+/// Returns airplanes side by side whose ways cross far ahead: they decide together in every cycle, for half an hour.
+fn abreast(n: u32) -> String {
+    let airplane = |k: u32| {
+        let aside_m = 700.0 * (f64::from(k) - f64::from(n - 1) / 2.0);
+        format!(
+            "[[airplanes]]\nat_m = [-60000.0, {aside_m:?}]\nheading_deg = 0.0\nway_points_m = [[60000.0, {:?}]]\n",
+            -aside_m
+        )
+    };
+    let head = "format = 1\nworld = \"airspace\"\nseed = 1\ncycles = 1000000\n[airspace]\ndeployment = \"pim\"\n";
+    std::iter::once(head.to_string()).chain((0..n).map(airplane)).collect()
+}
+
 /// Prints how long the others of a group take until all have their controls after one of them, where the coordinator is or
 /// comes next, is killed while they decide.
 fn recovery(n: u32, kills: usize) {
     let folder = tempfile::tempdir().expect("a folder");
-    let text = text(n, 1_000_000).replace("compact-team", "pim") + "radius_m = 60000.0\n";
-    std::fs::write(folder.path().join("s.toml"), text).expect("written");
+    std::fs::write(folder.path().join("s.toml"), abreast(n)).expect("written");
     let mut job = job(folder.path(), Clock::Realtime { speed: 5.0 });
     (job.common.json_log, job.common.log) = (true, "debug".into());
     let (mut child, news) = watched(job);
+    let mut killer = Killer::new();
     let (mut times, mut killed): (Vec<Duration>, Option<Killed>) = (Vec::new(), None);
-    let mut now = FleetNow::default();
+    let (mut now, mut since) = (FleetNow::default(), Instant::now());
     while times.len() < kills {
+        assert!(since.elapsed() < LONG, "nobody could be killed, or has come back: {now:?}");
         let victim = times.len() as u32 % n;
         match news.recv_timeout(LONG).expect("the fleet flies") {
             News::Fleet(fleet) => now = fleet,
@@ -281,16 +295,16 @@ fn recovery(n: u32, kills: usize) {
                     // All are back from what has happened before.
                     let is_whole = now.nodes.iter().all(|node| node.heard + 1 == n as usize);
                     if let Some(process) = node.process.filter(|_| is_whole) {
-                        kill(process);
+                        killer.kill(process);
                         let done = BTreeSet::new();
                         killed = Some(Killed { at: Instant::now(), cycle, done });
                     }
                 }
-                Some(since) if airplane != victim && talk == "done" && cycle >= since.cycle => {
-                    since.done.insert(airplane);
-                    if since.done.len() + 1 == n as usize {
-                        times.push(at.saturating_duration_since(since.at));
-                        killed = None;
+                Some(lost) if airplane != victim && talk == "done" && cycle >= lost.cycle => {
+                    lost.done.insert(airplane);
+                    if lost.done.len() + 1 == n as usize {
+                        times.push(at.saturating_duration_since(lost.at));
+                        (killed, since) = (None, Instant::now());
                     }
                 }
                 _ => {}
@@ -306,9 +320,26 @@ fn recovery(n: u32, kills: usize) {
     );
 }
 
-fn kill(process: u32) {
-    let killed = Command::new("kill").args(["-KILL", &process.to_string()]).status();
-    assert!(killed.expect("kill is there").success());
+/// A shell that kills processes: to start a program for each would take longer than a talk.
+struct Killer(Child);
+
+impl Killer {
+    fn new() -> Self {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", "while read process; do kill -KILL $process; done"]);
+        Self(shell.stdin(Stdio::piped()).spawn().expect("a shell"))
+    }
+
+    fn kill(&mut self, process: u32) {
+        writeln!(self.0.stdin.as_mut().expect("a pipe"), "{process}").expect("told");
+    }
+}
+
+impl Drop for Killer {
+    fn drop(&mut self) {
+        drop(self.0.stdin.take());
+        let _ = self.0.wait();
+    }
 }
 
 /// Prints what many nodes take in real time: deadlines missed, memory, bytes.
