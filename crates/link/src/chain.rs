@@ -94,6 +94,11 @@ impl<const D: usize> Deployed for Connectors<D> {
         true
     }
 
+    fn heeds_lost(&self) -> bool {
+        // What it has said to its neighbors since it decided may be lost with it.
+        false
+    }
+
     fn sights(&self, run: &dyn Simulation) -> Vec<Sight> {
         let run = self.run(run);
         let mut sights = Vec::new();
@@ -128,10 +133,7 @@ impl<const D: usize> Deployed for Connectors<D> {
     ) -> Vec<Absurd> {
         let run = self.run(run);
         let absurd = self.absurd(run, controls);
-        controls.retain(|(agent, _)| {
-            !gone.contains(agent) && absurd.iter().all(|one| one.agent != *agent)
-        });
-        // Also of one that had decided before: what it has said since may be lost with it.
+        controls.retain(|(agent, _)| absurd.iter().all(|one| one.agent != *agent));
         controls.extend(gone.iter().map(|&id| (id, Handed::<D>::GONE.to_vec())));
         let read = self.world.read_controls(run.cycle(), controls).expect("all were read");
         let mut read: Vec<Option<Handed<D>>> = read.into_iter().map(Some).collect();

@@ -39,8 +39,14 @@ pub trait Deployed: Send + Sync {
         0
     }
 
+    /// Whether the control of an agent counts that had come before its node was lost.
+    fn heeds_lost(&self) -> bool {
+        true
+    }
+
     /// Takes the controls of a round whose groups are given, where rounds that follow depend on them; those that make no
-    /// sense are left out. Of agents that are gone it is noted that they are.
+    /// sense are left out. Of agents that are gone it is noted that they are; none of the controls is theirs, unless these
+    /// are heeded ([`Deployed::heeds_lost`]).
     fn take(
         &self,
         _run: &dyn Simulation,

@@ -44,23 +44,31 @@ impl Server<'_> {
             if self.is_gone(agent) {
                 gone.push(agent);
             }
-            let Some(seat) = self.seats.get_mut(&agent) else { continue };
-            match seat.control.take() {
-                Some(control) => {
-                    seat.flown += 1;
-                    controls.push((agent, control));
-                }
-                None => {
-                    let (who, cycle) = (self.stage.called(agent), self.stage.cycle());
-                    let talk = &*seat.status.doing;
-                    tracing::info!(agent, who, cycle, talk, "a control is late");
-                    seat.late += 1;
-                    self.tally.late_controls += 1;
-                }
+            match self.take_control(agent) {
+                Some(control) => controls.push((agent, control)),
+                None => self.note_late(agent),
             }
         }
         let absurd = self.stage.take(groups, controls, &gone);
         self.note_absurd(absurd);
+    }
+
+    /// Takes the control of an agent, if there is one that counts.
+    fn take_control(&mut self, agent: EntityId) -> Option<Vec<u8>> {
+        let is_heeded = !self.is_gone(agent) || self.stage.world().heeds_lost();
+        let seat = self.seats.get_mut(&agent)?;
+        let control = seat.control.take().filter(|_| is_heeded)?;
+        seat.flown += 1;
+        Some(control)
+    }
+
+    fn note_late(&mut self, agent: EntityId) {
+        let Some(seat) = self.seats.get_mut(&agent) else { return };
+        let (who, cycle) = (self.stage.called(agent), self.stage.cycle());
+        let talk = &*seat.status.doing;
+        tracing::info!(agent, who, cycle, talk, "a control is late");
+        seat.late += 1;
+        self.tally.late_controls += 1;
     }
 
     /// Lets the world go on.
@@ -89,5 +97,120 @@ impl Server<'_> {
                 seat.flown -= 1;
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mail::Mail;
+    use crate::server::{Attendant, Look, Terms};
+    use crate::stage::Stage;
+    use crate::wire::memory::Exchange;
+    use crate::words::{Clock, Life, Member, Topology, Welcome};
+    use crate::worlds::deployed;
+    use sidestep::scenario::Source;
+    use sidestep::worlds::WORLDS;
+    use sidestep_session::{Journey, Keep, Unwatched};
+    use std::time::Duration;
+
+    const CHAIN: &str = "format = 1\nworld = \"chain\"\nseed = 1\ncycles = 9\n[chain]\ndt_s = 0.05\n\
+        self_collision = false\nbacktracks = 0\nescape = \"off\"\ndeployment = \"team\"\n\
+        [[chains]]\nconnectors = 3\nat_m = [0, 0]\nrod_m = [0.3, 0.35]\n\
+        [[chains.tasks]]\nkind = \"wander\"\nwithin_m = [[-3, -3], [4, 3]]\npatience_s = 100\n";
+
+    const AIRPLANES: &str = "format = 1\nworld = \"airspace\"\nseed = 1\ncycles = 9\n[airspace]\n\
+        deployment = \"compact-team\"\nmax_rounds = 20\n[airspace.generator]\nkind = \"superconflict\"\n\
+        n = 3\nradius_m = 1500.0\n";
+
+    struct Nobody;
+
+    impl Attendant for Nobody {
+        fn attend(&mut self, _: &Look<'_>) -> Result<Vec<(EntityId, String)>, Broken> {
+            Ok(Vec::new())
+        }
+    }
+
+    fn stage(text: &str) -> Stage {
+        let source = Source::new("s.toml", text, "");
+        let compiled = WORLDS.compile(&source).expect("a scenario");
+        let world = deployed(compiled.as_ref(), &source).expect("agents of their own");
+        let keep = Keep::default();
+        let journey = Journey::start(compiled.as_ref(), &source, 1, keep, None).expect("started");
+        Stage::new(journey, world, &Unwatched)
+    }
+
+    fn terms() -> Terms {
+        let (clock, topology, overrides) = (Clock::Lockstep, Topology::Star, Vec::new());
+        Terms {
+            scenario: String::new(),
+            build: "test".into(),
+            welcome: Welcome { clock, topology, overrides, logs_packets: false },
+            lease: Duration::from_secs(60),
+            has_faults: false,
+        }
+    }
+
+    /// Returns what agents decide that perceive this, and hear all that others say.
+    fn decided(stage: &Stage, sights: &[Sight]) -> Controls {
+        let program = |sight: &Sight| {
+            let mut program = stage.world().program(sight.agent, "test");
+            program.begin(sight.begin.cycle, &sight.begin.sight).expect("a percept");
+            program
+        };
+        let mut programs: Vec<_> = sights.iter().map(program).collect();
+        let mut tick = 0;
+        while !programs.iter().all(|program| program.is_done()) {
+            tick += 1;
+            assert!(tick < 10_000, "they never come to an end");
+            for from in 0..programs.len() {
+                for packet in programs[from].take_packets() {
+                    for to in packet.to {
+                        programs[to as usize].on_packet(from as EntityId, &packet.payload, tick);
+                    }
+                }
+            }
+        }
+        let control = |(sight, program): (&Sight, &Box<dyn crate::ports::Program>)| {
+            (sight.agent, program.control().expect("it is done"))
+        };
+        sights.iter().zip(&programs).map(control).collect()
+    }
+
+    /// Makes a cycle in which all have decided, and the node of agent 1 is lost then. Returns how many controls of each
+    /// were flown, and how many were not.
+    fn with_a_loss(stage: &mut Stage) -> Vec<(u64, u64)> {
+        let sights = stage.sights();
+        let controls = decided(stage, &sights);
+        let mut nobody = Nobody;
+        let mail = Mail::new(Party::Server, Box::new(Exchange::default().wire(Party::Server)));
+        let mut server = Server::new(mail, stage, &mut nobody, terms());
+        server.has_begun = true;
+        for agent in 0..3 {
+            let member = Member { agent, life: Life(1), listens: Vec::new() };
+            server.seats.get_mut(&agent).expect("a seat").take(member, 0);
+        }
+        let groups = server.hand_out_sights();
+        for (agent, control) in controls {
+            server.on_control(agent, Control { cycle: 0, control });
+        }
+        let _ = server.lose(1, "it was killed".into());
+        server.take_controls(&groups);
+        server.advance().expect("the world goes on");
+        server.seats.values().map(|seat| (seat.flown, seat.late)).collect()
+    }
+
+    #[test]
+    fn a_connector_that_is_lost_after_it_has_decided_is_not_flown_and_its_chain_stands() {
+        let mut stage = stage(CHAIN);
+        assert_eq!(with_a_loss(&mut stage), [(1, 0), (0, 1), (1, 0)]);
+        assert_eq!(stage.run().metrics()["stood"], 1, "{}", stage.run().metrics());
+    }
+
+    #[test]
+    fn what_an_airplane_has_decided_is_flown_although_its_node_is_lost_then() {
+        let mut stage = stage(AIRPLANES);
+        assert_eq!(with_a_loss(&mut stage), [(1, 0), (1, 0), (1, 0)]);
+        assert_eq!(stage.run().metrics()["absent"], 0, "{}", stage.run().metrics());
     }
 }
