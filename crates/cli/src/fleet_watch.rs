@@ -1,15 +1,22 @@
 //! Fleets that the studio watches: `sidestep-link` hears them, in a thread for each, and a screen shows them.
 
 use crate::exit::Failure;
+use crate::interrupt;
 use crate::link;
 use sidestep_server::Screen;
 use sidestep_session::fleet::{Failed, Job, Tls, Told, WatchJob};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
+use std::thread::sleep;
+use std::time::Duration;
 
 /// Seconds that a fleet has to answer; after as long a silence it is taken to be gone.
 const PATIENCE_S: f64 = 10.0;
+
+/// Time after which it looks again whether a fleet flies where one has ended or was lost. A server that is about to end
+/// shows its last view for a second.
+const AGAIN: Duration = Duration::from_secs(2);
 
 /// Whether the command line names a fleet's endpoint here, e.g. `tcp/127.0.0.1:7600`, rather than a file.
 pub(crate) fn is_endpoint(named: &Path) -> bool {
@@ -47,28 +54,41 @@ pub(crate) fn watch(endpoint: &str, tls: Option<Tls>) -> Result<Arc<Screen>, Fai
     begins.recv().unwrap_or(Err(Failure::Interrupted))
 }
 
-/// Puts what is heard on a screen, until the fleet is over or gone.
+/// Puts what is heard on a screen, of one fleet after the other that flies there, until the command is interrupted.
 fn hear(job: &Job, endpoint: &str, began: &Sender<Result<Arc<Screen>, Failure>>) {
-    let mut screen: Option<Arc<Screen>> = None;
-    let done = link::run(job, |told| match (told, &screen) {
+    let mut screen = None;
+    while !interrupt::requested() {
+        match (hear_one(job, endpoint, began, &mut screen), &screen) {
+            (Err(failure), Some(screen)) => {
+                let Failed { cause, remedy, .. } = Failed::from(&failure);
+                screen.lose(&cause, &remedy);
+            }
+            (Err(failure), None) => return drop(began.send(Err(failure))),
+            (Ok(()), _) => {}
+        }
+        sleep(AGAIN);
+    }
+}
+
+/// Puts what is heard on a screen, until the fleet is over or gone.
+fn hear_one(
+    job: &Job,
+    endpoint: &str,
+    began: &Sender<Result<Arc<Screen>, Failure>>,
+    screen: &mut Option<Arc<Screen>>,
+) -> Result<(), Failure> {
+    link::run(job, |told| match (told, &*screen) {
         (Told::Scene(staged), None) => {
             let made = Arc::new(Screen::new(endpoint.to_string(), *staged));
             // Whoever waits is there until it has an answer.
             let _ = began.send(Ok(made.clone()));
-            screen = Some(made);
+            *screen = Some(made);
         }
+        (Told::Scene(staged), Some(screen)) => screen.begin(*staged),
         (Told::Seen(seen), Some(screen)) => screen.show(*seen),
         // Said of other jobs, or by the end of this one.
         _ => {}
-    });
-    match (done, screen) {
-        (Err(failure), Some(screen)) => {
-            let Failed { cause, remedy, .. } = Failed::from(&failure);
-            screen.lose(&cause, &remedy);
-        }
-        (Err(failure), None) => drop(began.send(Err(failure))),
-        (Ok(()), _) => {}
-    }
+    })
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //!
 //! Whoever hears a fleet puts the newest view here and never waits; sessions take it when they can.
 
-use crate::protocol::{Fleet, Node, Problem};
+use crate::protocol::{Fleet, Node, Problem, Who};
 use sidestep_session::fleet::{FleetNow, NodeNow, Seen, Staged};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -12,25 +12,29 @@ use std::time::Instant;
 pub struct Screen {
     /// The endpoint by which it is named.
     pub(crate) endpoint: String,
-    /// The part that stays as it is.
-    pub(crate) staged: Staged,
     shown: Mutex<Shown>,
 }
 
 /// The newest view, and whether it is the last.
 #[derive(Debug, Clone)]
 pub(crate) struct Shown {
+    /// The part that stays as it is while one fleet flies.
+    pub(crate) staged: Arc<Staged>,
     pub(crate) seen: Option<Arc<Seen>>,
     pub(crate) heard: Instant,
-    /// The reason why nothing more will be seen.
+    /// The reason why nothing more is seen.
     pub(crate) lost: Option<Problem>,
 }
 
 impl Screen {
     /// Returns a screen that shows nothing yet.
     pub fn new(endpoint: String, staged: Staged) -> Self {
-        let shown = Shown { seen: None, heard: Instant::now(), lost: None };
-        Self { endpoint, staged, shown: Mutex::new(shown) }
+        Self { endpoint, shown: Mutex::new(Shown::of(staged)) }
+    }
+
+    /// Begins to show another fleet that flies there, or the same one once more: nothing of it yet.
+    pub fn begin(&self, staged: Staged) {
+        *self.lock() = Shown::of(staged);
     }
 
     fn lock(&self) -> MutexGuard<'_, Shown> {
@@ -43,14 +47,23 @@ impl Screen {
         (shown.seen, shown.heard) = (Some(Arc::new(seen)), Instant::now());
     }
 
-    /// Tells why nothing more will be seen.
+    /// Tells why nothing more is seen of a fleet that has not come to its end.
     pub fn lose(&self, cause: &str, remedy: &str) {
-        self.lock().lost = Some(Problem::new(self.endpoint.as_str(), cause, remedy));
+        let mut shown = self.lock();
+        if shown.seen.as_ref().is_none_or(|seen| !seen.is_over) {
+            shown.lost = Some(Problem::new(self.endpoint.as_str(), cause, remedy));
+        }
     }
 
     /// Returns what is shown now.
     pub(crate) fn now(&self) -> Shown {
         self.lock().clone()
+    }
+}
+
+impl Shown {
+    fn of(staged: Staged) -> Self {
+        Self { staged: Arc::new(staged), seen: None, heard: Instant::now(), lost: None }
     }
 }
 
@@ -62,13 +75,14 @@ pub(crate) fn told(now: &FleetNow, silent_s: f64) -> Fleet {
         late_cycles: now.late_cycles,
         talk_p50_ms: now.talk_p50_ms,
         talk_p99_ms: now.talk_p99_ms,
-        nodes: now.nodes.iter().map(node).collect(),
+        nodes: now.nodes.iter().map(|one| node(&now.noun, one)).collect(),
     }
 }
 
-fn node(now: &NodeNow) -> Node {
+fn node(noun: &str, now: &NodeNow) -> Node {
     Node {
         agent: now.agent,
+        who: Who { kind: noun.into(), number: now.number, part: now.part },
         state: now.state.clone(),
         epoch: now.epoch,
         heard: now.heard_of.clone(),

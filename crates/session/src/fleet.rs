@@ -50,6 +50,14 @@ impl AgentName {
         }
     }
 
+    /// Returns the number of what is seen of it, and which part of that it is where it is one.
+    pub fn body(self) -> (EntityId, Option<u32>) {
+        match self {
+            Self::Airplane(id) => (id, None),
+            Self::Connector { chain, connector } => (chain, Some(connector)),
+        }
+    }
+
     /// Returns the option that names it.
     pub fn option(self) -> String {
         format!("--{} {self}", self.noun())
@@ -277,6 +285,10 @@ pub struct NodeNow {
     pub agent: EntityId,
     /// and by its name, e.g. `3`, or `0.3` of connector 3 of chain 0.
     pub name: String,
+    /// The number of what is seen of it: of the airplane, or of the chain,
+    pub number: EntityId,
+    /// and which part of that it is, where it is one: which connector.
+    pub part: Option<u32>,
     /// A word for its state: `awaited`, `joined`, `gone`, `silent` of one that was not heard for a second, or its part in
     /// the cycle.
     pub state: String,

@@ -1,15 +1,22 @@
 /** Who hears whom in a fleet. */
 
-import type { Fleet, Node } from "../protocol";
+import { whoKey } from "../format";
+import type { Fleet, Node, Who } from "../protocol";
 
-/** Two agents by their numbers, of which the second hears the first; where both hear each other there is one link. */
+/** Two agents by their numbers on the network, of which the second hears the first; where both hear each other there is one link. */
 export interface Link {
   from: number;
   to: number;
   isMutual: boolean;
 }
 
-/** The links of a fleet, or of one agent of it. */
+/** The node of the agent that a body is, if it is one's. */
+export function nodeOf(fleet: Fleet, who: Who): Node | undefined {
+  const key = whoKey(who);
+  return fleet.nodes.find((node) => whoKey(node.who) === key);
+}
+
+/** The links of a fleet, or of one agent of it; of all where `selected` is none. */
 export function linksOf(fleet: Fleet, selected: number | null): Link[] {
   const hears = new Map(fleet.nodes.map((node) => [node.agent, new Set(node.heard)]));
   const links: Link[] = [];

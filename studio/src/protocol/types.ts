@@ -631,9 +631,13 @@ nodes: Array<Node>, };
  */
 export type Node = {
 /**
- * The agent's number.
+ * The agent's number on the network.
  */
 agent: number,
+/**
+ * The body by which the agent is seen.
+ */
+who: Who,
 /**
  * A word for its state: `awaited`, `joined`, `gone`, or its part in the cycle.
  */
@@ -643,7 +647,7 @@ state: string,
  */
 epoch: number,
 /**
- * Numbers of the agents that it has heard in the last cycle.
+ * Numbers on the network of the agents that it has heard in the last cycle.
  */
 heard: Array<number>,
 /**

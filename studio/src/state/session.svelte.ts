@@ -2,7 +2,7 @@
 
 import { Credit } from "../credit";
 import { decodeFrame, FrameError, type Frame } from "../decode";
-import { linksOf, type Link } from "../fleet/links";
+import { linksOf, nodeOf, type Link } from "../fleet/links";
 import { LOST, Refused, problemOf } from "../connection";
 import { firstSpeed, SPEEDS, whoKey } from "../format";
 import type { Answer, Call, Cast, Event, Inspection, Problem, Scene, Speed, Status, Subject, Who } from "../protocol";
@@ -181,8 +181,11 @@ export class Session {
     const { bodies, selected } = this;
     const { fleet } = this.status;
     if (!fleet || !bodies) return [];
-    const index = (number: number): number | undefined => bodies.find({ kind: this.scene.agent, number, part: null });
-    return linksOf(fleet, selected?.number ?? null).flatMap(({ from, to, isMutual }) => {
+    const bodyOf = new Map(fleet.nodes.map((node) => [node.agent, bodies.find(node.who)]));
+    const index = (agent: number): number | undefined => bodyOf.get(agent);
+    // A body that is no agent's, such as an obstacle, hears nobody: all links stay.
+    const chosen = selected ? nodeOf(fleet, selected) : undefined;
+    return linksOf(fleet, chosen?.agent ?? null).flatMap(({ from, to, isMutual }) => {
       const [a, b] = [index(from), index(to)];
       return a === undefined || b === undefined ? [] : [{ from: a, to: b, isMutual }];
     });

@@ -11,6 +11,9 @@ import { Session } from "./session.svelte";
 /** Sessions side by side at most. */
 export const MOST_SESSIONS = 4;
 
+/** Milliseconds after which the page looks again whether a fleet flies where one was lost. */
+export const FIND_AGAIN_MS = 2000;
+
 export interface Banner {
   words: string;
   isBad: boolean;
@@ -127,7 +130,8 @@ export class Studio {
     return true;
   }
 
-  async #openAt(session: Session, seed: number | null): Promise<boolean> {
+  /** Opens what a session is of; a refusal is told unless that is `quiet`. Returns whether it is open. */
+  async #openAt(session: Session, seed: number | null, quiet = false): Promise<boolean> {
     try {
       const answer = await this.ask({ do: "open", what: session.subject, seed });
       if (answer.is !== "opened") return false;
@@ -136,7 +140,7 @@ export class Studio {
     } catch (error) {
       if (!(error instanceof Refused)) throw error;
       // The banner tells what is the same for all.
-      if (error.problem !== LOST) this.problem(error.problem);
+      if (error.problem !== LOST && !quiet) this.problem(error.problem);
       return false;
     }
   }
@@ -207,7 +211,27 @@ export class Studio {
     if (!session) return this.#keep(notice.session, notice);
     if (notice.notice === "cast") session.takeCast(notice);
     else if (notice.notice === "status") session.takeStatus(notice);
-    else session.takeEnd(notice.problem);
+    else this.#ended(session, notice.problem);
+  }
+
+  /** Nothing more comes of a session; where a fleet flew, another one may fly. */
+  #ended(session: Session, problem: Problem): void {
+    session.takeEnd(problem);
+    if (session.isFleet) this.#findAgain(session);
+  }
+
+  /** Looks now and then whether a fleet flies where one has ended or was lost, until the session is closed. */
+  #findAgain(session: Session): void {
+    const generation = this.#generation;
+    this.#around.after(FIND_AGAIN_MS, () => void this.#look(session, generation));
+  }
+
+  async #look(session: Session, generation: number): Promise<void> {
+    // A new connection opens all sessions again by itself.
+    const isWanted = (): boolean => generation === this.#generation && this.sessions.includes(session) && session.ended !== null;
+    if (!isWanted()) return;
+    if (await this.#openAt(session, null, true)) this.#deliver(session);
+    else if (isWanted()) this.#findAgain(session);
   }
 
   #frame(bytes: ArrayBuffer): void {
@@ -284,7 +308,7 @@ export class Studio {
       const isOpen = await this.#openAt(session, session.seed);
       if (generation !== this.#generation) return;
       if (!isOpen) {
-        session.takeEnd(problemOf(session.scene.name, "it could not be opened again", "open it anew, or close it"));
+        this.#ended(session, problemOf(session.scene.name, "it could not be opened again", "open it anew, or close it"));
         missing++;
         continue;
       }

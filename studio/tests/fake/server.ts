@@ -31,7 +31,7 @@ function fleetAt(cycle: number): Fleet {
   const node = (agent: number): Fleet["nodes"][number] => {
     const isLost = agent === 2;
     return {
-      agent, state: isLost ? "gone" : "decide", epoch: 1, round: 3, flown: cycle, late: agent === 7 ? 4 : 0, lives: 1,
+      agent, who: { kind: "airplane", number: agent, part: null }, state: isLost ? "gone" : "decide", epoch: 1, round: 3, flown: cycle, late: agent === 7 ? 4 : 0, lives: 1,
       heard: isLost ? [] : [0, 1, 3, 4, 5, 6].filter((other) => other !== agent),
       packets_per_s: 12, bytes_per_s: 3456, silent_s: isLost ? 12 : agent === 7 ? 3 : 0.2,
     };

@@ -1,12 +1,12 @@
 /** Who hears whom in a fleet, and how its nodes are. */
 
 import { describe, expect, test } from "vitest";
-import { fleetWords, healthOf, linksOf } from "../../src/fleet/links";
+import { fleetWords, healthOf, linksOf, nodeOf } from "../../src/fleet/links";
 import type { Fleet, Node } from "../../src/protocol";
 
 function node(agent: number, heard: number[], more: Partial<Node> = {}): Node {
   return {
-    agent, heard, state: "done", epoch: 1, round: 2, flown: 3, late: 0, lives: 1, packets_per_s: 4, bytes_per_s: 5, silent_s: 0.1,
+    agent, who: { kind: "airplane", number: agent, part: null }, heard, state: "done", epoch: 1, round: 2, flown: 3, late: 0, lives: 1, packets_per_s: 4, bytes_per_s: 5, silent_s: 0.1,
     ...more,
   };
 }
@@ -25,6 +25,14 @@ describe("links", () => {
 });
 
 describe("nodes", () => {
+  test("are found by the bodies of their agents, also where these are parts", () => {
+    const connector = (agent: number, number: number, part: number): Node => node(agent, [], { who: { kind: "connector", number, part } });
+    const all = fleet([connector(0, 0, 0), connector(1, 0, 1), connector(2, 1, 0)]);
+    expect(nodeOf(all, { kind: "connector", number: 1, part: 0 })?.agent).toBe(2);
+    expect(nodeOf(all, { kind: "connector", number: 0, part: 1 })?.agent).toBe(1);
+    expect(nodeOf(all, { kind: "obstacle", number: 0, part: null })).toBeUndefined();
+  });
+
   test("are well, late or away", () => {
     expect([node(0, []), node(0, [], { silent_s: 3 }), node(0, [], { state: "gone" }), node(0, [], { silent_s: null, state: "awaited" })].map(healthOf))
       .toEqual(["well", "late", "away", "away"]);

@@ -119,6 +119,32 @@ test("a run that played goes to its cycle and plays on", async () => {
   expect(studio.banner).toEqual({ words: "Connected again; reopened Hall at cycle 345.", isBad: false });
 });
 
+test("a fleet that was lost is looked for until one flies there again, or its session is closed", async () => {
+  void studio.open({ kind: "fleet", path: "tcp/127.0.0.1:7600" });
+  await settled();
+  await line().answer("open", { ...OPENED, session: 2 });
+  const fleet = studio.sessions[1]!;
+  const problem = { place: "tcp/127.0.0.1:7600", line: null, column: null, end_line: null, end_column: null, key: null, cause: "it was not heard", remedy: "wait", is_warning: false };
+  line().say({ notice: "ended", session: 2, problem });
+  expect(fleet.ended?.cause).toBe("it was not heard");
+  const looked = retries.length;
+  retries.at(-1)!();
+  await settled();
+  const { id } = line().asked.splice(line().asked.findIndex(({ call }) => call.do === "open"), 1)[0]!;
+  line().say({ id, problem });
+  await settled();
+  expect([studio.problems, retries.length]).toEqual([[], looked + 1]);
+  retries.at(-1)!();
+  await settled();
+  await line().answer("open", { ...OPENED, session: 3 });
+  expect([fleet.ended, fleet.id, retries.length]).toEqual([null, 3, looked + 1]);
+  line().say({ notice: "ended", session: 3, problem });
+  studio.close(fleet);
+  retries.at(-1)!();
+  await settled();
+  expect(line().calls("open")).toEqual([]);
+});
+
 test("a run that stood still stays so", async () => {
   show(20);
   await lose();

@@ -252,9 +252,13 @@ impl<'a> Captain<'a> {
             Some(_) if seat.control.is_some() => "done",
             Some(_) => &status.doing,
         };
+        let name = fleet.stage.world().name(agent);
+        let (number, part) = name.body();
         NodeNow {
             agent,
-            name: fleet.stage.world().name(agent).to_string(),
+            name: name.to_string(),
+            number,
+            part,
             state: state.into(),
             process: seat.member.as_ref().map(|_| seat.process),
             epoch: status.epoch,

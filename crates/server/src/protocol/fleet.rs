@@ -1,5 +1,6 @@
 //! Fleets: agents that are flown by processes elsewhere, as a page sees them.
 
+use super::Who;
 use serde::Serialize;
 
 /// A fleet at one moment.
@@ -24,13 +25,15 @@ pub struct Fleet {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Node {
-    /// The agent's number.
+    /// The agent's number on the network.
     pub agent: u32,
+    /// The body by which the agent is seen.
+    pub who: Who,
     /// A word for its state: `awaited`, `joined`, `gone`, or its part in the cycle.
     pub state: String,
     /// Epoch of the coordinator that it follows.
     pub epoch: u64,
-    /// Numbers of the agents that it has heard in the last cycle.
+    /// Numbers on the network of the agents that it has heard in the last cycle.
     pub heard: Vec<u32>,
     /// The round of its talk.
     pub round: u32,

@@ -36,13 +36,14 @@ impl Means {
     /// Returns the screen of a fleet.
     ///
     /// # Errors
-    /// When none of this name is watched.
+    /// When none of this name is watched, or nothing is heard of it now.
     pub(super) fn screen(&self, endpoint: &str) -> Result<Arc<Screen>, Problem> {
         let found = self.screens.iter().find(|screen| screen.endpoint == endpoint);
-        found.cloned().ok_or_else(|| {
+        let screen = found.cloned().ok_or_else(|| {
             let remedy = format!("start the studio with it: sidestep studio {endpoint}");
             Problem::new(endpoint, "no fleet of this address is watched", remedy)
-        })
+        })?;
+        screen.now().lost.map_or(Ok(screen), Err)
     }
 }
 

@@ -11,6 +11,7 @@ use crate::protocol::{
 use crate::screen::{Screen, Shown, told};
 use sidestep::kernel::Cycle;
 use sidestep::kernel::view::Frame;
+use sidestep_session::fleet::{Seen, Staged};
 use std::sync::Arc;
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
@@ -29,6 +30,8 @@ pub(super) struct Watching {
     session: SessionId,
     outbox: Arc<Outbox>,
     screen: Arc<Screen>,
+    /// The part that stays as it is of the fleet that is watched; another one may fly there later.
+    staged: Arc<Staged>,
     viewer: Viewer,
     log: Chronicle,
     /// The newest frame, its number, and the events that are known.
@@ -39,9 +42,10 @@ pub(super) struct Watching {
 
 impl Watching {
     pub(super) fn new(session: SessionId, outbox: Arc<Outbox>, screen: Arc<Screen>) -> Self {
-        let viewer = Viewer::new(session, outbox.clone(), &screen.staged.scenery);
+        let staged = screen.now().staged;
+        let viewer = Viewer::new(session, outbox.clone(), &staged.scenery);
         let (log, frame) = (Chronicle::default(), Frame::default());
-        Self { session, outbox, screen, viewer, log, frame, number: 0, known_until: 0 }
+        Self { session, outbox, screen, staged, viewer, log, frame, number: 0, known_until: 0 }
     }
 
     /// Answers requests and shows what is heard, until nobody wants to see it or nothing more will be seen.
@@ -65,6 +69,9 @@ impl Watching {
                 Err(RecvTimeoutError::Disconnected) => return,
             }
             let shown = self.look();
+            if !Arc::ptr_eq(&shown.staged, &self.staged) {
+                return self.fail(self.succeeded());
+            }
             let now = Instant::now();
             if self.number > 0 {
                 self.viewer.pass_on(&self.frame, &mut self.log, now);
@@ -79,7 +86,9 @@ impl Watching {
     /// Takes what is on the screen, if it is new.
     fn look(&mut self) -> Shown {
         let shown = self.screen.now();
-        let Some(seen) = shown.seen.as_ref().filter(|seen| seen.number != self.number) else {
+        let is_same = Arc::ptr_eq(&shown.staged, &self.staged);
+        let is_new = |seen: &&Arc<Seen>| is_same && seen.number != self.number;
+        let Some(seen) = shown.seen.as_ref().filter(is_new) else {
             return shown;
         };
         self.number = seen.number;
@@ -101,7 +110,7 @@ impl Watching {
     }
 
     fn opened(&self) -> Answer {
-        let staged = &self.screen.staged;
+        let staged = &self.staged;
         let mut scene = scene((&staged.world, &staged.agent), &staged.scenery, false);
         // Tabs are told apart by names, which scenarios need not have.
         if scene.name.is_empty() {
@@ -133,7 +142,7 @@ impl Watching {
         let silent_s = shown.heard.elapsed().as_secs_f64();
         let silent_s = if silent_s < SILENCE_S { 0.0 } else { silent_s.floor() };
         let is_over = seen.is_some_and(|seen| seen.is_over);
-        let staged = &self.screen.staged;
+        let staged = &self.staged;
         Status {
             session: self.session,
             state: if is_over { State::Over } else { State::Watched },
@@ -148,6 +157,11 @@ impl Watching {
             fleet: seen
                 .map(|seen| Box::new(told(&seen.fleet, if is_over { 0.0 } else { silent_s }))),
         }
+    }
+
+    fn succeeded(&self) -> Problem {
+        let place = self.screen.endpoint.as_str();
+        Problem::new(place, "the fleet has ended, and another one flies here", "open it again")
     }
 
     /// Tells that nothing more will be seen.

@@ -18,19 +18,16 @@ struct Elsewhere {
 
 impl Elsewhere {
     fn begin() -> Self {
-        let source = Source::new("s.toml", AIRPLANES, "");
-        let compiled = WORLDS.compile(&source).expect("it is right");
-        let mut run = compiled.start(&source, 1);
-        run.watch();
-        let staged = Staged {
-            build: "b".into(),
-            world: run.world().into(),
-            agent: run.agent().into(),
-            seed: 7,
-            scenery: run.scenery(),
-        };
-        let screen = Arc::new(Screen::new(AT.into(), staged));
+        let run = flight();
+        let screen = Arc::new(Screen::new(AT.into(), staged(run.as_ref())));
         Self { run, screen, number: 0, events: Vec::new() }
+    }
+
+    /// Flies from the start once more, at the same address.
+    fn restart(&mut self) {
+        self.run = flight();
+        (self.number, self.events) = (0, Vec::new());
+        self.screen.begin(staged(self.run.as_ref()));
     }
 
     /// Flies on and shows it, with all events so far.
@@ -40,8 +37,10 @@ impl Elsewhere {
         let mut frame = self.run.frame(Look::BODIES);
         self.events.append(&mut frame.log);
         frame.log.clone_from(&self.events);
-        let nodes = (0..6).map(|agent| NodeNow { agent, ..NodeNow::default() }).collect();
-        let fleet = FleetNow { cycle: frame.cycle, cycles: 40, nodes, ..FleetNow::default() };
+        // As connectors are: the number on the network is not that of the body.
+        let node = |agent| NodeNow { agent, number: 4, part: Some(agent), ..NodeNow::default() };
+        let (nodes, noun) = ((0..6).map(node).collect(), "connector".into());
+        let fleet = FleetNow { cycle: frame.cycle, cycles: 40, noun, nodes, ..FleetNow::default() };
         self.screen.show(Seen { number: self.number, frame, fleet, is_over });
     }
 
@@ -56,6 +55,30 @@ impl Elsewhere {
         );
         page
     }
+}
+
+fn flight() -> Box<dyn Simulation> {
+    let source = Source::new("s.toml", AIRPLANES, "");
+    let compiled = WORLDS.compile(&source).expect("it is right");
+    let mut run = compiled.start(&source, 1);
+    run.watch();
+    run
+}
+
+fn staged(run: &dyn Simulation) -> Staged {
+    Staged {
+        build: "b".into(),
+        world: run.world().into(),
+        agent: run.agent().into(),
+        seed: 7,
+        scenery: run.scenery(),
+    }
+}
+
+fn ended(page: &mut Page) -> Value {
+    page.until("the end", |page| {
+        page.notices.iter().find(|notice| notice["notice"] == "ended").cloned()
+    })
 }
 
 fn status(page: &mut Page, is_it: impl Fn(&Value) -> bool) -> Value {
@@ -78,6 +101,8 @@ fn views_are_shown_as_they_are_heard_and_no_event_twice() {
         let now = status(&mut page, |status| status["cycle"] == cycle);
         assert_eq!((&now["state"], &now["cycles_planned"]), (&"watched".into(), &40.0.into()));
         assert_eq!(now["fleet"]["nodes"].as_array().map(Vec::len), Some(6));
+        let who = json!({ "kind": "connector", "number": 4, "part": 5 });
+        assert_eq!(now["fleet"]["nodes"][5]["who"], who);
     }
     assert!(elsewhere.events.len() > 3, "there is something to tell");
     let told =
@@ -102,11 +127,38 @@ fn what_would_steer_a_fleet_is_refused_and_its_loss_ends_the_session() {
         assert_eq!(cause, "a fleet is only watched here", "{call}");
     }
     elsewhere.screen.lose("it was not heard", "watch it again");
-    let ended = page.until("the end", |page| {
-        page.notices.iter().find(|notice| notice["notice"] == "ended").cloned()
-    });
-    assert_eq!(ended["problem"]["cause"], "it was not heard");
+    assert_eq!(ended(&mut page)["problem"]["cause"], "it was not heard");
     status(&mut page, |status| status["state"] == "failed");
+}
+
+#[test]
+fn a_fleet_that_is_lost_cannot_be_opened_and_the_one_that_flies_there_next_can() {
+    let mut elsewhere = Elsewhere::begin();
+    elsewhere.show(1, false);
+    elsewhere.screen.lose("it was not heard", "watch it again");
+    let folder = tempfile::tempdir().expect("a folder");
+    let means = Means { screens: vec![elsewhere.screen.clone()], ..means(folder.path(), 1) };
+    let (mut page, refused) = Page::of(means, Subject::Fleet { path: AT.into() }, folder);
+    assert_eq!(refused["problem"]["cause"], "it was not heard");
+    drop(page);
+    elsewhere.restart();
+    page = elsewhere.page();
+    elsewhere.show(3, false);
+    status(&mut page, |status| status["cycle"] == 3.0);
+}
+
+#[test]
+fn a_fleet_that_is_over_stays_to_be_seen_until_another_one_flies_there() {
+    let mut elsewhere = Elsewhere::begin();
+    elsewhere.show(2, true);
+    let mut page = elsewhere.page();
+    status(&mut page, |status| status["state"] == "over");
+    elsewhere.screen.lose("nobody answers", "watch it again");
+    // A second one finds it, too.
+    drop(elsewhere.page());
+    elsewhere.restart();
+    let cause = &ended(&mut page)["problem"]["cause"];
+    assert_eq!(*cause, "the fleet has ended, and another one flies here");
 }
 
 #[test]
