@@ -5,7 +5,7 @@
 //! slaves included, is farther from its place at the start of the tick than its speed allows, and a
 //! part that only this limit keeps from escaping is reported.
 
-use super::threat::{Nearness, Threat, collect, nearness};
+use super::threat::{Nearness, Threat, collect, gap_m, nearness};
 use super::{Escape, Escaped, Left, Margin, Part, Tick};
 use crate::rods::chain::Chain;
 use crate::rods::geometry::{Point, along, distance, dot, perpendicular, scaled, sub, unit};
@@ -16,6 +16,7 @@ use crate::rods::scene::TOLERANCE_M;
 use crate::rods::veto::{Mode, Motion, Outcome, Reason, Request, Source, Veto};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin};
+use std::ops::Range;
 
 /// Leads parts out of the way one after the other.
 #[derive(Debug, Clone)]
@@ -83,14 +84,14 @@ impl<const D: usize> Literal<D> {
         tries: &mut usize,
         told: &mut Escaped<D>,
     ) -> Result<(), InputError> {
-        self.threats.iter_mut().for_each(|t| t.given_up = false);
         self.vetoes.clear();
+        self.measure_all(tick, margin);
         while *tries > 0 {
-            self.measure(tick, margin);
             let Some(deepest) = self.deepest() else { break };
             *tries -= 1;
-            match self.relieve(tick, margin, deepest)? {
-                Ok(()) => {
+            match self.relieve(tick, deepest)? {
+                Ok(touched) => {
+                    self.measure(tick, &touched);
                     told.moves += 1;
                     let Threat { part, mover, .. } = self.threats[deepest];
                     let obstacle = tick.obstacles.moving()[mover].id;
@@ -107,9 +108,19 @@ impl<const D: usize> Literal<D> {
         Ok(())
     }
 
-    fn measure(&mut self, tick: &Tick<'_, D>, margin: Margin) {
+    /// Measures all threats in a margin; none is given up any more.
+    fn measure_all(&mut self, tick: &Tick<'_, D>, margin: Margin) {
         for threat in &mut self.threats {
-            threat.depth_m = depth_of(tick, threat, margin);
+            threat.given_up = false;
+            threat.margin_m = margin.around(&tick.obstacles.moving()[threat.mover]);
+            threat.depth_m = depth_of(tick, threat);
+        }
+    }
+
+    /// Measures the threats of some connectors and their rods again; all others are as deep as before.
+    fn measure(&mut self, tick: &Tick<'_, D>, touched: &Range<usize>) {
+        for threat in self.threats.iter_mut().filter(|t| t.part.is_among(touched)) {
+            threat.depth_m = depth_of(tick, threat);
         }
     }
 
@@ -124,14 +135,13 @@ impl<const D: usize> Literal<D> {
             .max_by(order)
     }
 
-    /// Tries to reduce one violation; returns the objection if nothing works. A base that objects
-    /// is led back to its place by a return pass, so the elbows of an arm get out of the way too.
+    /// Tries to reduce one violation; returns the connectors that may have moved, or the objection if nothing works: then
+    /// every bit is as before. A base that objects is led back to its place by a return pass, so the elbows of an arm get out of the way too.
     fn relieve(
         &mut self,
         tick: &mut Tick<'_, D>,
-        margin: Margin,
         which: usize,
-    ) -> Result<Result<(), Veto<D>>, InputError> {
+    ) -> Result<Result<Range<usize>, Veto<D>>, InputError> {
         let threat = self.threats[which];
         let mover = tick.obstacles.moving()[threat.mover];
         let near = nearness(tick.chain, threat.part, &mover);
@@ -140,8 +150,8 @@ impl<const D: usize> Literal<D> {
             let push_m = ((threat.depth_m + BEYOND_M) / lever).min(self.room_m(tick, k));
             for way in ways(near.away, mover.velocity_m_s) {
                 let to = along(tick.chain.points()[k], way, push_m);
-                match self.attempt(tick, margin, which, k, to)? {
-                    Ok(()) => return Ok(Ok(())),
+                match self.attempt(tick, which, k, to)? {
+                    Ok(touched) => return Ok(Ok(touched)),
                     // If the speed limit was the only obstacle, that says more than any other
                     // reason.
                     Err(veto) if why.reason != Reason::StepLimit => why = veto,
@@ -158,15 +168,14 @@ impl<const D: usize> Literal<D> {
         self.rules.most_m().max(distance(tick.start[k], self.before[k]))
     }
 
-    /// Moves one connector, if that helps; otherwise every bit is as before.
+    /// Moves one connector, if that helps; otherwise every bit is as before. Returns the connectors that may have moved.
     fn attempt(
         &mut self,
         tick: &mut Tick<'_, D>,
-        margin: Margin,
         which: usize,
         k: usize,
         to: Point<D>,
-    ) -> Result<Result<(), Veto<D>>, InputError> {
+    ) -> Result<Result<Range<usize>, Veto<D>>, InputError> {
         let at = tick.chain.points()[k];
         let to = clipped(tick.start[k], to, self.room_m(tick, k));
         if distance(to, at) <= TOLERANCE_M {
@@ -193,17 +202,18 @@ impl<const D: usize> Literal<D> {
         let refused = self
             .too_far(tick, touched.clone())
             .map(|by| Veto { by, ..objection(tick.chain, k, Reason::StepLimit, None) })
-            .or_else(|| self.no_help(tick, margin, which, k, distance(to, at)));
+            .or_else(|| self.no_help(tick, &touched, which, k, distance(to, at)));
+        let run = touched.clone();
         let (from, to) = match refused {
-            Some(_) => (&self.before[touched.clone()], &mut tick.chain.points_mut()[touched]),
-            None => (&tick.chain.points()[touched.clone()], &mut self.before[touched]),
+            Some(_) => (&self.before[run.clone()], &mut tick.chain.points_mut()[run]),
+            None => (&tick.chain.points()[run.clone()], &mut self.before[run]),
         };
         to.copy_from_slice(from);
-        Ok(refused.map_or(Ok(()), Err))
+        Ok(refused.map_or(Ok(touched), Err))
     }
 
     /// Returns the first connector that went farther than its speed allows.
-    fn too_far(&self, tick: &Tick<'_, D>, touched: std::ops::Range<usize>) -> Option<usize> {
+    fn too_far(&self, tick: &Tick<'_, D>, touched: Range<usize>) -> Option<usize> {
         touched.into_iter().find(|&i| {
             distance(tick.start[i], tick.chain.points()[i]) > self.room_m(tick, i) + 1e-12
         })
@@ -214,16 +224,19 @@ impl<const D: usize> Literal<D> {
     fn no_help(
         &self,
         tick: &Tick<'_, D>,
-        margin: Margin,
+        touched: &Range<usize>,
         which: usize,
         k: usize,
         way_m: f64,
     ) -> Option<Veto<D>> {
         let depth_m = self.threats[which].depth_m;
         let bound_m = depth_m - LEAST_GAIN * way_m.min(depth_m);
-        let worse = self.threats.iter().enumerate().find(|(i, threat)| {
+        // What nobody touched is as deep as before.
+        let all = self.threats.iter().enumerate();
+        let mut changed = all.filter(|(i, threat)| *i == which || threat.part.is_among(touched));
+        let worse = changed.find(|(i, threat)| {
             let allowed_m = if *i == which { bound_m } else { threat.depth_m.max(bound_m) };
-            depth_of(tick, threat, margin) > allowed_m
+            depth_of(tick, threat) > allowed_m
         });
         worse.map(|(_, threat)| {
             let id = tick.obstacles.moving()[threat.mover].id;
@@ -232,8 +245,7 @@ impl<const D: usize> Literal<D> {
     }
 
     fn tell_what_is_left(&mut self, tick: &Tick<'_, D>, told: &mut Escaped<D>) {
-        self.threats.iter_mut().for_each(|t| t.given_up = false);
-        self.measure(tick, Margin::NONE);
+        self.measure_all(tick, Margin::NONE);
         let Some(deepest) = self.deepest() else { return };
         let threat = self.threats[deepest];
         told.deepest_m = threat.depth_m;
@@ -247,9 +259,8 @@ impl<const D: usize> Literal<D> {
     }
 }
 
-fn depth_of<const D: usize>(tick: &Tick<'_, D>, threat: &Threat, margin: Margin) -> f64 {
-    let mover = &tick.obstacles.moving()[threat.mover];
-    margin.around(mover) - nearness(tick.chain, threat.part, mover).gap_m
+fn depth_of<const D: usize>(tick: &Tick<'_, D>, threat: &Threat) -> f64 {
+    threat.margin_m - gap_m(tick.chain, threat.part, &tick.obstacles.moving()[threat.mover])
 }
 
 /// Returns the connectors that may move for a part, and how much of their way the point of contact

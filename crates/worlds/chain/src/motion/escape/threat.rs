@@ -4,6 +4,7 @@ use crate::rods::chain::Chain;
 use crate::rods::geometry::{Bounds, Point, distance, first_axis, perpendicular, sub, unit};
 use crate::rods::obstacle::{Obstacle, Obstacles};
 use crate::rods::own_body::OwnBody;
+use std::ops::Range;
 
 /// A part of a chain; the order breaks ties between equally deep violations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -20,6 +21,14 @@ impl Part {
         let (Self::Connector(k) | Self::Rod(k)) = self;
         k
     }
+
+    /// Whether it is one of some connectors, or a rod that ends at one of them.
+    pub(super) fn is_among(self, connectors: &Range<usize>) -> bool {
+        match self {
+            Self::Connector(k) => connectors.contains(&k),
+            Self::Rod(i) => connectors.contains(&i) || connectors.contains(&(i + 1)),
+        }
+    }
 }
 
 /// A part and a moving obstacle that may get too near to each other in this tick.
@@ -28,7 +37,8 @@ pub(super) struct Threat {
     pub(super) part: Part,
     /// Index among [`Obstacles::moving`].
     pub(super) mover: usize,
-    /// The depth of the part in the margin when last measured, meters.
+    /// The free space required around the obstacle, meters, and the depth of the part in it, as last measured.
+    pub(super) margin_m: f64,
     pub(super) depth_m: f64,
     /// Whether it could not be relieved.
     pub(super) given_up: bool,
@@ -52,10 +62,7 @@ pub(super) fn nearness<const D: usize>(
     part: Part,
     mover: &Obstacle<D>,
 ) -> Nearness<D> {
-    let (body, radius_m) = match part {
-        Part::Connector(i) => ([chain.points()[i]; 2], chain.connectors()[i].radius_m),
-        Part::Rod(i) => ([chain.points()[i], chain.points()[i + 1]], chain.rods()[i].radius_m),
-    };
+    let (body, radius_m) = body(chain, part);
     let nearest = mover.core.nearest_to_segment(body);
     let length_m = distance(body[0], body[1]);
     let along_rod =
@@ -64,6 +71,21 @@ pub(super) fn nearness<const D: usize>(
         gap_m: nearest.distance_m - mover.radius_m - radius_m,
         away: unit(sub(nearest.on_body, nearest.on_core)).unwrap_or_else(|| left_of(mover)),
         along_rod,
+    }
+}
+
+/// Returns the distance of the surfaces of a part and an obstacle, meters; negative if they overlap.
+pub(super) fn gap_m<const D: usize>(chain: &Chain<D>, part: Part, mover: &Obstacle<D>) -> f64 {
+    let (body, radius_m) = body(chain, part);
+    mover.core.nearest_to_segment(body).distance_m - mover.radius_m - radius_m
+}
+
+/// Returns the ends of a part, and its radius, meters.
+fn body<const D: usize>(chain: &Chain<D>, part: Part) -> ([Point<D>; 2], f64) {
+    let points = chain.points();
+    match part {
+        Part::Connector(i) => ([points[i]; 2], chain.connectors()[i].radius_m),
+        Part::Rod(i) => ([points[i], points[i + 1]], chain.rods()[i].radius_m),
     }
 }
 
@@ -91,8 +113,9 @@ pub(super) fn collect<const D: usize>(
     for (k, mover) in movers.filter(|(_, mover)| mover.is_moving()) {
         let within_m = within_m(mover);
         let mut look = |part: Part| {
-            if nearness(chain, part, mover).gap_m < within_m {
-                threats.push(Threat { part, mover: k, depth_m: 0.0, given_up: false });
+            if gap_m(chain, part, mover) < within_m {
+                let (margin_m, depth_m, given_up) = Default::default();
+                threats.push(Threat { part, mover: k, margin_m, depth_m, given_up });
             }
         };
         body.visit(&mover.bounds().grown(within_m), |rod| {

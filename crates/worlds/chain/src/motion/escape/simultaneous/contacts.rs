@@ -109,12 +109,6 @@ pub(super) fn radius_m<const D: usize>(chain: &Chain<D>, part: Part) -> f64 {
     }
 }
 
-/// Returns the distance of the surfaces of a part and an obstacle, meters; negative if they overlap.
-pub(super) fn gap_m<const D: usize>(chain: &Chain<D>, part: Part, mover: &Obstacle<D>) -> f64 {
-    let nearest = mover.core.nearest_to_segment(ends(chain.points(), part));
-    nearest.distance_m - mover.radius_m - radius_m(chain, part)
-}
-
 /// Returns the pairs that two rods and their connectors make. As in any motion, neighbors are
 /// exempt: connectors one index apart, rods two.
 fn candidates(rod: usize, other: usize, last: Option<usize>) -> [Option<[Part; 2]>; 6] {

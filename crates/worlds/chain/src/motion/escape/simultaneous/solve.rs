@@ -5,8 +5,8 @@
 //! obstacles may be in conflict with laws, and never the other way round.
 
 use super::super::Margin;
-use super::super::threat::{Threat, left_of};
-use super::contacts::{Contacts, along_rod, gap_m, nearest, radius_m};
+use super::super::threat::{Threat, gap_m, left_of};
+use super::contacts::{Contacts, along_rod, nearest, radius_m};
 use super::given::{Given, Through, Wishes};
 use super::laws::{Bend, Laws};
 use super::lengths::Lengths;

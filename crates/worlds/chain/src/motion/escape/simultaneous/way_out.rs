@@ -6,8 +6,7 @@
 //! place, with obstacles going straight on, and the one with the least time inside is taken.
 
 use super::super::Escape;
-use super::super::threat::Part;
-use super::contacts::gap_m;
+use super::super::threat::{Part, gap_m};
 use super::given::{Given, Through};
 use super::posture::ends;
 use super::solve::{Solver, away_from};
