@@ -7,6 +7,9 @@ use super::rods::geometry::{
 use super::rods::obstacle::Obstacles;
 use super::rods::own_body::OwnBody;
 
+/// Distance by which searches go beyond what counts, meters: far more than rounding.
+const SPARE_M: f64 = 1e-9;
+
 /// The surroundings of a connector and of the rod behind it, as far as somebody looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Near<const D: usize> {
@@ -32,7 +35,9 @@ pub(crate) fn near<const D: usize>(
     let end = if with_rods { (k + 1).min(points.len() - 1) } else { k };
     let (at, radii_m) = (points[k], [k, end].map(|i| connectors[i].radius_m));
     let rod_m = chain.rods().get(k).map_or(0.0, |rod| rod.radius_m);
-    let room = Bounds::of(&[at, points[end]]).grown(radii_m[0].max(radii_m[1]) + look_m);
+    // Who is inside looks only for what it is in deeper.
+    let room_m = (radii_m[0].max(radii_m[1]) + look_m).max(0.0) + SPARE_M;
+    let room = Bounds::of(&[at, points[end]]).grown(room_m);
     obstacles.visit(&room, |o| {
         let nearest = o.core.nearest_to_point(at);
         let gap_m = nearest.distance_m - radii_m[0] - o.radius_m;
@@ -61,7 +66,8 @@ pub(crate) fn least_clearance<const D: usize>(
     }
     let mut least = (look_m, 0);
     for k in 0..chain.points().len() {
-        let near = near(chain, obstacles, k, look_m, with_rods);
+        // What is farther than the nearest so far changes nothing.
+        let near = near(chain, obstacles, k, least.0, with_rods);
         let apart_m = near.gap_m.min(near.rod_gap_m);
         if apart_m < least.0 {
             least = (apart_m, k);
@@ -150,6 +156,27 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn the_least_clearance_is_that_of_the_part_with_the_least_and_the_first_of_those(
+            points in prop::collection::vec(prop::array::uniform2(-2.0..2.0f64), 2..9),
+            discs in prop::collection::vec((prop::array::uniform2(-3.0..3.0f64), 0.05..1.5f64), 1..20),
+            look_m in 0.01..2.0f64, with_rods in any::<bool>(),
+        ) {
+            let n = points.len();
+            let rod = Rod { min_m: 1e-9, max_m: 9.0, radius_m: 0.02 };
+            let chain = Chain::new(points, vec![Connector::free(0.1); n], vec![rod; n - 1]);
+            let Ok(chain) = chain else { return Ok(()) };
+            let discs = (0..).zip(discs).map(|(id, (at, radius_m))| Obstacle::ball(id, at, radius_m));
+            let obstacles = Obstacles::new(discs.collect(), 1.0).unwrap();
+            let mut least = (look_m, 0);
+            for k in 0..n {
+                let near = near(&chain, &obstacles, k, look_m, with_rods);
+                let apart_m = near.gap_m.min(near.rod_gap_m);
+                least = if apart_m < least.0 { (apart_m, k) } else { least };
+            }
+            prop_assert_eq!(least_clearance(&chain, &obstacles, look_m, with_rods), least);
+        }
+
         #[test]
         fn the_least_gap_of_a_chain_is_that_of_its_nearest_pair(
             points in prop::collection::vec(prop::array::uniform2(-2.0..2.0f64), 3..14),
