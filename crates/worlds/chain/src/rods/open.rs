@@ -3,7 +3,8 @@
 //!
 //! A sweep is a series of dependent roots and divisions, each of which the processor waits for. The
 //! two sweeps of an initiator in the middle depend only on the initiator, so they take turns in one
-//! loop and the processor computes both at once; every bit is the same as one after the other.
+//! loop and the processor computes both at once; every bit is the same as one after the other. So it is
+//! with several motions of the same connector: each follows the one before it, two connectors behind.
 
 use super::candidates::guided;
 use super::chain::{Chain, Rod};
@@ -46,14 +47,7 @@ fn sweep<const D: usize, const NEARLY: bool>(
     let least_move_m = chain.least_move_m();
     let (points, rods) = chain.parts_mut();
     let from = std::mem::replace(&mut points[k], to);
-    let mut sweeps = [Direction::Up, Direction::Down].map(|direction| Sweep {
-        direction,
-        master: k,
-        was: from,
-        is: to,
-        changed: 0,
-        longest2: 0.0,
-    });
+    let mut sweeps = Direction::BOTH.map(|direction| Sweep::start(direction, k, from, to));
     let [up, down] = &mut sweeps;
     while up.advance::<NEARLY>(points, rods, least_move_m)
         && down.advance::<NEARLY>(points, rods, least_move_m)
@@ -63,6 +57,60 @@ fn sweep<const D: usize, const NEARLY: bool>(
     tally.touch(down.master..up.master + 1);
     tally.changed += 1 + up.changed + down.changed;
     tally.slave_went(up.longest2.max(down.longest2).sqrt());
+}
+
+/// Most motions that are made in turn.
+pub(super) const MOST_IN_TURN: usize = 8;
+/// Connectors by which a motion is behind the one before it: it reads the slave and the next one, as that has left them.
+const BEHIND: usize = 2;
+
+/// Moves connector `k` to some places one after the other, at most [`MOST_IN_TURN`] of them, and all connectors that must
+/// follow; slaves stay as by [`Stays::Nearly`]. Returns a bound of any connector's way, meters.
+pub(super) fn pull_in_turn<const D: usize>(
+    chain: &mut Chain<D>,
+    k: usize,
+    to: &[Point<D>],
+    tally: &mut Tally,
+) -> f64 {
+    let least_move_m = chain.least_move_m();
+    let (points, rods) = chain.parts_mut();
+    let from = |points: &[Point<D>], j: usize| if j == 0 { points[k] } else { to[j - 1] };
+    let mut sweeps = Direction::BOTH.map(|direction| {
+        let start = |j: usize| Sweep::start(direction, k, from(points, j), to[j]);
+        std::array::from_fn::<_, MOST_IN_TURN, _>(|j| start(j.min(to.len() - 1)))
+    });
+    for sweeps in &mut sweeps {
+        advance_in_turn(&mut sweeps[..to.len()], points, rods, least_move_m);
+    }
+    let [up, down] = sweeps;
+    let mut way_m = 0.0;
+    for (j, (up, down)) in up.iter().zip(&down).take(to.len()).enumerate() {
+        let slave_m = up.longest2.max(down.longest2).sqrt();
+        way_m += slave_m.max(distance(from(points, j), to[j]));
+        tally.touch(down.master..up.master + 1);
+        tally.changed += 1 + up.changed + down.changed;
+        tally.slave_went(slave_m);
+    }
+    points[k] = to[to.len() - 1];
+    way_m
+}
+
+fn advance_in_turn<const D: usize>(
+    sweeps: &mut [Sweep<D>],
+    points: &mut [Point<D>],
+    rods: &[Rod],
+    least_move_m: f64,
+) {
+    let (mut round, mut goes_on) = (0, true);
+    while goes_on || round <= BEHIND * sweeps.len() {
+        goes_on = false;
+        for (j, sweep) in sweeps.iter_mut().enumerate() {
+            if round >= BEHIND * j {
+                goes_on |= sweep.advance::<true>(points, rods, least_move_m);
+            }
+        }
+        round += 1;
+    }
 }
 
 /// One sweep on its way outward.
@@ -78,6 +126,11 @@ struct Sweep<const D: usize> {
 }
 
 impl<const D: usize> Sweep<D> {
+    /// Returns the sweep of connector `k` that moves.
+    fn start(direction: Direction, k: usize, was: Point<D>, is: Point<D>) -> Self {
+        Self { direction, master: k, was, is, changed: 0, longest2: 0.0 }
+    }
+
     /// Moves the next slave; returns false, now and ever after, once the motion ends.
     #[inline(always)]
     fn advance<const NEARLY: bool>(

@@ -50,6 +50,9 @@ pub(super) enum Direction {
 }
 
 impl Direction {
+    /// Both.
+    pub(super) const BOTH: [Self; 2] = [Self::Up, Self::Down];
+
     /// Returns the master of a slave.
     #[inline]
     pub(super) fn before(self, slave: usize) -> usize {

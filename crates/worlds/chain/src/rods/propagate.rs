@@ -32,6 +32,8 @@ pub struct Propagator<const D: usize> {
     own: OwnBody<D>,
     leeway: Leeway<D>,
     proofs: Proofs,
+    /// Proofs of all sub-steps of a request at once.
+    whole_proofs: Proofs,
     work: Work<D>,
     untried: Vec<Untried<D>>,
     /// Positions before the request, for the run of connectors that have moved.
@@ -66,6 +68,12 @@ impl<const D: usize> Heads<D> {
 
     fn indices(&self) -> Range<usize> {
         self.first..self.first + self.n
+    }
+
+    /// Returns their positions after `k` of `n` equal parts of their way.
+    fn part_of(&self, from: [Point<D>; 2], [k, n]: [usize; 2]) -> [Point<D>; 2] {
+        let part = k as f64 / n as f64;
+        [0, 1].map(|h| if k == n { self.to[h] } else { between(from[h], self.to[h], part) })
     }
 
     /// Returns their positions.
@@ -103,11 +111,11 @@ impl<const D: usize> Propagator<D> {
             return Ok(Outcome::Vetoed(veto(chain, heads.first, by, refusal)));
         }
         let n = self.sub_steps(chain, obstacles, &heads, from)?;
+        if self.pull_all_apart(chain, obstacles, &heads, n) {
+            return Ok(Outcome::Moved(self.moved(None)));
+        }
         for k in 1..=n {
-            let part = k as f64 / n as f64;
-            let to = [0, 1]
-                .map(|h| if k == n { heads.to[h] } else { between(from[h], heads.to[h], part) });
-            let heads = Heads { to, ..heads };
+            let heads = Heads { to: heads.part_of(from, [k, n]), ..heads };
             if let Err((by, refusal)) = self.sub_step(chain, obstacles, heads, k < n) {
                 let veto = veto(chain, heads.first, by, refusal);
                 return Ok(self.stopped(chain, request.mode, veto));
@@ -155,7 +163,7 @@ impl<const D: usize> Propagator<D> {
         if heads.indices().enumerate().all(is_there) {
             return Ok(());
         }
-        let is_open = obstacles.is_empty() && chain.is_plain() && heads.n == 1;
+        let is_open = is_open(chain, obstacles, &heads);
         if is_open && !self.rules.self_collision {
             open::pull(chain, heads.first, heads.to[0], Stays::Exactly, &mut self.tally);
             return Ok(());
@@ -416,6 +424,11 @@ impl<const D: usize> Propagator<D> {
         }
         self.tally.touch(from..to);
     }
+}
+
+/// Whether nothing but the chain itself can be in the way of a motion.
+fn is_open<const D: usize>(chain: &Chain<D>, obstacles: &Obstacles<D>, heads: &Heads<D>) -> bool {
+    obstacles.is_empty() && chain.is_plain() && heads.n == 1
 }
 
 /// Returns the number of sub-steps of a way. `is_empty` says that there is no obstacle.

@@ -1,6 +1,6 @@
 //! Motions of a chain in its own way in which no part comes near another.
 
-use super::{Heads, Propagator, Tally};
+use super::{Heads, Propagator, Tally, is_open};
 use crate::rods::chain::Chain;
 use crate::rods::geometry::distance;
 use crate::rods::leeway::Leeway;
@@ -56,15 +56,59 @@ impl<const D: usize> Propagator<D> {
         let head_m = distance(chain.points()[heads.first], heads.to[0]);
         open::pull(chain, heads.first, heads.to[0], Stays::Nearly, &mut tally);
         let way_m = head_m.max(tally.max_slave_step_m);
-        let may = tally.max_slave_step_m <= self.rules.slave_step_max_m
-            && self.leeway.allows(chain, way_m);
+        let may = self.is_proven(chain, &tally, way_m);
         if may {
             if goes_on {
                 self.remember(heads.first, tally.from..tally.to);
             }
             self.tally.add(&tally);
             self.leeway.settle(chain);
-        } else {
+        }
+        may
+    }
+
+    /// Makes all sub-steps of a request alone at once, if no part comes near another in any of them. Every part is then
+    /// where it would be after one sub-step after the other, each with a proof of its own or none.
+    pub(super) fn pull_all_apart(
+        &mut self,
+        chain: &mut Chain<D>,
+        obstacles: &Obstacles<D>,
+        heads: &Heads<D>,
+        n: usize,
+    ) -> bool {
+        let may = self.rules.self_collision
+            && (2..=open::MOST_IN_TURN).contains(&n)
+            && is_open(chain, obstacles, heads)
+            && Leeway::is_for(chain);
+        let k = heads.first;
+        let from = heads.places(chain);
+        // A sub-step that is too short to count is none.
+        let is_long = distance(from[0], heads.to[0]) > 2.0 * n as f64 * chain.least_move_m();
+        if !may || !is_long || !self.whole_proofs.is_due() {
+            return false;
+        }
+        self.leeway.note(chain);
+        let mut tally = Tally::start(k);
+        let mut to = [heads.to[0]; open::MOST_IN_TURN];
+        for (j, to) in to[..n].iter_mut().enumerate() {
+            *to = heads.part_of(from, [j + 1, n])[0];
+        }
+        let way_m = open::pull_in_turn(chain, k, &to[..n], &mut tally);
+        let holds = self.is_proven(chain, &tally, way_m);
+        if holds {
+            self.tally.add(&tally);
+            self.leeway.settle(chain);
+        }
+        self.whole_proofs.note(holds);
+        holds
+    }
+
+    /// Whether a motion from the noted places, in which connectors went `way_m` at most, is allowed; otherwise it is taken
+    /// back.
+    fn is_proven(&mut self, chain: &mut Chain<D>, tally: &Tally, way_m: f64) -> bool {
+        let may = tally.max_slave_step_m <= self.rules.slave_step_max_m
+            && self.leeway.allows(chain, way_m);
+        if !may {
             let run = tally.from..tally.to;
             chain.points_mut()[run.clone()].copy_from_slice(&self.leeway.noted()[run]);
             self.leeway.go_back(way_m);
