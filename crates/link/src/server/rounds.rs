@@ -171,10 +171,8 @@ mod tests {
                 }
             }
         }
-        let control = |(sight, program): (&Sight, &Box<dyn crate::ports::Program>)| {
-            (sight.agent, program.control().expect("it is done"))
-        };
-        sights.iter().zip(&programs).map(control).collect()
+        let agents = sights.iter().map(|sight| sight.agent);
+        agents.zip(programs.iter().map(|program| program.control().expect("it is done"))).collect()
     }
 
     /// Makes a cycle in which all have decided, and the node of agent 1 is lost then. Returns how many controls of each
