@@ -39,6 +39,8 @@ impl<const D: usize> ChainWorld<D> {
             bodies: still.chain(goals).collect(),
             names: (0..)
                 .zip(self.chains.iter())
+                // Those without a name go by their number.
+                .filter(|(_, spec)| !spec.name.is_empty())
                 .map(|(id, spec)| (Kind::Connector, id, spec.name.clone()))
                 .collect(),
         }
