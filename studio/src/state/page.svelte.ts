@@ -1,5 +1,7 @@
 /** What the page as such chose: theme, width, open panels. */
 
+import type { Center } from "./center";
+
 export type ThemeChoice = "auto" | "light" | "dark";
 
 function kept(key: string): string | null {
@@ -34,7 +36,8 @@ class Page {
   inspector_px = $state(Math.min(720, Math.max(220, Number(kept("inspector") ?? 330))));
   /** The panel below the canvas on narrow screens. */
   tab = $state<"agents" | "events" | "inspector" | "charts">("agents");
-  center = $state<"view" | "forms" | "text" | "report">("view");
+  /** What the center is to show, of sessions that have it (`centerOf`). */
+  center = $state<Center>("view");
   /** Whether the picture is drawn upon. */
   edits = $state(false);
   showsNew = $state(false);

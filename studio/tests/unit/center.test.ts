@@ -1,0 +1,12 @@
+/** The center shows what there is of the session that is active, whatever another one showed. */
+
+import { expect, test } from "vitest";
+import { centerOf, centersOf } from "../../src/state/center";
+
+const [recorded, scenario, fleet] = [{ isFleet: false, folder: "runs/a" }, { isFleet: false, folder: null }, { isFleet: true, folder: null }];
+
+test("where a session has no report, or nothing but a picture, the picture is shown and its tab is chosen", () => {
+  expect([recorded, scenario, fleet].map((one) => centerOf(one, "report"))).toEqual(["report", "view", "view"]);
+  expect([recorded, scenario, fleet].map((one) => centerOf(one, "text"))).toEqual(["text", "text", "view"]);
+  for (const one of [recorded, scenario, fleet]) expect(centersOf(one)).toContain(centerOf(one, "report"));
+});
