@@ -9,7 +9,7 @@ use crate::notebook::shown;
 use crate::scenario::{Bundle, Made, made};
 use crate::space::{Room, Team, named, numbered};
 use crate::table::Table;
-use crate::watch::Signals;
+use crate::watch::{ForAWhile, Signals};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
@@ -34,7 +34,8 @@ const NOTEBOOK_PX: u32 = 480;
 /// Same scenario and seed, same bits: whatever the workers, as the command and the library.
 ///
 /// It may be used from several threads, one at a time; Python's lock is released while it advances, and Ctrl-C stops it between
-/// two cycles. It can be pickled: its whole state goes along, but no rows.
+/// two cycles. Handlers of signals may use it, too: they see it between two cycles. It can be pickled: its whole state goes along,
+/// but no rows.
 ///
 /// Examples of its methods go on from here:
 ///
@@ -95,31 +96,42 @@ impl Simulation {
         self.with(py, |journey| Ok(ask(journey.simulation())))
     }
 
-    /// Advances from the cycle at which it stands to the one that `goal` returns for it, or to the end of the run, and
-    /// returns the number of cycles done.
+    /// Advances to the goal, or to the end of the run, and returns the number of cycles done.
+    ///
+    /// Signals are looked for between two slices, while nobody holds the run: their handlers are functions of Python
+    /// on this thread, and may ask the simulation whatever they like.
+    fn advance_towards(&self, py: Python<'_>, mut goal: Goal) -> PyResult<u64> {
+        let mut done = 0;
+        loop {
+            py.check_signals()?;
+            let slice = self.slice(py, goal)?;
+            done += slice.done;
+            if slice.is_last {
+                return Ok(done);
+            }
+            goal = goal.after(slice.done);
+        }
+    }
+
+    /// Advances towards a goal for a little while.
     ///
     /// The cycle is read by who then advances, with no other thread in between: of two threads that step at once, each
     /// adds its own step.
-    fn advance_from(
-        &self,
-        py: Python<'_>,
-        goal: impl FnOnce(Cycle) -> Cycle + Send,
-    ) -> PyResult<u64> {
-        let signals = Signals::default();
-        let done = py.detach(|| {
+    fn slice(&self, py: Python<'_>, goal: Goal) -> PyResult<Slice> {
+        py.detach(|| {
             let mut held = self.journey.lock().unwrap_or_else(PoisonError::into_inner);
             let journey = held.as_mut().ok_or_else(closed)?;
             let from = journey.cycle();
-            let advanced = journey.advance_to(goal(from).max(from), &signals);
-            let done = journey.cycle() - from;
-            if advanced.is_err() {
+            let until = goal.from(from);
+            if let Err(error) = journey.advance_to(until, &ForAWhile::default()) {
                 // A run that broke off has no state that anybody can use.
                 *held = None;
+                return Err(error::session(&error));
             }
-            advanced.map(|()| done).map_err(|e| error::session(&e))
-        })?;
-        signals.into_result()?;
-        Ok(done)
+            let now = journey.cycle();
+            let is_last = now >= until || journey.simulation().is_over();
+            Ok(Slice { done: now - from, is_last })
+        })
     }
 
     /// Returns a team by number or name, with its number.
@@ -186,6 +198,41 @@ impl Simulation {
     fn end(&self, until: Option<Cycle>) -> Cycle {
         until.unwrap_or_else(|| self.scenario.compiled.plan().cycles)
     }
+}
+
+/// The cycle that somebody advances to.
+#[derive(Clone, Copy)]
+enum Goal {
+    /// That many cycles after the present one.
+    Further(u64),
+    /// This one.
+    Until(Cycle),
+}
+
+impl Goal {
+    /// Returns the cycle to advance to from `now`.
+    fn from(self, now: Cycle) -> Cycle {
+        match self {
+            Self::Further(cycles) => now.saturating_add(cycles),
+            Self::Until(until) => until.max(now),
+        }
+    }
+
+    /// Returns what is left of it once so many cycles are done.
+    fn after(self, done: u64) -> Self {
+        match self {
+            Self::Further(cycles) => Self::Further(cycles - done),
+            Self::Until(_) => self,
+        }
+    }
+}
+
+/// The outcome of advancing for a little while.
+struct Slice {
+    /// Cycles done.
+    done: u64,
+    /// Whether the goal is reached, or the run is over.
+    is_last: bool,
 }
 
 fn undrawn(error: &DrawError) -> PyErr {
@@ -259,7 +306,7 @@ impl Simulation {
     /// (1, 5)
     #[pyo3(signature = (cycles=Whole(1)), text_signature = "($self, cycles=1)")]
     fn step(&self, py: Python<'_>, cycles: Whole) -> PyResult<u64> {
-        self.advance_from(py, |now| now.saturating_add(cycles.0))
+        self.advance_towards(py, Goal::Further(cycles.0))
     }
 
     /// Advances to cycle `until`, by default the planned end, and returns how many cycles were done.
@@ -282,7 +329,7 @@ impl Simulation {
         let simulation = slf.get();
         let until = simulation.end(until.map(|Whole(until)| until));
         match decide {
-            None => simulation.advance_from(slf.py(), |_| until),
+            None => simulation.advance_towards(slf.py(), Goal::Until(until)),
             Some(decide) => decided(slf.py(), simulation, decide, state, until),
         }
     }
@@ -680,7 +727,7 @@ impl Deciding for Simulation {
     }
 
     fn advance(&self, py: Python<'_>) -> PyResult<()> {
-        self.advance_from(py, |now| now.saturating_add(1)).map(drop)
+        self.advance_towards(py, Goal::Further(1)).map(drop)
     }
 }
 

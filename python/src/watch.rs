@@ -4,9 +4,25 @@ use pyo3::prelude::*;
 use sidestep::kernel::Interrupt;
 use sidestep_session::{Error, Watcher};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
 
-/// A watcher that stops a run between two cycles when Python has a signal to handle.
+/// Time after which a run is handed back, so that Python can be asked for signals: a fraction of what anybody notices.
+const A_WHILE: Duration = Duration::from_millis(50);
+
+/// A watcher that stops a run between two cycles after a while. It asks Python nothing: whoever drives the run holds
+/// its lock, and a handler of a signal may want that.
+#[derive(Debug, Default)]
+pub(crate) struct ForAWhile(OnceLock<Instant>);
+
+impl Watcher for ForAWhile {
+    fn go_on(&self) -> bool {
+        // It is asked before the first cycle, too, which so is done in any case.
+        self.0.get_or_init(Instant::now).elapsed() < A_WHILE
+    }
+}
+
+/// A watcher that stops work when Python has a signal to handle. Whoever uses it holds no lock that a handler may want.
 #[derive(Debug, Default)]
 pub(crate) struct Signals(Mutex<Option<PyErr>>);
 

@@ -164,6 +164,70 @@ def test_ctrl_c_stops_between_two_cycles_with_the_state_whole():
     assert run.returncode == 0
 
 
+def told_of(program):
+    """What a program prints; one that waits for ever fails the test, and does not hold the others up."""
+    program = [sys.executable, "-c", textwrap.dedent(program)]
+    return subprocess.run(program, capture_output=True, text=True, check=True, timeout=300).stdout
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_a_handler_of_a_signal_reads_saves_and_stops_the_run_that_it_interrupts():
+    told = told_of(
+        """
+        import signal, sidestep
+        scenario = {"world": "robots", "cycles": 10**9, "map": {"ascii": "....."},
+                    "robots": [{"count": 2}]}
+        sim, seen = sidestep.Simulation(scenario), []
+
+        def look(*_):
+            seen.append((sim.cycle, sim.checkpoint(), sim.digest))
+            if len(seen) == 3:
+                raise KeyboardInterrupt
+
+        signal.signal(signal.SIGALRM, look)
+        signal.setitimer(signal.ITIMER_REAL, 0.05, 0.05)
+        try:
+            sim.run()
+        except KeyboardInterrupt:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+        cycles = [cycle for cycle, _, _ in seen]
+        again = sidestep.Simulation(scenario)
+        again.restore(seen[-1][1])
+        print(cycles == sorted(cycles), sim.cycle == cycles[-1] > 0, again.digest == sim.digest)
+        """
+    )
+    assert told == "True True True\n"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_handlers_of_signals_change_neither_rows_nor_bits_and_add_their_own_steps():
+    told = told_of(
+        """
+        import signal, sidestep
+        scenario = {"world": "robots", "cycles": 10**9, "map": {"ascii": "....."},
+                    "robots": [{"count": 2}]}
+        quiet, asked = (sidestep.Simulation(scenario, record=["trajectories"]) for _ in range(2))
+        looks = []
+        signal.signal(signal.SIGALRM, lambda *_: looks.append(asked.metrics()))
+        signal.setitimer(signal.ITIMER_REAL, 0.001, 0.001)
+        done = asked.step(300_000)
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        quiet.step(300_000)
+        ours, theirs = (sim.tables()["trajectories"] for sim in (quiet, asked))
+        same = all(list(ours[name]) == list(theirs[name]) for name in ours.columns)
+        print(done, len(looks) > 0, same, asked.digest == quiet.digest)
+
+        steps = []
+        signal.signal(signal.SIGALRM, lambda *_: steps.append(asked.step(3)))
+        signal.setitimer(signal.ITIMER_REAL, 0.001, 0.001)
+        done = asked.step(300_000)
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        print(done, asked.cycle == 600_000 + 3 * len(steps))
+        """
+    )
+    assert told == "300000 True True True\n300000 True\n"
+
+
 def test_it_is_loaded_quickly_and_says_its_version():
     program = "import sys, sidestep; print(sidestep.__version__, 'matplotlib' in sys.modules)"
     told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
