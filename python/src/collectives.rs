@@ -2,7 +2,7 @@
 
 use crate::error::wrong;
 use crate::json::list;
-use crate::watch::attended;
+use crate::watch::{heeding, interruptible};
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -13,7 +13,6 @@ use sidestep::collectives::{
 use sidestep::kernel::Seed;
 use sidestep::kernel::interrupt::{self, Interrupt};
 use sidestep::kernel::stream::{Purpose, Streams};
-use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Mutex, PoisonError};
 
 /// The random streams of the players' samples.
@@ -101,19 +100,6 @@ impl Options {
     }
 }
 
-/// Does work that heeds an interrupt; `None` if that was raised.
-fn heeding<T>(interrupt: &Interrupt, work: impl FnOnce() -> T) -> Option<T> {
-    let heeded = || {
-        let _heeded = interrupt.heeded_here();
-        work()
-    };
-    match catch_unwind(AssertUnwindSafe(heeded)) {
-        Ok(done) => Some(done),
-        Err(payload) if interrupt.explains(payload.as_ref()) => None,
-        Err(payload) => resume_unwind(payload),
-    }
-}
-
 /// Returns the error of an optimization that was interrupted: whoever interrupted it has raised another one before.
 fn interrupted() -> PyErr {
     wrong("minimize", "it was interrupted", "call it again")
@@ -152,10 +138,7 @@ pub(crate) fn minimize_pairs<'py>(
         game.add_pair(*a, *b, costs.iter().copied().collect());
     }
     let (settings, uniform) = (options.settings()?, options.uniform());
-    let outcome = attended(py, |watcher| {
-        heeding(&watcher.interrupt(), || optimize(&game, &settings, uniform))
-    })?;
-    let outcome = outcome.ok_or_else(interrupted)?;
+    let outcome = interruptible(py, || optimize(&game, &settings, uniform))?;
     let cost = game.cost(&outcome.joint);
     told(py, &outcome, cost)
 }

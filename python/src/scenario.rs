@@ -3,6 +3,7 @@
 use crate::error::{self, wrong};
 use crate::json::{list, table, to_python, to_toml};
 use crate::notebook::shown;
+use crate::watch::interruptible;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyMapping};
 use sidestep::kernel::InputError;
@@ -49,8 +50,10 @@ enum Text {
 }
 
 impl Made {
-    fn new(source: Source, is_dict: bool) -> PyResult<Self> {
-        let compiled = WORLDS.compile(&source).map_err(|e| told(&e, is_dict))?;
+    /// Reads and compiles a scenario while other threads of Python go on; Ctrl-C ends that.
+    fn new(py: Python<'_>, source: Source, is_dict: bool) -> PyResult<Self> {
+        let compiled = interruptible(py, || WORLDS.compile(&source))?;
+        let compiled = compiled.map_err(|e| told(&e, is_dict))?;
         Ok(Self::of(compiled, Text::Own(source), is_dict, None))
     }
 
@@ -65,14 +68,14 @@ impl Made {
     }
 
     /// Returns the scenario of a bundle.
-    pub(crate) fn unpacked(resolved: Resolved) -> PyResult<Self> {
+    pub(crate) fn unpacked(py: Python<'_>, resolved: Resolved) -> PyResult<Self> {
         let unpacked = match resolved.files.is_empty() {
             true => None,
             false => Some(Arc::new(unpack(&resolved.files)?)),
         };
         let base = unpacked.as_ref().map_or_else(PathBuf::new, |dir| dir.path().to_path_buf());
         let source = Source::new("scenario.toml", resolved.text.clone(), base);
-        let made = Self::new(source, false)?;
+        let made = Self::new(py, source, false)?;
         let _ = made.resolved.set(Ok(resolved));
         Ok(Self { unpacked, ..made })
     }
@@ -116,7 +119,7 @@ impl Made {
     }
 
     /// Returns the same scenario with another seed, compiled anew only where its world needs that.
-    pub(crate) fn reseeded(self: &Arc<Self>, seed: u64) -> PyResult<Self> {
+    pub(crate) fn reseeded(self: &Arc<Self>, py: Python<'_>, seed: u64) -> PyResult<Self> {
         if i64::try_from(seed).is_err() {
             let remedy = "give at most 2^63 - 1: scenario files have no larger numbers";
             return Err(wrong("seed", format!("{seed} is too large"), remedy));
@@ -126,10 +129,10 @@ impl Made {
             Text::Own(_) => self,
             Text::Reseeded { of, .. } => of,
         };
-        let compiled = match self.compiled.reseeded(seed) {
+        let compiled = interruptible(py, || match self.compiled.reseeded(seed) {
             Some(compiled) => compiled,
             None => self.compiled_with(seed),
-        };
+        })?;
         let compiled = compiled.map_err(|e| told(&e, self.is_dict))?;
         let text = Text::Reseeded { of: Arc::clone(of), seed, source: OnceLock::new() };
         Ok(Self::of(compiled, text, self.is_dict, self.unpacked.clone()))
@@ -142,9 +145,9 @@ impl Made {
     }
 
     /// Returns the same scenario with other values.
-    pub(crate) fn with(&self, overrides: &[String]) -> PyResult<Self> {
+    pub(crate) fn with(&self, py: Python<'_>, overrides: &[String]) -> PyResult<Self> {
         let source = self.source()?.clone().with(overrides).map_err(|e| told(&e, self.is_dict))?;
-        Ok(Self { unpacked: self.unpacked.clone(), ..Self::new(source, self.is_dict)? })
+        Ok(Self { unpacked: self.unpacked.clone(), ..Self::new(py, source, self.is_dict)? })
     }
 }
 
@@ -171,26 +174,27 @@ pub(crate) fn made(scenario: &Bound<'_, PyAny>) -> PyResult<Arc<Made>> {
     if let Ok(scenario) = scenario.cast::<Scenario>() {
         return Ok(Arc::clone(&scenario.get().0));
     }
-    of_any(Some(scenario), None, None).map(Arc::new)
+    of_any(scenario.py(), Some(scenario), None, None).map(Arc::new)
 }
 
 fn of_any(
+    py: Python<'_>,
     scenario: Option<&Bound<'_, PyAny>>,
     text: Option<&str>,
     base: Option<PathBuf>,
 ) -> PyResult<Made> {
     let base = base.unwrap_or_default();
     match (scenario, text) {
-        (None, Some(text)) => Made::new(Source::new("text", text, base), false),
+        (None, Some(text)) => Made::new(py, Source::new("text", text, base), false),
         (Some(given), None) => match given.cast::<PyMapping>() {
-            Ok(mapping) => Made::new(of_dict(mapping, &base)?, true),
+            Ok(mapping) => Made::new(py, of_dict(mapping, &base)?, true),
             Err(_) => {
                 let path: PathBuf = given.extract().map_err(|_| {
                     let cause = format!("{given} is no path, dict or Scenario");
                     wrong("scenario", cause, "give a path or a dict, or text=...")
                 })?;
-                let (source, compiled) =
-                    sidestep_session::read(WORLDS, &path, &[]).map_err(|e| error::input(&e))?;
+                let read = interruptible(py, || sidestep_session::read(WORLDS, &path, &[]))?;
+                let (source, compiled) = read.map_err(|e| error::input(&e))?;
                 Ok(Made::of(compiled, Text::Own(source), false, None))
             }
         },
@@ -215,11 +219,12 @@ impl Scenario {
     #[new]
     #[pyo3(signature = (scenario=None, *, text=None, base=None))]
     fn new(
+        py: Python<'_>,
         scenario: Option<&Bound<'_, PyAny>>,
         text: Option<&str>,
         base: Option<PathBuf>,
     ) -> PyResult<Self> {
-        of_any(scenario, text, base).map(|made| Self(Arc::new(made)))
+        of_any(py, scenario, text, base).map(|made| Self(Arc::new(made)))
     }
 
     /// Returns the same scenario with other values: `set(seed=3)`, `set({"robots.0.count": 5})`. A dotted key goes by tables and
@@ -232,6 +237,7 @@ impl Scenario {
     #[pyo3(signature = (values=None, /, **keys))]
     fn set(
         &self,
+        py: Python<'_>,
         values: Option<&Bound<'_, PyMapping>>,
         keys: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
@@ -243,7 +249,7 @@ impl Scenario {
                 overrides.push(format!("{key}={}", to_toml(&value, &key)?));
             }
         }
-        self.0.with(&overrides).map(|made| Self(Arc::new(made)))
+        self.0.with(py, &overrides).map(|made| Self(Arc::new(made)))
     }
 
     /// Returns what will surprise its author, the weightiest first: `key: words`.
@@ -325,8 +331,12 @@ pub(crate) type Bundle = (String, Vec<(String, Vec<u8>)>);
 
 /// Returns the scenario that was pickled.
 #[pyfunction]
-pub(crate) fn unpack_scenario(text: String, files: Vec<(String, Vec<u8>)>) -> PyResult<Scenario> {
-    Made::unpacked(Resolved { text, files }).map(|made| Scenario(Arc::new(made)))
+pub(crate) fn unpack_scenario(
+    py: Python<'_>,
+    text: String,
+    files: Vec<(String, Vec<u8>)>,
+) -> PyResult<Scenario> {
+    Made::unpacked(py, Resolved { text, files }).map(|made| Scenario(Arc::new(made)))
 }
 
 /// Returns the JSON Schema of the scenarios of a world, or of any, as a dict.

@@ -59,17 +59,25 @@ pub(crate) struct Simulation {
 }
 
 impl Simulation {
-    fn at_start(scenario: Arc<Made>, workers: usize, keep: Keep<'_>) -> PyResult<Self> {
+    /// Starts a scenario while other threads of Python go on.
+    fn at_start(
+        py: Python<'_>,
+        scenario: Arc<Made>,
+        workers: usize,
+        keep: Keep<'_>,
+    ) -> PyResult<Self> {
         if workers == 0 {
             return Err(wrong("workers", "0 workers cannot simulate", "give 1 or more"));
         }
-        // Without a folder it is identified by the text that a folder would have: checkpoints fit both.
-        let source = match keep.folder {
-            Some(_) => scenario.source()?.clone(),
-            None => Source::new("scenario.toml", scenario.identity()?, ""),
-        };
-        let journey = Journey::start(scenario.compiled.as_ref(), &source, workers, keep, None);
-        let journey = journey.map_err(|e| error::session(&e))?;
+        let journey = py.detach(|| {
+            // Without a folder it is identified by the text that a folder would have: checkpoints fit both.
+            let source = match keep.folder {
+                Some(_) => scenario.source()?.clone(),
+                None => Source::new("scenario.toml", scenario.identity()?, ""),
+            };
+            let journey = Journey::start(scenario.compiled.as_ref(), &source, workers, keep, None);
+            journey.map_err(|e| error::session(&e))
+        })?;
         let teams = journey.simulation().teams().iter().cloned().map(Arc::new).collect();
         let journey = Mutex::new(Some(journey));
         Ok(Self { scenario, workers, teams, journey, film: Mutex::default() })
@@ -284,13 +292,14 @@ impl Simulation {
         out: Option<PathBuf>,
         replace: bool,
     ) -> PyResult<Self> {
+        let py = scenario.py();
         let mut scenario = made(scenario)?;
         let seed = seed.map(|Whole(seed)| seed);
         if let Some(seed) = seed.filter(|&seed| seed != scenario.compiled.plan().seed) {
-            scenario = Arc::new(scenario.reseeded(seed)?);
+            scenario = Arc::new(scenario.reseeded(py, seed)?);
         }
         let keep = Keep { folder: out.as_deref(), mcap: None, replace };
-        let simulation = Self::at_start(scenario, workers.0 as usize, keep)?;
+        let simulation = Self::at_start(py, scenario, workers.0 as usize, keep)?;
         if let Recorded(Some(wanted)) = record {
             let mut journey = simulation.journey.lock().unwrap_or_else(PoisonError::into_inner);
             let journey = journey.as_mut().ok_or_else(closed)?;
@@ -461,7 +470,7 @@ impl Simulation {
     /// True
     fn copy(&self, py: Python<'_>) -> PyResult<Self> {
         let bytes = self.ask(py, |run| run.checkpoint())?;
-        let copy = Self::at_start(Arc::clone(&self.scenario), self.workers, Keep::default())?;
+        let copy = Self::at_start(py, Arc::clone(&self.scenario), self.workers, Keep::default())?;
         copy.restore(py, bytes)?;
         Ok(copy)
     }
@@ -743,8 +752,8 @@ pub(crate) fn rebuild(
     checkpoint: Vec<u8>,
 ) -> PyResult<Simulation> {
     let (text, files) = scenario;
-    let scenario = Arc::new(Made::unpacked(Resolved { text, files })?);
-    let simulation = Simulation::at_start(scenario, workers, Keep::default())?;
+    let scenario = Arc::new(Made::unpacked(py, Resolved { text, files })?);
+    let simulation = Simulation::at_start(py, scenario, workers, Keep::default())?;
     simulation.restore(py, checkpoint)?;
     Ok(simulation)
 }

@@ -3,6 +3,7 @@
 use pyo3::prelude::*;
 use sidestep::kernel::Interrupt;
 use sidestep_session::{Error, Watcher};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
@@ -84,6 +85,32 @@ impl Watcher for Attended {
     fn interrupt(&self) -> Interrupt {
         self.interrupt.clone()
     }
+}
+
+/// Does work that heeds an interrupt; `None` if that was raised.
+pub(crate) fn heeding<T>(interrupt: &Interrupt, work: impl FnOnce() -> T) -> Option<T> {
+    let heeded = || {
+        let _heeded = interrupt.heeded_here();
+        work()
+    };
+    match catch_unwind(AssertUnwindSafe(heeded)) {
+        Ok(done) => Some(done),
+        Err(payload) if interrupt.explains(payload.as_ref()) => None,
+        Err(payload) => resume_unwind(payload),
+    }
+}
+
+/// Does work on another thread that heeds an interrupt, while this one waits without Python's lock and looks for
+/// signals.
+///
+/// # Errors
+/// The exception of a signal.
+pub(crate) fn interruptible<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce() -> T + Send,
+) -> PyResult<T> {
+    let done = attended(py, |watcher| heeding(&watcher.interrupt(), work))?;
+    Ok(done.expect("only a signal interrupts it, and that has raised its exception"))
 }
 
 /// Does work in other threads, while this one waits without Python's lock and looks for signals.
