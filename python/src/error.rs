@@ -2,10 +2,9 @@
 
 use pyo3::prelude::*;
 use sidestep::kernel;
-use sidestep::kernel::checkpoint;
 use sidestep::kernel::control;
 use sidestep::kernel::ports;
-use sidestep_session::Error;
+use sidestep_session::{Error, RestoreError};
 
 pyo3::import_exception!(sidestep._errors, InputError);
 pyo3::import_exception!(sidestep._errors, OrderError);
@@ -53,9 +52,15 @@ pub(crate) fn record(error: &ports::RecordError) -> PyErr {
     RecordError::new_err(error.to_string())
 }
 
-/// Returns the exception of a checkpoint.
-pub(crate) fn checkpoint(error: &checkpoint::CheckpointError) -> PyErr {
-    CheckpointError::new_err(error.to_string())
+/// Returns the exception of a run that does not go on from a checkpoint.
+pub(crate) fn restore(error: &RestoreError) -> PyErr {
+    match error {
+        RestoreError::Record(error) => record(error),
+        RestoreError::Stored { .. } => CheckpointError::new_err(format!(
+            "{error}\n  help: restore it in a copy (`sim.copy()`), or in a new Simulation with a folder of its own"
+        )),
+        _ => CheckpointError::new_err(error.to_string()),
+    }
 }
 
 /// Returns the exception of a session.

@@ -104,6 +104,11 @@ impl Simulation {
         self.with(py, |journey| Ok(ask(journey.simulation())))
     }
 
+    /// Returns the state as bytes.
+    fn saved(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
+        self.with(py, |journey| journey.checkpoint().map_err(|e| error::record(&e)))
+    }
+
     /// Advances to the goal, or to the end of the run, and returns the number of cycles done.
     ///
     /// Signals are looked for between two slices, while nobody holds the run: their handlers are functions of Python
@@ -182,7 +187,7 @@ impl Simulation {
         let values = numbers(py, order, values, agents.len(), shape)?;
         self.with(py, |journey| {
             let orders = Orders { order, agents, values: &values };
-            journey.simulation_mut().order(&orders).map_err(|e| error::order(&e))
+            journey.order(&orders).map_err(|e| error::order(&e))
         })
     }
 
@@ -443,13 +448,14 @@ impl Simulation {
     /// >>> isinstance(sim.checkpoint(), bytes)
     /// True
     fn checkpoint<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let bytes = self.ask(py, |run| run.checkpoint())?;
-        Ok(PyBytes::new(py, &bytes))
+        Ok(PyBytes::new(py, &self.saved(py)?))
     }
 
-    /// Goes on from a checkpoint of the same scenario.
+    /// Goes on from a checkpoint of the same scenario. Rows that are kept in memory lose those of its cycle and of later ones:
+    /// `tables` gives what a run has that never went there. What `tables` gave before is yours.
     ///
-    /// Raises CheckpointError when it is damaged, or belongs to another scenario or version.
+    /// Raises CheckpointError when it is damaged, or belongs to another scenario or version; also where the rows go to a folder
+    /// (`out`), which holds one past, unless it is the present state: restore it in a `copy`, or in a new Simulation.
     ///
     /// >>> before = sim.checkpoint()
     /// >>> sim.step(5)
@@ -458,10 +464,7 @@ impl Simulation {
     /// >>> sim.cycle
     /// 10
     fn restore(&self, py: Python<'_>, checkpoint: Vec<u8>) -> PyResult<()> {
-        self.with(py, |journey| {
-            let restored = journey.simulation_mut().restore(&checkpoint);
-            restored.map_err(|e| error::checkpoint(&e))
-        })
+        self.with(py, |journey| journey.restore(&checkpoint).map_err(|e| error::restore(&e)))
     }
 
     /// Returns an independent copy in the same state, which records nothing.
@@ -469,7 +472,7 @@ impl Simulation {
     /// >>> sim.copy().digest == sim.digest
     /// True
     fn copy(&self, py: Python<'_>) -> PyResult<Self> {
-        let bytes = self.ask(py, |run| run.checkpoint())?;
+        let bytes = self.saved(py)?;
         let copy = Self::at_start(py, Arc::clone(&self.scenario), self.workers, Keep::default())?;
         copy.restore(py, bytes)?;
         Ok(copy)

@@ -18,6 +18,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::Duration;
 
+mod past;
+
+pub use past::RestoreError;
+
 /// A run that is ready to start or continue.
 pub struct Journey {
     run: Box<dyn Simulation>,
@@ -34,6 +38,8 @@ pub struct Journey {
     told: Option<Foreign>,
     /// Its cost so far.
     effort: Effort,
+    /// The cycle for which [`Self::order`] ordered something last.
+    ordered_at: Option<Cycle>,
 }
 
 /// The places where a run is recorded.
@@ -144,6 +150,7 @@ impl Journey {
             until: None,
             told: None,
             effort,
+            ordered_at: None,
         }
     }
 
@@ -156,7 +163,7 @@ impl Journey {
         self.run.as_ref()
     }
 
-    /// The run, for who gives it orders, or restores another state of it.
+    /// The run, for who watches it or hands controls over.
     pub fn simulation_mut(&mut self) -> &mut dyn Simulation {
         self.run.as_mut()
     }

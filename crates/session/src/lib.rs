@@ -54,7 +54,7 @@ pub use error::Error;
 pub use files::replace;
 pub use film::{Ending, Film, McapFilm, frame_rows};
 pub use identity::{adds_code, build};
-pub use journey::{Journey, Keep};
+pub use journey::{Journey, Keep, RestoreError};
 pub use live::{Steered, Viewers, ViewersAt, next_free};
 pub use picture::write_png;
 pub use recorded::{csv_table, stored_summary};

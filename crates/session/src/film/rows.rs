@@ -3,7 +3,7 @@
 use super::Film;
 use crate::Error;
 use sidestep::kernel::ports::table::label_of;
-use sidestep::kernel::ports::{Buffer, RowBuffer, Table, TableSchema, Values};
+use sidestep::kernel::ports::{Table, TableSchema, Values};
 use sidestep::kernel::view::{Body, Condition, Frame, Kind, Look};
 use sidestep::kernel::{Cycle, Simulation};
 
@@ -21,21 +21,31 @@ struct Row {
 /// cycles, and the last one of a run that is over.
 pub(crate) struct FrameRows {
     every: Cycle,
+    /// The cycle at which the run was looked at first,
+    first: Option<Cycle>,
+    /// and that of the last frame.
     last: Option<Cycle>,
-    rows: RowBuffer<Row>,
+    rows: Vec<Row>,
 }
 
 impl FrameRows {
     /// Returns frames that are taken every `every` cycles.
     pub(crate) fn new(every: Cycle) -> Self {
-        let mut rows = RowBuffer::default();
-        rows.begin(Some(table()));
-        Self { every: every.max(1), last: None, rows }
+        Self { every: every.max(1), first: None, last: None, rows: Vec::new() }
     }
 
     /// Takes the rows that were kept so far.
     pub(crate) fn take(&mut self) -> (TableSchema, Vec<Values>) {
-        (table().schema(), self.rows.take().unwrap_or_default())
+        let (table, rows) = (table(), std::mem::take(&mut self.rows));
+        (table.schema(), table.block(&rows))
+    }
+
+    /// Drops the frames of cycle `now` and of later ones: the run stands there again.
+    pub(crate) fn rewind(&mut self, now: Cycle) {
+        self.rows.retain(|row| row.cycle < now);
+        self.first = self.first.filter(|&first| first < now);
+        // Any frame before serves: none is taken twice.
+        self.last = self.first;
     }
 
     fn is_due(&self, run: &dyn Simulation) -> bool {
@@ -54,6 +64,7 @@ impl Film for FrameRows {
         // Whoever advances a run in small steps looks at it more often than frames are due.
         if self.is_due(run) {
             self.last = Some(run.cycle());
+            self.first = self.first.or(self.last);
             self.rows.extend(rows(run.frame(Look::BODIES)));
         }
         Ok(())

@@ -1,0 +1,104 @@
+//! The way back of a run: checkpoints, and what was recorded on the way that it did not go in the end.
+
+use super::Journey;
+use sidestep::kernel::Cycle;
+use sidestep::kernel::checkpoint::{CheckpointError, decode_header};
+use sidestep::kernel::control::{OrderError, Orders};
+use sidestep::kernel::ports::RecordError;
+
+/// The reason why a run does not go on from a checkpoint.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RestoreError {
+    /// The checkpoint is damaged, or belongs to something else.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// Rows that wait cannot be handed over.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// What was stored cannot be taken back.
+    #[error(
+        "the run goes to {place}, which holds one past: it stands at cycle {now}, and the checkpoint is of {state}"
+    )]
+    Stored {
+        /// The folder or file.
+        place: String,
+        /// The cycle at which the run stands.
+        now: Cycle,
+        /// The cycle of the checkpoint, in words.
+        state: String,
+    },
+}
+
+impl Journey {
+    /// Orders something of agents for the next cycle, see [`order`](sidestep::kernel::Simulation::order).
+    ///
+    /// # Errors
+    /// An order that cannot be obeyed; nothing is ordered then.
+    pub fn order(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
+        self.run.order(orders)?;
+        self.ordered_at = Some(self.run.cycle());
+        Ok(())
+    }
+
+    /// Returns the present state as bytes for [`Self::restore`].
+    ///
+    /// # Errors
+    /// When rows that wait cannot be handed over.
+    pub fn checkpoint(&mut self) -> Result<Vec<u8>, RecordError> {
+        let (bytes, now) = (self.run.checkpoint(), self.run.cycle());
+        // Orders that wait have their rows already, and both come back together.
+        if let Some(rows) = self.rows.as_mut().filter(|_| self.ordered_at == Some(now)) {
+            self.run.record(rows)?;
+            rows.mark(&bytes, now);
+        }
+        Ok(bytes)
+    }
+
+    /// Goes on from a checkpoint of the same scenario. Rows and frames that are kept in memory lose those of its cycle and
+    /// of later ones, as if the run had never gone there; those that were taken before are the caller's.
+    ///
+    /// # Errors
+    /// When the checkpoint is damaged or belongs to another world, scenario or version, or when the run is stored in a
+    /// folder or file and the checkpoint is not its present state. The run stays as it is then.
+    pub fn restore(&mut self, checkpoint: &[u8]) -> Result<(), RestoreError> {
+        let is_kept = self.rows.is_some() || self.recording.is_some() || self.film.is_some();
+        if is_kept && self.run.checkpoint() == checkpoint {
+            return Ok(());
+        }
+        self.check_is_free(checkpoint)?;
+        if let Some(rows) = &mut self.rows {
+            // Rows that wait belong to the cycles that are over.
+            self.run.record(rows)?;
+        }
+        self.run.restore(checkpoint)?;
+        self.forget(checkpoint);
+        Ok(())
+    }
+
+    /// Refuses another state of a run that is stored: it would be stored after what followed it.
+    fn check_is_free(&self, checkpoint: &[u8]) -> Result<(), RestoreError> {
+        let folder = self.recording.as_ref();
+        let folder = folder.map(|it| format!("the folder {}", it.folder().path().display()));
+        let film = self.film.as_ref().map(|_| "an MCAP file".to_string());
+        let Some(place) = folder.or(film) else { return Ok(()) };
+        let (now, its) = (self.run.cycle(), decode_header(checkpoint)?.cycle);
+        let state = match its == now {
+            true => "another state there".to_string(),
+            false => format!("cycle {its}"),
+        };
+        Err(RestoreError::Stored { place, now, state })
+    }
+
+    /// Drops the rows and frames from the present cycle on, after a checkpoint was restored.
+    fn forget(&mut self, checkpoint: &[u8]) {
+        let now = self.run.cycle();
+        if let Some(rows) = &mut self.rows {
+            let has_orders = rows.rewind(checkpoint, now);
+            self.ordered_at = has_orders.then_some(now);
+        }
+        if let Some(frames) = &mut self.frames {
+            frames.rewind(now);
+        }
+    }
+}
