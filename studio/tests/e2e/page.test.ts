@@ -331,6 +331,16 @@ describe("results", () => {
     await page.locator("canvas.picture").waitFor();
   });
 
+  test("a chart offers no metric that another one shows", async () => {
+    await visit("robots");
+    const charts = page.getByRole("combobox", { name: "Metric" });
+    await charts.nth(2).waitFor();
+    expect(await charts.first().getByRole("option").count()).toBe(2);
+    await charts.first().selectOption({ index: 1 });
+    expect(await charts.count()).toBe(3);
+    expect(complaints).toEqual([]);
+  });
+
   test("the picture on the canvas and the tables of a recording are kept as files", async () => {
     await openFile(/robots\.run/);
     await drawn(page);

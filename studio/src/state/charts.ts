@@ -1,0 +1,8 @@
+/** Which metrics a chart may show. */
+
+import type { MetricName } from "../protocol";
+
+/** Those that no other chart shows: each is shown once. */
+export function offered(names: readonly MetricName[], shown: readonly string[], own: string): MetricName[] {
+  return names.filter(({ key }) => key === own || !shown.includes(key));
+}
