@@ -1,6 +1,7 @@
 /** Addresses at which the server makes results of recordings and sweeps: reports, and what can be exported. */
 
-import type { SweepRun } from "../protocol";
+import { problemOf } from "../connection";
+import type { Problem, SweepRun } from "../protocol";
 
 function address(route: string, fields: Record<string, string | number | undefined>): string {
   const given = Object.entries(fields).filter(([, value]) => value !== undefined);
@@ -10,6 +11,13 @@ function address(route: string, fields: Record<string, string | number | undefin
 /** The report of a folder, or a part of it: `html`, `markdown`, `figures`, or the name of a figure. */
 export function reportAddress(path: string, part?: string): string {
   return address("report", { path, as: part });
+}
+
+/** Why there is no result, as the server has said it: place, cause, and help on a line of its own. */
+export function failureOf(path: string, said: string): Problem {
+  const [, place, cause, help] = /^(.*?): ([^]*?)(?:\nhelp: ([^]*))?$/.exec(said.trim()) ?? [];
+  if (cause === undefined || help === undefined) return problemOf(path, said.trim() || "the server gives no report", "try it again");
+  return problemOf(place || path, cause, help);
 }
 
 /** A run that was asked for in the page of a report: a variant by its name or its number, and a seed or none. */

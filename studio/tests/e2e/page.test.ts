@@ -341,6 +341,17 @@ describe("results", () => {
     expect(complaints).toEqual([]);
   });
 
+  test("why there is no report stands in its place, and another session shows its picture instead", async () => {
+    await openFile(/broken\.run/);
+    await page.getByRole("tab", { name: "Report" }).click();
+    await page.getByText("it is cut off").waitFor();
+    await page.getByText("record it again").waitFor();
+    await openFile(/^chain\.toml/);
+    await page.getByRole("tab", { name: "View", selected: true }).waitFor();
+    await page.getByRole("button", { name: "Fit" }).waitFor();
+    await page.getByRole("region", { name: "Charts" }).waitFor();
+  });
+
   test("the picture on the canvas and the tables of a recording are kept as files", async () => {
     await openFile(/robots\.run/);
     await drawn(page);

@@ -240,7 +240,7 @@ export class FakeServer {
     if (call.do === "runs") return runs();
     if (call.do === "open") {
       const { what } = call;
-      const key = what.kind === "fleet" ? "airspace" : what.kind === "new" ? what.world : what.path.replace(/\.\w+$/, "");
+      const key = what.kind === "fleet" ? "airspace" : what.kind === "new" ? what.world : what.path.replace("broken", "robots").replace(/\.\w+$/, "");
       const world = WORLDS[key]?.();
       if (!world) throw { ...problemOf("there is no such scenario", "choose another one"), place: key };
       if (what.kind === "recording") world.scene.is_recording = true;
@@ -268,6 +268,10 @@ export class FakeServer {
 function result(url: string, response: ServerResponse): void {
   const fields = new URL(url, "http://x").searchParams;
   const part = fields.get("as");
+  // What is refused may be shown in no frame.
+  if (fields.get("path") === "broken.run") {
+    return void response.writeHead(422, { "content-type": "text/plain", "x-frame-options": "DENY" }).end("broken.run/run.json: it is cut off\nhelp: record it again\n");
+  }
   if (part === "figures") return void response.writeHead(200, { "content-type": "application/json" }).end('["01-speed"]');
   const policy = "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; frame-ancestors 'self'";
   const kept = part === null ? {} : { "content-disposition": `attachment; filename="made-up.${part}"` };
@@ -293,6 +297,7 @@ function files(folder: string | null): Answer {
     ...["robots", "chain", "airspace"].map((name) => ({ path: `${name}.toml`, name: `${name}.toml`, kind: "scenario" as const, about: "made up" })),
     { path: "nowhere.toml", name: "nowhere.toml", kind: "scenario", about: "cannot be opened" },
     { path: "robots.run", name: "robots.run", kind: "run", about: "made up" },
+    { path: "broken.run", name: "broken.run", kind: "run", about: "cut off" },
     { path: "chain.mcap", name: "chain.mcap", kind: "recording", about: "made up" },
     { path: "sweep", name: "sweep", kind: "sweep", about: "40 runs" },
   ] };
@@ -320,7 +325,7 @@ function act(call: Exclude<Call, { do: "files" | "open" | "runs" | "schema" | "s
     case "inspect": return { is: "inspection", ...run.world.inspect(call.who, run.cycle) };
     case "metrics": return metrics(run, call.from);
     case "events": {
-      const all = run.world.events(call.from, call.until);
+      const all = run.world.events(call.from, call.until).slice(call.skip ?? 0);
       return { is: "events", entries: all.slice(0, call.most), left_out: Math.max(0, all.length - call.most), known_until: call.until };
     }
     case "tables": return { is: "tables", names: run.world.scene.is_recording ? ["events", "trajectories"] : [] };

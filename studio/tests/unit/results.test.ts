@@ -1,7 +1,7 @@
 /** Addresses and names of results hold whatever folders and scenarios are called. */
 
 import { expect, test } from "vitest";
-import { exportAddress, foundRun, plainName, reportAddress, wantedRun } from "../../src/state/results";
+import { exportAddress, failureOf, foundRun, plainName, reportAddress, wantedRun } from "../../src/state/results";
 
 test("paths are written so that the server reads them as they are", () => {
   expect(reportAddress("runs/a & b/ü%")).toBe("/report?path=runs%2Fa%20%26%20b%2F%C3%BC%25");
@@ -26,4 +26,9 @@ test("what a report's page asks for is read with care, and found by name or numb
   expect(found({ opens: { variant: "0001" } })).toBe(runs[2]);
   expect(found({ opens: { variant: "0009" } })).toBeUndefined();
   expect([null, 3, "opens", {}, { opens: null }, { opens: { variant: 3 } }].map(found)).toEqual(Array(6).fill(null));
+});
+
+test("why there is no result is read from what the server has said", () => {
+  expect(failureOf("r", "r/run.json: it is cut off: 3 bytes\nhelp: record it again\n")).toMatchObject({ place: "r/run.json", cause: "it is cut off: 3 bytes", remedy: "record it again" });
+  expect(failureOf("r", "Only the studio's own page may ask.\n")).toMatchObject({ place: "r", cause: "Only the studio's own page may ask." });
 });
