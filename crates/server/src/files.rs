@@ -4,7 +4,10 @@ use crate::encode::problem;
 use crate::protocol::{FileEntry, FileKind, Problem};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
+use serde_json::Value;
+use sidestep::kernel::InputError;
 use sidestep::scenario::{Source, Worlds};
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,7 +21,11 @@ const MOST_FOREIGN: usize = 50;
 
 /// The folders and files that may be read.
 #[derive(Debug, Clone)]
-pub(crate) struct Files(Arc<Vec<Root>>);
+pub(crate) struct Files {
+    roots: Arc<Vec<Root>>,
+    /// Real places elsewhere that scenarios name which were named at start.
+    granted: Arc<BTreeSet<PathBuf>>,
+}
 
 /// A folder or a file that was named at start.
 #[derive(Debug)]
@@ -62,12 +69,26 @@ impl Files {
             Ok(Root { path: path.clone(), real })
         };
         let roots: Result<Vec<Root>, Problem> = named.iter().map(root).collect();
-        Ok(Self(Arc::new(roots?)))
+        Ok(Self { roots: Arc::new(roots?), granted: Arc::default() })
+    }
+
+    /// Allows what these scenarios name as well: whoever starts the studio with one of them wants it to run. What pages
+    /// write later names nothing elsewhere beyond that.
+    pub(crate) fn with_named_by<'p>(self, scenarios: impl Iterator<Item = &'p Path>) -> Self {
+        let sources = scenarios.filter_map(|path| Source::read(path, &[]).ok());
+        let named = sources.flat_map(|source| {
+            let names = named(&source).unwrap_or_default();
+            names
+                .into_iter()
+                .filter_map(move |name| source.path(Path::new(&name)).canonicalize().ok())
+        });
+        let granted = named.filter(|real| !self.holds(real)).collect();
+        Self { granted: Arc::new(granted), ..self }
     }
 
     /// Returns the first folder that was named.
     pub(crate) fn first_folder(&self) -> PathBuf {
-        let folder = self.0.iter().find(|root| root.real.is_dir());
+        let folder = self.roots.iter().find(|root| root.real.is_dir());
         folder.map_or_else(PathBuf::new, |root| root.path.clone())
     }
 
@@ -92,33 +113,24 @@ impl Files {
         }
     }
 
-    /// Whether a path without links is below the folders.
+    /// Whether a path without links is below the folders, or is named by a scenario that was named at start.
     pub(crate) fn holds(&self, real: &Path) -> bool {
-        self.below_root(real).is_some()
+        self.below_root(real).is_some() || self.granted.contains(real)
     }
 
     /// Returns a path without links relative to the folder that it is below.
     pub(crate) fn below_root<'p>(&self, real: &'p Path) -> Option<&'p Path> {
-        self.0.iter().find_map(|root| real.strip_prefix(&root.real).ok())
+        self.roots.iter().find_map(|root| real.strip_prefix(&root.real).ok())
     }
 
-    /// Refuses a text of a page that names a file elsewhere: whatever key it is, a value that is the path of
-    /// something that is there.
+    /// Refuses a text that names a file elsewhere: whatever key it is, a value that is the path of something that is
+    /// there.
     ///
     /// # Errors
     /// With the value.
     pub(crate) fn check_text(&self, source: &Source) -> Result<(), Problem> {
-        let table: serde_json::Value = source.parse().map_err(|e| problem(&e))?;
-        let mut open = vec![&table];
-        while let Some(value) = open.pop() {
-            match value {
-                serde_json::Value::Array(items) => open.extend(items),
-                serde_json::Value::Object(members) => open.extend(members.values()),
-                serde_json::Value::String(text) => self.check_value(source, text)?,
-                _ => {}
-            }
-        }
-        Ok(())
+        let names = named(source).map_err(|e| problem(&e))?;
+        names.iter().try_for_each(|name| self.check_value(source, name))
     }
 
     fn check_value(&self, source: &Source, text: &str) -> Result<(), Problem> {
@@ -140,7 +152,7 @@ impl Files {
     ) -> Result<Vec<FileEntry>, Problem> {
         let Some(folder) = folder else {
             let named = |root: &Root| entry(&root.path, worlds, &mut 0);
-            return Ok(self.0.iter().filter_map(named).collect());
+            return Ok(self.roots.iter().filter_map(named).collect());
         };
         let path = self.find(folder)?;
         let told = |e: std::io::Error| {
@@ -158,6 +170,24 @@ impl Files {
         entries.sort_by_key(|entry| (entry.kind != FileKind::Folder, entry.name.clone()));
         Ok(entries)
     }
+}
+
+/// Returns all strings in a text, any of which may be the path of a file.
+///
+/// # Errors
+/// When it is no TOML.
+fn named(source: &Source) -> Result<Vec<String>, InputError> {
+    let mut open = vec![source.parse::<Value>()?];
+    let mut names = Vec::new();
+    while let Some(value) = open.pop() {
+        match value {
+            Value::Array(items) => open.extend(items),
+            Value::Object(members) => open.extend(members.into_iter().map(|(_, value)| value)),
+            Value::String(text) => names.push(text),
+            _ => {}
+        }
+    }
+    Ok(names)
 }
 
 /// Returns what is to be told of a file or folder; `None` of what cannot be opened. `foreign` counts how many files
@@ -311,5 +341,20 @@ mod tests {
         assert_eq!(check("a = [{ b = \"../out/secret.toml\" }]"), Err("../out/secret.toml".into()));
         assert_eq!(check("a = \"/etc/passwd\""), Err("/etc/passwd".into()));
         assert_eq!(check("a = = 1"), Err("s.toml".into()));
+    }
+
+    #[test]
+    fn what_a_scenario_names_that_was_named_at_start_may_be_read_and_nothing_beside_it() {
+        let (folder, files) = places();
+        let path = |name: &str| folder.path().join(name).display().to_string();
+        fs::write(path("out/map.txt"), "....").expect("written");
+        fs::write(path("in/a.toml"), "map = { file = \"../out/map.txt\" }\n").expect("written");
+        let files = files.with_named_by([Path::new(&path("in/a.toml"))].into_iter());
+        let check =
+            |text: &str| files.check_text(&Source::new("s.toml", text, folder.path().join("in")));
+        assert_eq!(check("a = \"../out/map.txt\""), Ok(()));
+        assert!(files.find(&path("out/map.txt")).is_ok());
+        assert!(check("a = \"../out/secret.toml\"").is_err() && files.find(&path("out")).is_err());
+        assert!(files.target(&path("out/map.txt")).is_err(), "it may be read, not written");
     }
 }

@@ -114,7 +114,9 @@ impl Studio {
                 .iter()
                 .map(|screen| Named { kind: "fleet".into(), path: screen.endpoint.clone() }),
         );
+        let scenarios = open.iter().filter(|named| named.kind == "scenario");
         let files = Files::below(&folders).map_err(|p| input(&p))?;
+        let files = files.with_named_by(scenarios.map(|named| Path::new(&named.path)));
         let listener = listen::bind(&options.host, options.port)?;
         let failed = |e: std::io::Error| {
             Error::stopped(

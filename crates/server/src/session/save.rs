@@ -1,7 +1,9 @@
 //! Scenarios that are saved: whole or not at all, and never over what somebody else wrote meanwhile.
 
+use super::stage::Means;
 use crate::protocol::{Answer, Problem};
 use crate::write::{Target, replaced};
+use serde_json::Value;
 use sidestep::scenario::Source;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -44,6 +46,28 @@ pub(super) fn own_path(own: Option<&OwnFile>, place: &str) -> Result<String, Pro
         let remedy = "give a name that ends in .toml";
         Problem::new(place, "the scenario is in no file yet", remedy)
     })
+}
+
+/// Refuses a text that would let a page read what it may not, and a new file that is no scenario. A text that is no
+/// TOML may be saved: nobody reads anything else because of it.
+///
+/// # Errors
+/// With the file that it names, or what it has to be.
+pub(super) fn writable(means: &Means, target: &Target, source: &Source) -> Result<(), Problem> {
+    let Ok(values) = source.parse::<Value>() else { return Ok(()) };
+    means.files.check_text(source)?;
+    match target.real.exists() || values["world"].is_string() {
+        true => Ok(()),
+        false => {
+            let worlds = means.worlds.names().join(", ");
+            let remedy = format!("begin it with world = \"...\", one of {worlds}");
+            Err(Problem::new(
+                source.place.as_str(),
+                "would be no scenario: it has no `world`",
+                remedy,
+            ))
+        }
+    }
 }
 
 /// Writes a text into a file, unless the file holds something else than the session knows of.

@@ -1,6 +1,6 @@
 //! The run of a session, and its origin.
 
-use super::save::{OwnFile, Shown, own_path, saved};
+use super::save::{OwnFile, Shown, own_path, saved, writable};
 use super::showing::Showcase;
 use crate::encode::problem;
 use crate::files::Files;
@@ -109,6 +109,7 @@ impl Stage {
         seed: Option<u64>,
         own: Option<OwnFile>,
     ) -> Result<Self, Problem> {
+        check_names(&means, &source)?;
         let run = started(&means, &source, seed)?;
         let until = run.plan().cycles;
         let shown = Shown::default();
@@ -148,7 +149,11 @@ impl Stage {
         }
         let (source, seed) = match text {
             Some(text) => (other_text(&self.means, &self.source, text)?, seed),
-            None => (self.source.clone(), seed.or(self.seed)),
+            None => {
+                // Saving it elsewhere has changed what its paths lead to.
+                check_names(&self.means, &self.source)?;
+                (self.source.clone(), seed.or(self.seed))
+            }
         };
         self.run = started(&self.means, &source, seed)?;
         (self.until, self.source, self.seed) = (self.run.plan().cycles, source, seed);
@@ -185,9 +190,12 @@ impl Stage {
             None => own_path(self.own.as_ref(), &self.source.place)?,
         };
         let target = self.means.files.target(&path)?;
+        let folder = target.path.parent().map(Path::to_path_buf).unwrap_or_default();
+        let source = Source::new(path, text, folder);
+        writable(&self.means, &target, &source)?;
+        let Source { text, folder, .. } = source;
         let answer = saved(&target, self.own.as_ref(), &text, over)?;
         if let Answer::Saved { place } = &answer {
-            let folder = target.path.parent().map(Path::to_path_buf).unwrap_or_default();
             (self.source.place, self.source.folder) = (place.clone(), folder);
             self.own = Some(OwnFile { path: target.path, text });
             self.shown.set(&self.source);
@@ -308,6 +316,14 @@ pub(super) fn other_text(means: &Means, source: &Source, text: String) -> Result
     let other = Source { text, ..source.clone() };
     means.files.check_text(&other)?;
     Ok(other)
+}
+
+/// Refuses a scenario that names files elsewhere: where pages may write, one of them may have written it.
+///
+/// # Errors
+/// With the file.
+fn check_names(means: &Means, source: &Source) -> Result<(), Problem> {
+    if means.read_only { Ok(()) } else { means.files.check_text(source) }
 }
 
 fn started(

@@ -1,0 +1,108 @@
+//! What a page saves: it reads nothing elsewhere by it, and makes nothing but scenarios.
+
+use super::*;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const MAP: &str = "type octile\nheight 4\nwidth 8\nmap\n........\n........\n........\n........\n";
+
+/// A folder `in` with a scenario, and a map beside it that may not be read.
+fn places() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, text) in [("in/s.toml", ROBOTS), ("out/secret.map", MAP)] {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+        fs::write(path, text).expect("written");
+    }
+    folder
+}
+
+fn naming(map: &str) -> String {
+    format!(
+        "format = 1\nworld = \"robots\"\ncycles = 10\n[map]\nfile = \"{map}\"\nbox_size_m = 0.25\n\
+         [[robots]]\ncount = 1\n"
+    )
+}
+
+fn scenario(path: &Path) -> Subject {
+    Subject::Scenario { path: path.display().to_string() }
+}
+
+/// A page that has opened the scenario, and the folder that may be read.
+fn page() -> (Page, PathBuf) {
+    let folder = places();
+    let inside = folder.path().join("in");
+    let (page, opened) = Page::of(means(&inside, 1), scenario(&inside.join("s.toml")), folder);
+    assert!(opened.get("problem").is_none(), "{opened}");
+    (page, inside)
+}
+
+impl Page {
+    fn save(&mut self, text: &str, to: Option<&Path>, over: bool) -> Value {
+        let to = to.map(|path| path.display().to_string());
+        let call = json!({
+            "do": "save", "session": 1, "text": text, "to": to, "over": over
+        });
+        let id = self.send(call);
+        self.wait(id)
+    }
+}
+
+#[test]
+fn nothing_elsewhere_is_read_by_a_text_that_is_saved_and_opened() {
+    let (mut page, inside) = page();
+    let stolen = inside.join("stolen.toml");
+    let reply = page.save(&naming("../out/secret.map"), Some(&stolen), false);
+    assert_eq!(reply["problem"]["place"], "../out/secret.map", "{reply}");
+    assert!(!stolen.exists());
+    // What is named where the session is, is named elsewhere from a folder below.
+    let deep = inside.join("deep/x.toml");
+    fs::create_dir(inside.join("deep")).expect("made");
+    let reply = page.save(&naming("../../out/secret.map"), Some(&deep), false);
+    assert_eq!(reply["problem"]["place"], "../../out/secret.map", "{reply}");
+    fs::write(&stolen, naming("../out/secret.map")).expect("written");
+    let open =
+        |means: Means| Page::of(means, scenario(&stolen), tempfile::tempdir().expect("a folder")).1;
+    let reply = open(means(&inside, 1));
+    assert_eq!(reply["problem"]["place"], "../out/secret.map", "{reply}");
+    let reads = Means { read_only: true, ..means(&inside, 1) };
+    assert_eq!(open(reads)["answer"]["is"], "opened", "no page can have written it");
+    let own = means(&inside, 1);
+    let named = Means { files: own.files.with_named_by([&*stolen].into_iter()), ..own };
+    assert_eq!(open(named)["answer"]["is"], "opened", "it was named at start");
+}
+
+#[test]
+fn what_is_read_stays_inside_where_a_session_goes_on_in_another_folder() {
+    let folder = places();
+    let inside = folder.path().join("in");
+    fs::create_dir(inside.join("deep")).expect("made");
+    for map in ["in/m.map", "m.map"] {
+        fs::write(folder.path().join(map), MAP).expect("written");
+    }
+    let deep = inside.join("deep/x.toml");
+    fs::write(&deep, naming("../m.map")).expect("written");
+    let (mut page, opened) = Page::of(means(&inside, 1), scenario(&deep), folder);
+    assert_eq!(opened["answer"]["is"], "opened");
+    let saved = page.save(ROBOTS, Some(&inside.join("y.toml")), false);
+    assert_eq!(saved["answer"]["is"], "saved");
+    let id = page.send(json!({ "do": "restart", "session": 1, "seed": null, "text": null }));
+    assert_eq!(page.wait(id)["problem"]["place"], "../m.map");
+}
+
+#[test]
+fn a_new_file_is_a_scenario_or_a_text_that_cannot_be_read_yet() {
+    let (mut page, inside) = page();
+    let other = inside.join("Cargo.toml");
+    let reply = page.save("hello = 1\n", Some(&other), false);
+    assert!(reply["problem"]["cause"].as_str().is_some_and(|c| c.contains("world")), "{reply}");
+    assert!(!other.exists());
+    assert_eq!(
+        page.save("world = = 1", Some(&inside.join("half.toml")), false)["answer"]["is"],
+        "saved"
+    );
+    assert_eq!(
+        page.save("hello = 1\n", Some(&inside.join("half.toml")), false)["answer"]["is"],
+        "saved"
+    );
+}
