@@ -259,7 +259,7 @@ export class Draft {
     await this.#queue;
     const { text } = this;
     const file = to ?? this.#file;
-    const answer = await this.session.tell({ do: "save", text, to: file, over });
+    const answer = await this.session.tell({ do: "save", text, to: file, base: this.saved, over });
     if (answer?.is === "differs") {
       this.theirs = answer.text;
       this.#wanted = file;

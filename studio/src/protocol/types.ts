@@ -178,7 +178,12 @@ text: string,
  */
 to: string | null,
 /**
- * Whether a file is replaced that holds something else than this session has read or written.
+ * The text that the file holds as far as the page knows; without it the one that this session has read or
+ * written, which another program may have changed before a page was connected again.
+ */
+base: string | null,
+/**
+ * Whether a file is replaced that holds something else.
  */
 over: boolean, } | { "do": "schema",
 /**

@@ -5,6 +5,7 @@ import type { Socket } from "../../src/connection";
 import type { Standing } from "../../src/enter";
 import type { Call, Notice, Scene, Status } from "../../src/protocol";
 import { encodeFrame } from "../fake/encode";
+import { draftOf } from "../../src/edit/draft.svelte";
 import { Studio } from "../../src/state/studio.svelte";
 
 const SCENE = { world: "robots", name: "Hall", dimensions: 2, cycle_s: 0.1, is_recording: false, floor: null, bodies: [] } as unknown as Scene;
@@ -169,6 +170,18 @@ test("a server that dies while sessions are reopened is not told to be connected
   await line().answer("seek", { is: "done" });
   expect(studio.banner).toEqual({ words: "Connected again; reopened Hall at cycle 345.", isBad: false });
   expect([line().calls("play").length, session().ended]).toEqual([1, null]);
+});
+
+test("what is saved after a loss names the text that the page knows, not that of the file by now", async () => {
+  const draft = draftOf(session());
+  await settled();
+  await line().answer("source", { is: "source", place: "s.toml", text: "a = 1", read_only: false });
+  await lose();
+  await back();
+  await line().answer("open", OPENED);
+  void draft.save(null, false);
+  await settled();
+  expect(line().calls("save")).toEqual([{ do: "save", session: 1, text: "a = 1", to: null, base: "a = 1", over: false }]);
 });
 
 test("what cannot be opened again is told, and opened the next time", async () => {

@@ -159,7 +159,10 @@ pub enum Call {
         text: String,
         /// The path of the file; the session's own without it.
         to: Option<String>,
-        /// Whether a file is replaced that holds something else than this session has read or written.
+        /// The text that the file holds as far as the page knows; without it the one that this session has read or
+        /// written, which another program may have changed before a page was connected again.
+        base: Option<String>,
+        /// Whether a file is replaced that holds something else.
         over: bool,
     },
     /// Asks for the JSON Schema of a world's scenarios.

@@ -6,6 +6,7 @@ use super::inspect::inspection;
 use super::memory::Memory;
 use super::pace::{Pace, Rate};
 use super::scout::Scout;
+use super::save::Wish;
 use super::showing::Showing;
 use super::stage::Stage;
 use super::viewer::{MOST_SCANNING, Viewer};
@@ -205,7 +206,9 @@ impl Player {
                 let (place, text) = (source.place.clone(), source.text.clone());
                 Ok(Answer::Source { place, text, read_only: self.stage.is_fixed() })
             }
-            Call::Save { text, to, over, .. } => self.stage.save(text, to, over),
+            Call::Save { text, to, base, over, .. } => {
+                self.stage.save(text, to, Wish { base, over })
+            }
             Call::Tables { .. } => self.stage.tables().map(|names| Answer::Tables { names }),
             _ => Err(Problem::new("request", "it is not for a session", "report this as a bug")),
         }

@@ -48,6 +48,15 @@ pub(super) fn own_path(own: Option<&OwnFile>, place: &str) -> Result<String, Pro
     })
 }
 
+/// The way in which a page wants a text saved.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Wish {
+    /// The text that the page believes the file holds; what the session has read or written without it.
+    pub(super) base: Option<String>,
+    /// Whether the file is replaced whatever it holds.
+    pub(super) over: bool,
+}
+
 /// Refuses a text that would let a page read what it may not, and a new file that is no scenario. A text that is no
 /// TOML may be saved: nobody reads anything else because of it.
 ///
@@ -70,7 +79,7 @@ pub(super) fn writable(means: &Means, target: &Target, source: &Source) -> Resul
     }
 }
 
-/// Writes a text into a file, unless the file holds something else than the session knows of.
+/// Writes a text into a file, unless the file holds something else than the page knows of.
 ///
 /// # Errors
 /// When it cannot be written; then the file is as it was.
@@ -78,14 +87,16 @@ pub(super) fn saved(
     target: &Target,
     own: Option<&OwnFile>,
     text: &str,
-    over: bool,
+    wish: &Wish,
 ) -> Result<Answer, Problem> {
-    let known = own.filter(|own| is_same(&own.path, target)).map(|own| own.text.as_str());
+    let own = own.filter(|own| is_same(&own.path, target)).map(|own| own.text.as_str());
+    // A page that was connected again knows another text than its new session has read.
+    let known = wish.base.as_deref().or(own);
     let may_replace = |found: Option<&str>| match found {
         None => true,
-        Some(found) => over || known == Some(found) || found == text,
+        Some(found) => wish.over || known == Some(found) || found == text,
     };
-    match replaced(target, text, known.is_some(), may_replace)? {
+    match replaced(target, text, own.is_some(), may_replace)? {
         None => Ok(Answer::Saved { place: target.path.display().to_string() }),
         Some(text) => Ok(Answer::Differs { text }),
     }

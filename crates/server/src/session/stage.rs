@@ -1,6 +1,6 @@
 //! The run of a session, and its origin.
 
-use super::save::{OwnFile, Shown, own_path, saved, writable};
+use super::save::{OwnFile, Shown, Wish, own_path, saved, writable};
 use super::showing::Showcase;
 use crate::encode::problem;
 use crate::files::Files;
@@ -168,7 +168,7 @@ impl Stage {
         &mut self,
         text: String,
         to: Option<String>,
-        over: bool,
+        wish: Wish,
     ) -> Result<Answer, Problem> {
         if self.means.read_only {
             let remedy = "start the studio without --read-only";
@@ -194,7 +194,7 @@ impl Stage {
         let source = Source::new(path, text, folder);
         writable(&self.means, &target, &source)?;
         let Source { text, folder, .. } = source;
-        let answer = saved(&target, self.own.as_ref(), &text, over)?;
+        let answer = saved(&target, self.own.as_ref(), &text, &wish)?;
         if let Answer::Saved { place } = &answer {
             (self.source.place, self.source.folder) = (place.clone(), folder);
             self.own = Some(OwnFile { path: target.path, text });

@@ -1,4 +1,4 @@
-//! What a page saves: it reads nothing elsewhere by it, and makes nothing but scenarios.
+//! What a page saves: it reads nothing elsewhere by it, makes nothing but scenarios, and loses nobody's changes.
 
 use super::*;
 use std::fs;
@@ -38,10 +38,10 @@ fn page() -> (Page, PathBuf) {
 }
 
 impl Page {
-    fn save(&mut self, text: &str, to: Option<&Path>, over: bool) -> Value {
+    fn save(&mut self, text: &str, to: Option<&Path>, base: Option<&str>, over: bool) -> Value {
         let to = to.map(|path| path.display().to_string());
         let call = json!({
-            "do": "save", "session": 1, "text": text, "to": to, "over": over
+            "do": "save", "session": 1, "text": text, "to": to, "base": base, "over": over
         });
         let id = self.send(call);
         self.wait(id)
@@ -52,13 +52,13 @@ impl Page {
 fn nothing_elsewhere_is_read_by_a_text_that_is_saved_and_opened() {
     let (mut page, inside) = page();
     let stolen = inside.join("stolen.toml");
-    let reply = page.save(&naming("../out/secret.map"), Some(&stolen), false);
+    let reply = page.save(&naming("../out/secret.map"), Some(&stolen), None, false);
     assert_eq!(reply["problem"]["place"], "../out/secret.map", "{reply}");
     assert!(!stolen.exists());
     // What is named where the session is, is named elsewhere from a folder below.
     let deep = inside.join("deep/x.toml");
     fs::create_dir(inside.join("deep")).expect("made");
-    let reply = page.save(&naming("../../out/secret.map"), Some(&deep), false);
+    let reply = page.save(&naming("../../out/secret.map"), Some(&deep), None, false);
     assert_eq!(reply["problem"]["place"], "../../out/secret.map", "{reply}");
     fs::write(&stolen, naming("../out/secret.map")).expect("written");
     let open =
@@ -84,7 +84,7 @@ fn what_is_read_stays_inside_where_a_session_goes_on_in_another_folder() {
     fs::write(&deep, naming("../m.map")).expect("written");
     let (mut page, opened) = Page::of(means(&inside, 1), scenario(&deep), folder);
     assert_eq!(opened["answer"]["is"], "opened");
-    let saved = page.save(ROBOTS, Some(&inside.join("y.toml")), false);
+    let saved = page.save(ROBOTS, Some(&inside.join("y.toml")), None, false);
     assert_eq!(saved["answer"]["is"], "saved");
     let id = page.send(json!({ "do": "restart", "session": 1, "seed": null, "text": null }));
     assert_eq!(page.wait(id)["problem"]["place"], "../m.map");
@@ -94,15 +94,30 @@ fn what_is_read_stays_inside_where_a_session_goes_on_in_another_folder() {
 fn a_new_file_is_a_scenario_or_a_text_that_cannot_be_read_yet() {
     let (mut page, inside) = page();
     let other = inside.join("Cargo.toml");
-    let reply = page.save("hello = 1\n", Some(&other), false);
+    let reply = page.save("hello = 1\n", Some(&other), None, false);
     assert!(reply["problem"]["cause"].as_str().is_some_and(|c| c.contains("world")), "{reply}");
     assert!(!other.exists());
     assert_eq!(
-        page.save("world = = 1", Some(&inside.join("half.toml")), false)["answer"]["is"],
+        page.save("world = = 1", Some(&inside.join("half.toml")), None, false)["answer"]["is"],
         "saved"
     );
     assert_eq!(
-        page.save("hello = 1\n", Some(&inside.join("half.toml")), false)["answer"]["is"],
+        page.save("hello = 1\n", Some(&inside.join("half.toml")), None, false)["answer"]["is"],
         "saved"
     );
+}
+
+#[test]
+fn a_file_that_changed_while_its_page_was_cut_off_is_not_replaced_unasked() {
+    let (mut page, inside) = page();
+    let path = inside.join("s.toml");
+    // The session has read what another program has written since the page read the file.
+    let before = ROBOTS.replace("seed = 5", "seed = 4");
+    let mine = ROBOTS.replace("seed = 5", "seed = 6");
+    let reply = page.save(&mine, None, Some(&before), false);
+    assert_eq!(reply["answer"], json!({ "is": "differs", "text": ROBOTS }));
+    assert_eq!(fs::read_to_string(&path).expect("read"), ROBOTS);
+    assert_eq!(page.save(&mine, None, Some(ROBOTS), false)["answer"]["is"], "saved");
+    assert_eq!(page.save(ROBOTS, None, Some(&before), true)["answer"]["is"], "saved");
+    assert_eq!(fs::read_to_string(&path).expect("read"), ROBOTS);
 }
