@@ -2,6 +2,7 @@
 
 export class Seeker {
   #wish: number | null = null;
+  #going: number | null = null;
   #way: Promise<boolean> | null = null;
   #isSought = false;
   readonly #go: (cycle: number) => Promise<boolean>;
@@ -9,6 +10,11 @@ export class Seeker {
   /** `go` asks the server, and tells whether it came there. */
   constructor(go: (cycle: number) => Promise<boolean>) {
     this.#go = go;
+  }
+
+  /** The cycle to which it is on its way, if it is. */
+  get goal(): number | null {
+    return this.#way === null ? null : (this.#wish ?? this.#going);
   }
 
   /** Goes to a cycle, after the one that is on its way. Tells whether the last wish came true. */
@@ -37,6 +43,7 @@ export class Seeker {
     while (this.#wish !== null) {
       const cycle = this.#wish;
       this.#wish = null;
+      this.#going = cycle;
       isThere = await this.#go(cycle);
     }
     this.#way = null;

@@ -78,6 +78,8 @@ export class Session {
   #isInspecting = false;
   readonly #rewind = new Rewind();
   readonly #seeker = new Seeker((cycle) => this.#seekNow(cycle));
+  /** The last step that is under way. */
+  #stepping: { goal: number } | null = null;
   readonly #missed = new Missed();
   /** Counts what the page asked of the run: a way that was given up for something newer is no problem. */
   #orders = 0;
@@ -309,9 +311,32 @@ export class Session {
   }
 
   step(cycles: number): void {
-    if (cycles < 0) return this.seek(this.shown.cycle + cycles);
+    const from = this.#seeker.goal ?? this.#stepping?.goal ?? this.shown.cycle;
+    if (cycles < 0 || this.#seeker.goal !== null) return this.seek(from + cycles);
     this.#order();
-    void this.tell({ do: "step", cycles });
+    void this.#stepNow(from + cycles, cycles);
+  }
+
+  /** Steps that follow each other faster than they are gone add up, here and at the server. */
+  async #stepNow(goal: number, cycles: number): Promise<void> {
+    const orders = this.#orders;
+    const step = (this.#stepping = { goal });
+    try {
+      await this.#ask({ do: "step", cycles });
+    } catch (error) {
+      if (orders === this.#orders) this.#told(error);
+    } finally {
+      if (this.#stepping === step) this.#stepping = null;
+    }
+  }
+
+  /** The page has closed it: what is under way is nobody's concern any more. */
+  dispose(): void {
+    this.quietly({ do: "close" });
+    this.#order();
+    this.id = 0;
+    this.#waiting.over();
+    for (const timer of [this.#inspectTimer, this.#regrantTimer]) if (timer !== null) clearTimeout(timer);
   }
 
   /** Whatever it does by itself ends with what is asked for now. */

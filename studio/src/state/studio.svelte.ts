@@ -176,7 +176,7 @@ export class Studio {
   }
 
   close(session: Session): void {
-    session.quietly({ do: "close" });
+    session.dispose();
     const at = this.sessions.indexOf(session);
     this.sessions = this.sessions.filter((one) => one !== session);
     if (this.activeKey === session.key) this.activeKey = this.sessions[Math.max(0, at - 1)]?.key ?? 0;

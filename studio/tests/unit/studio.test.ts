@@ -172,6 +172,38 @@ test("a server that dies while sessions are reopened is not told to be connected
   expect([line().calls("play").length, session().ended]).toEqual([1, null]);
 });
 
+test("steps that follow each other faster than they are gone add up, forth and back, and none complains", async () => {
+  show(100);
+  for (let i = 0; i < 3; i++) session().step(10);
+  expect(line().calls("step")).toEqual(Array.from({ length: 3 }, () => ({ do: "step", cycles: 10, session: 1 })));
+  session().step(-1);
+  session().step(-1);
+  session().step(10);
+  expect(line().calls("seek")).toEqual([{ do: "seek", cycle: 129, session: 1 }]);
+  const problem = { place: "cycle 130", cause: "another way was asked for", remedy: "", is_warning: false };
+  for (const { id } of line().asked.filter(({ call }) => call.do === "step")) line().say({ id, problem });
+  await settled();
+  await line().answer("seek", { is: "done" });
+  expect(line().calls("seek")).toEqual([{ do: "seek", cycle: 138, session: 1 }]);
+  expect(studio.problems).toEqual([]);
+});
+
+test("a session that is closed on its way back complains of nothing, and asks for nothing more", async () => {
+  show(500);
+  session().select({ kind: "robot", number: 0, part: null });
+  session().rewind();
+  session().seek(300);
+  session().seek(200);
+  const closed = session();
+  studio.close(closed);
+  expect(line().calls("close")).toEqual([{ do: "close", session: 1 }]);
+  const asked = line().asked.length;
+  const problem = { place: "session", cause: "the session was closed", remedy: "", is_warning: false };
+  for (const { id } of line().asked.splice(0)) line().say({ id, problem });
+  await new Promise((then) => setTimeout(then, 300));
+  expect([asked > 0, line().asked, studio.problems, closed.isMoving]).toEqual([true, [], [], false]);
+});
+
 test("what is saved after a loss names the text that the page knows, not that of the file by now", async () => {
   const draft = draftOf(session());
   await settled();

@@ -48,7 +48,8 @@ pub enum Call {
         /// The session.
         session: SessionId,
     },
-    /// Goes some cycles on and stays paused; answered there.
+    /// Goes some cycles on and stays paused; answered there. Counted from where a way leads that is not gone to its
+    /// end, whose request is then answered at once.
     Step {
         /// The session.
         session: SessionId,

@@ -1,6 +1,7 @@
 //! A run that is played: what it does next, and what it answers.
 
 mod viewers;
+mod way;
 
 use super::inspect::inspection;
 use super::memory::Memory;
@@ -21,19 +22,10 @@ use sidestep::kernel::{Cycle, Interrupt};
 use sidestep_session::Beat;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use way::Errand;
 
 /// The number of events in an answer; whoever wants more asks again.
 const MOST_EVENTS: u32 = 5000;
-
-/// A way to a cycle that a page waits for.
-#[derive(Debug, Clone, Copy)]
-struct Errand {
-    /// The request that is answered on arrival; none of a viewer's.
-    id: Option<u32>,
-    target: Cycle,
-    /// The speed at which the run goes on from there.
-    then: Option<Speed>,
-}
 
 /// A run that is played.
 pub(super) struct Player {
@@ -160,7 +152,7 @@ impl Player {
                 Ok(Answer::Done)
             }
             Call::Step { cycles, .. } => {
-                self.go(Some(id), self.cycle().saturating_add(u64::from(cycles)), None);
+                self.step(id, cycles);
                 return None;
             }
             Call::Seek { cycle, .. } => {
@@ -249,31 +241,6 @@ impl Player {
             self.digest = Some((cycle, self.stage.run.digest().to_string()));
         }
         self.verdict = self.stage.verdict(self.stage.run.as_ref()).or(self.verdict.take());
-    }
-
-    /// Answers the request of a way that is not gone to its end.
-    pub(super) fn give_up(&mut self, cause: &str) {
-        if let Some(Errand { id: Some(id), target, .. }) = self.errand.take() {
-            let place = format!("cycle {target}");
-            self.reply(id, Err(Problem::new(place, cause, "ask again to go there")));
-        }
-    }
-
-    /// Sets out to a cycle, from the nearest place that is known.
-    fn go(&mut self, id: Option<u32>, cycle: Cycle, then: Option<Speed>) {
-        self.give_up("another way was asked for");
-        let target = cycle.min(self.stage.until);
-        (self.state, self.errand) = (State::Seeking, Some(Errand { id, target, then }));
-        let here = self.cycle();
-        let Some((at, checkpoint)) = self.memory.keyframes.before(target) else { return };
-        if target < here || at > here {
-            let run = self.stage.run.as_mut();
-            self.viewer.drain(run, &mut self.memory.log, Instant::now());
-            // A bug ends the session, with what it says.
-            run.restore(checkpoint).unwrap_or_else(|error| panic!("a keyframe: {error}"));
-            self.digest = None;
-            self.viewer.moved();
-        }
     }
 
     /// Does what is due, for some milliseconds at most. Returns how long nothing will be, unless there is a

@@ -12,6 +12,7 @@ use std::time::Instant;
 mod fleets;
 mod recordings;
 mod saving;
+mod ways;
 
 const ROBOTS: &str = "format = 1\nworld = \"robots\"\nseed = 5\ncycles = 600\n[map]\nbox_size_m = 0.25\nascii = \"\"\"\n\
     ..............\n..............\n....##........\n....##........\n..............\n..............\n\"\"\"\n\

@@ -1,0 +1,52 @@
+//! Ways to a cycle: begun, gone on with, and given up.
+
+use super::Player;
+use crate::protocol::{Answer, Problem, Speed, State};
+use sidestep::kernel::Cycle;
+use std::time::Instant;
+
+/// A way to a cycle that a page waits for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Errand {
+    /// The request that is answered on arrival; none of a viewer's.
+    pub(super) id: Option<u32>,
+    pub(super) target: Cycle,
+    /// The speed at which the run goes on from there.
+    pub(super) then: Option<Speed>,
+}
+
+impl Player {
+    /// Answers the request of a way that is not gone to its end.
+    pub(in super::super) fn give_up(&mut self, cause: &str) {
+        if let Some(Errand { id: Some(id), target, .. }) = self.errand.take() {
+            let place = format!("cycle {target}");
+            self.reply(id, Err(Problem::new(place, cause, "ask again to go there")));
+        }
+    }
+
+    /// Goes some cycles on from where it is, or is going to: steps that are asked for faster than they are gone add up.
+    pub(super) fn step(&mut self, id: u32, cycles: u32) {
+        let from = self.errand.map_or(self.cycle(), |errand| errand.target);
+        if let Some(Errand { id: Some(earlier), .. }) = self.errand.take() {
+            self.reply(earlier, Ok(Answer::Done));
+        }
+        self.go(Some(id), from.saturating_add(u64::from(cycles)), None);
+    }
+
+    /// Sets out to a cycle, from the nearest place that is known.
+    pub(super) fn go(&mut self, id: Option<u32>, cycle: Cycle, then: Option<Speed>) {
+        self.give_up("another way was asked for");
+        let target = cycle.min(self.stage.until);
+        (self.state, self.errand) = (State::Seeking, Some(Errand { id, target, then }));
+        let here = self.cycle();
+        let Some((at, checkpoint)) = self.memory.keyframes.before(target) else { return };
+        if target < here || at > here {
+            let run = self.stage.run.as_mut();
+            self.viewer.drain(run, &mut self.memory.log, Instant::now());
+            // A bug ends the session, with what it says.
+            run.restore(checkpoint).unwrap_or_else(|error| panic!("a keyframe: {error}"));
+            self.digest = None;
+            self.viewer.moved();
+        }
+    }
+}
