@@ -4,6 +4,7 @@ use crate::encode::event;
 use crate::protocol::{Answer, Event};
 use sidestep::kernel::Cycle;
 use sidestep::kernel::view::{Entry, Frame};
+use std::ops::Range;
 
 /// The number of events that are kept; further ones are counted.
 const MOST_EVENTS: usize = 100_000;
@@ -98,13 +99,14 @@ impl Chronicle {
         (entries, left_out)
     }
 
-    /// Returns at most so many of the events of some cycles.
-    pub(crate) fn answer(&self, from: Cycle, until: Cycle, most: u32) -> Answer {
-        let start = self.kept.partition_point(|entry| entry.cycle < from);
-        let end = self.kept.partition_point(|entry| entry.cycle < until).max(start);
+    /// Returns at most so many of the events of some cycles, after the first ones that are skipped.
+    pub(crate) fn answer(&self, cycles: Range<Cycle>, skip: u32, most: u32) -> Answer {
+        let start = self.kept.partition_point(|entry| entry.cycle < cycles.start);
+        let end = self.kept.partition_point(|entry| entry.cycle < cycles.end).max(start);
+        let start = start.saturating_add(skip as usize).min(end);
         let entries: Vec<Event> =
             self.kept[start..end].iter().take(most as usize).map(event).collect();
-        let lost = self.lost.iter().filter(|(cycle, _)| (from..until).contains(cycle));
+        let lost = self.lost.iter().filter(|(cycle, _)| cycles.contains(cycle));
         let lost: u64 = lost.map(|(_, count)| count).sum();
         let left_out = (end - start - entries.len()) as u64 + lost;
         Answer::Events { entries, left_out, known_until: self.frontier as f64 }
@@ -136,12 +138,21 @@ mod tests {
         chronicle.note(&mut frame(10, &[1, 5, 9]));
         chronicle.note(&mut frame(6, &[5]));
         chronicle.note(&mut frame(14, &[9, 10, 12]));
-        assert_eq!(cycles(&chronicle.answer(0, 99, 99)), (vec![1.0, 5.0, 9.0, 10.0, 12.0], 0));
-        assert_eq!(cycles(&chronicle.answer(5, 12, 99)), (vec![5.0, 9.0, 10.0], 0));
-        assert_eq!(cycles(&chronicle.answer(0, 99, 2)), (vec![1.0, 5.0], 3));
-        assert_eq!(cycles(&chronicle.answer(9, 3, 2)), (vec![], 0));
+        assert_eq!(cycles(&chronicle.answer(0..99, 0, 99)), (vec![1.0, 5.0, 9.0, 10.0, 12.0], 0));
+        assert_eq!(cycles(&chronicle.answer(5..12, 0, 99)), (vec![5.0, 9.0, 10.0], 0));
+        assert_eq!(cycles(&chronicle.answer(0..99, 0, 2)), (vec![1.0, 5.0], 3));
+        assert_eq!(cycles(&chronicle.answer(Range { start: 9, end: 3 }, 0, 2)), (vec![], 0));
         assert_eq!(chronicle.take_fresh().0.len(), 7, "a frame shows what led to it");
         assert_eq!(chronicle.take_fresh().0.len(), 0);
+    }
+
+    #[test]
+    fn a_cycle_of_more_events_than_an_answer_holds_is_told_in_parts() {
+        let mut chronicle = Chronicle::default();
+        chronicle.note(&mut frame(10, &[3, 3, 3, 3, 3, 7]));
+        assert_eq!(cycles(&chronicle.answer(3..9, 2, 2)), (vec![3.0, 3.0], 2));
+        assert_eq!(cycles(&chronicle.answer(3..9, 4, 2)), (vec![3.0, 7.0], 0));
+        assert_eq!(cycles(&chronicle.answer(3..9, u32::MAX, 2)), (vec![], 0));
     }
 
     #[test]
@@ -154,6 +165,6 @@ mod tests {
             (shown.len(), left_out),
             (MOST_IN_FRAME, (MOST_EVENTS + 7 - MOST_IN_FRAME + 2) as u64)
         );
-        assert_eq!(cycles(&chronicle.answer(0, 9, u32::MAX)).1, 9);
+        assert_eq!(cycles(&chronicle.answer(0..9, 0, u32::MAX)).1, 9);
     }
 }

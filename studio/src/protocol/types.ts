@@ -122,6 +122,10 @@ from: number,
  */
 until: number,
 /**
+ * The number of the first events that are not wanted; none without it.
+ */
+skip: number | null,
+/**
  * The largest number of events.
  */
 most: number, } | { "do": "source",

@@ -5,8 +5,11 @@ import { whoKey } from "../format";
 
 /** Events that the page keeps at most. */
 const MOST_KEPT = 20_000;
-/** Events that one question asks for at most. */
+/** Events that one question asks for at most; the server would give some more. */
 const MOST_ASKED = 2000;
+
+/** Asks for the events from a cycle to before another one, without the first so many of them. */
+type Ask = (from: number, until: number, skip: number, most: number) => Promise<Answer>;
 
 function keyOf(event: Event): string {
   const who = event.who ? whoKey(event.who) : "";
@@ -35,7 +38,7 @@ export class Events {
   }
 
   /** Fetches what has happened before this cycle; one question at a time. */
-  async fetch(until: number, ask: (from: number, until: number, most: number) => Promise<Answer>): Promise<void> {
+  async fetch(until: number, ask: Ask): Promise<void> {
     if (this.#isAsking || until <= this.#asked) return;
     const age = this.#age;
     this.#isAsking = true;
@@ -47,23 +50,26 @@ export class Events {
   }
 
   /** The server answers with the oldest: goes on from the last of them until none is left. */
-  async #fetchAll(age: number, until: number, ask: (from: number, until: number, most: number) => Promise<Answer>): Promise<void> {
-    let most = MOST_ASKED;
+  async #fetchAll(age: number, until: number, ask: Ask): Promise<void> {
+    // Those of the first cycle that earlier answers had no more room for: together, as equal ones are told apart by number.
+    let begun: Event[] = [];
     while (true) {
       const from = this.#asked;
-      const answer = await ask(from, until, most);
+      const answer = await ask(from, until, begun.length, MOST_ASKED);
       if (age !== this.#age || answer.is !== "events") return;
-      this.add(answer.entries);
-      const last = answer.entries.at(-1);
-      if (!last || answer.entries.length < most || answer.left_out === 0) {
+      const told = [...begun, ...answer.entries];
+      const last = told.at(-1);
+      if (!last || answer.entries.length < MOST_ASKED || answer.left_out === 0) {
+        this.add(told);
         // What is left out now is not at the server either: it was never kept.
         this.leftOut += answer.left_out;
         this.#asked = Math.max(from, Math.min(until, answer.known_until));
         return;
       }
-      // The last cycle may be cut; one that fills the whole answer needs a larger one.
-      if (last.cycle > from) this.#asked = last.cycle;
-      else most *= 2;
+      // The last cycle may be cut.
+      begun = told.filter(({ cycle }) => cycle === last.cycle);
+      this.add(told.filter(({ cycle }) => cycle < last.cycle));
+      this.#asked = last.cycle;
     }
   }
 

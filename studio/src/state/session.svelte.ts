@@ -285,7 +285,7 @@ export class Session {
     const cycle = 1 + (this.scene.is_recording ? this.lastCycle : Math.max(this.status.cycle, this.shown.cycle));
     const quiet = (): void => undefined;
     this.events
-      .fetch(cycle, (from, until, most) => this.#ask({ do: "events", from, until, most }))
+      .fetch(cycle, (from, until, skip, most) => this.#ask({ do: "events", from, until, skip, most }))
       .catch(quiet);
     if (withMetrics && !this.isFleet) this.metrics.fetch((from) => this.#ask({ do: "metrics", from })).catch(quiet);
   }

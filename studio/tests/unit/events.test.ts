@@ -8,10 +8,11 @@ function event(cycle: number, number: number): Event {
   return { cycle, level: "info", kind: "contact", who: { kind: "robot", number, part: null }, with: null, at_m: null, value: null, words: "" } as Event;
 }
 
-function server(all: Event[], lost = 0): (from: number, until: number, most: number) => Promise<Answer> {
-  return (from, until, most) => {
-    const there = all.filter(({ cycle }) => cycle >= from && cycle < until);
-    const entries = there.slice(0, most);
+/** The server's answers: of not more than 5000 events, however many are asked for. */
+function server(all: Event[], lost = 0): (from: number, until: number, skip: number, most: number) => Promise<Answer> {
+  return (from, until, skip, most) => {
+    const there = all.filter(({ cycle }) => cycle >= from && cycle < until).slice(skip);
+    const entries = there.slice(0, Math.min(most, 5000));
     return Promise.resolve({ is: "events", entries, left_out: there.length - entries.length + lost, known_until: until });
   };
 }
@@ -26,6 +27,13 @@ test("a cycle of more events than an answer holds is fetched as a whole", async 
   const events = new Events();
   await events.fetch(10, server(Array.from({ length: 4500 }, (_, i) => event(3, i))));
   expect([events.list.length, events.leftOut]).toEqual([4500, 0]);
+});
+
+test("a cycle of more events than any answer holds is fetched as a whole, and what comes after it, too", async () => {
+  const events = new Events();
+  const all = [event(2, 1), ...Array.from({ length: 6000 }, (_, i) => event(3, i % 100)), ...Array.from({ length: 5000 }, (_, i) => event(4 + i, 1))];
+  await events.fetch(9000, server(all));
+  expect([events.list.length, events.leftOut]).toEqual([all.length, 0]);
 });
 
 test("what the server never kept is counted once", async () => {

@@ -102,7 +102,8 @@ pub enum Call {
         /// The number of the first sample wanted.
         from: u32,
     },
-    /// Asks for the events so far between two cycles (`from` is inside, `until` is not), at most `most`.
+    /// Asks for the events so far between two cycles (`from` is inside, `until` is not), at most `most`, after the
+    /// first ones that are skipped.
     Events {
         /// The session.
         session: SessionId,
@@ -110,6 +111,8 @@ pub enum Call {
         from: u64,
         /// The cycle after the last one.
         until: u64,
+        /// The number of the first events that are not wanted; none without it.
+        skip: Option<u32>,
         /// The largest number of events.
         most: u32,
     },

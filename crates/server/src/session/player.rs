@@ -6,8 +6,8 @@ mod way;
 use super::inspect::inspection;
 use super::memory::Memory;
 use super::pace::{Pace, Rate};
-use super::scout::Scout;
 use super::save::Wish;
+use super::scout::Scout;
 use super::showing::Showing;
 use super::stage::Stage;
 use super::viewer::{MOST_SCANNING, Viewer};
@@ -189,9 +189,9 @@ impl Player {
             }
             Call::Inspect { who, .. } => inspection(run, &who).map(Answer::Inspection),
             Call::Metrics { from, .. } => Ok(self.memory.samples.answer(from)),
-            Call::Events { from, until, most, .. } => {
+            Call::Events { from, until, skip, most, .. } => {
                 self.viewer.drain(run, &mut self.memory.log, Instant::now());
-                Ok(self.memory.log.answer(from, until, most.min(MOST_EVENTS)))
+                Ok(self.memory.log.answer(from..until, skip.unwrap_or(0), most.min(MOST_EVENTS)))
             }
             Call::Source { .. } => {
                 let source = &self.stage.source;

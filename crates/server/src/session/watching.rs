@@ -124,8 +124,9 @@ impl Watching {
             Call::Credit { frames, .. } => self.viewer.grant(frames),
             // It has no scans.
             Call::Look { .. } => {}
-            Call::Events { from, until, most, .. } => {
-                return Ok(self.log.answer(from, until, most.min(MOST_EVENTS)));
+            Call::Events { from, until, skip, most, .. } => {
+                let skip = skip.unwrap_or(0);
+                return Ok(self.log.answer(from..until, skip, most.min(MOST_EVENTS)));
             }
             Call::Tables { .. } => return Ok(Answer::Tables { names: Vec::new() }),
             _ => {
