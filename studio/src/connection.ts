@@ -17,6 +17,8 @@ export interface Socket {
 export interface Listener {
   notice(notice: Notice): void;
   frame(bytes: ArrayBuffer): void;
+  /** The server could not tell which call a problem answers. */
+  problem(problem: Problem): void;
   /** The socket is gone; the next attempt comes after this time. */
   lost(attempt: number, wait_ms: number): void;
 }
@@ -109,6 +111,7 @@ export class Connection {
       if (words.notice === "hello") this.#greeted();
       return this.#listener.notice(words);
     }
+    if (words.id === 0 && "problem" in words) return this.#listener.problem(words.problem);
     const waiting = this.#waiting.get(words.id);
     this.#waiting.delete(words.id);
     if ("answer" in words) waiting?.resolve(words.answer);

@@ -19,7 +19,7 @@ const MOST_BODY_BYTES: usize = 256;
 /// The time for a token to come.
 const LONGEST_ENTRANCE: Duration = Duration::from_secs(10);
 /// Longest message of a socket. Longer ones than a request may be are answered; beyond this the socket is closed.
-const MOST_MESSAGE_BYTES: usize = 8 * MOST_REQUEST_BYTES;
+const MOST_MESSAGE_BYTES: usize = MOST_REQUEST_BYTES + (8 << 20);
 
 /// Headers of every answer that has none of its own: the page loads nothing from elsewhere, and is shown in no other page.
 const HEADERS: [(HeaderName, &str); 6] = [

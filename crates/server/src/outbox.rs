@@ -28,6 +28,8 @@ struct Waiting {
     texts: VecDeque<String>,
     /// Number of requests that were taken in and are not answered yet.
     open_requests: usize,
+    /// Numbers and bytes of the long ones among them.
+    long: Vec<(u32, usize)>,
     newest: BTreeMap<SessionId, Newest>,
     /// The session that was served last, so that all have their turn.
     last: SessionId,
@@ -63,11 +65,24 @@ impl Outbox {
         waiting.open_requests + waiting.texts.len()
     }
 
+    /// Notes that the request that was taken in is a long one.
+    pub(crate) fn note_long(&self, id: u32, bytes: usize) {
+        self.waiting().long.push((id, bytes));
+    }
+
+    /// Returns the bytes of all long requests without a reply.
+    pub(crate) fn long_bytes(&self) -> usize {
+        self.waiting().long.iter().map(|(_, bytes)| bytes).sum()
+    }
+
     /// Sends a reply.
     pub(crate) fn reply(&self, reply: &Reply) {
         let text = json(reply);
         let mut waiting = self.waiting();
         waiting.open_requests = waiting.open_requests.saturating_sub(1);
+        if let Some(at) = waiting.long.iter().position(|(id, _)| *id == reply.id) {
+            waiting.long.swap_remove(at);
+        }
         waiting.texts.push_back(text);
         drop(waiting);
         self.ready.notify_one();

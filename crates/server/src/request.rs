@@ -3,8 +3,9 @@
 use crate::protocol::{Call, Problem, Request, SessionId};
 use serde::Deserialize;
 
-/// Longest text of a request, in bytes: room for a scenario with a map drawn in it.
-pub const MOST_REQUEST_BYTES: usize = 4 << 20;
+/// Longest text of a request, in bytes: room for the longest scenario that can be read (16 MiB), and for the one that
+/// it replaces, both as JSON.
+pub const MOST_REQUEST_BYTES: usize = 40 << 20;
 
 /// A request of which nothing but its number can be read.
 #[derive(Deserialize)]
@@ -19,13 +20,19 @@ struct Numbered {
 pub fn decode(text: &str) -> Result<Request, Box<(u32, Problem)>> {
     if text.len() > MOST_REQUEST_BYTES {
         let cause = format!("it has more than {MOST_REQUEST_BYTES} bytes");
-        return Err(Box::new((0, Problem::new("request", cause, "send less at a time"))));
+        let remedy = "make the text shorter, or change the file with another program";
+        return Err(Box::new((number(text), Problem::new("request", cause, remedy))));
     }
     serde_json::from_str(text).map_err(|error| {
-        let id = serde_json::from_str(text).map_or(0, |Numbered { id }| id);
+        let id = number(text);
         let cause = format!("it cannot be read: {error}");
         Box::new((id, Problem::new("request", cause, "send JSON as the protocol has it")))
     })
+}
+
+/// Returns the number of a request that is not read as a whole, 0 if it has none.
+fn number(text: &str) -> u32 {
+    serde_json::from_str(text).map_or(0, |Numbered { id }| id)
 }
 
 impl Call {
@@ -97,8 +104,17 @@ mod tests {
         ] {
             assert_eq!(decode(text).map_err(|unread| unread.0), Err(id), "{text}");
         }
-        let (_, problem) = *decode(&" ".repeat(MOST_REQUEST_BYTES + 1)).expect_err("too long");
-        assert!(problem.cause.contains("bytes"));
+        let long = format!(r#"{{"id":8,"call":{{"text":"{}"}}}}"#, " ".repeat(MOST_REQUEST_BYTES));
+        let (id, problem) = *decode(&long).expect_err("too long");
+        assert!(id == 8 && problem.cause.contains("bytes"));
+    }
+
+    #[test]
+    fn the_longest_scenario_that_can_be_read_is_saved_over_another_one() {
+        let text = "seed = 1\n\"a\" = 2\n".repeat((16 << 20) / 19);
+        let call = serde_json::json!({ "do": "save", "session": 1, "text": text, "to": null, "base": text, "over": true });
+        let request = serde_json::json!({ "id": 7, "call": call }).to_string();
+        assert_eq!(decode(&request).map(|request| request.id), Ok(7));
     }
 
     proptest! {

@@ -20,6 +20,10 @@ use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 const MOST_SESSIONS: usize = 4;
 /// Requests and replies beyond this number wait in the network.
 const MOST_BACKLOG: usize = 64;
+/// Requests of more bytes are long.
+const LONG_BYTES: usize = 1 << 20;
+/// While long requests of so many bytes are not answered, others wait in the network.
+const MOST_LONG_BYTES: usize = 64 << 20;
 /// Requests per second, over a while.
 const REQUESTS_PER_S: f64 = 300.0;
 /// Requests that may come at once.
@@ -61,7 +65,7 @@ async fn talk(socket: &mut WebSocket, mut desk: Desk, outbox: &Outbox) {
                     }
                 }
             }
-            message = socket.recv(), if outbox.backlog() < MOST_BACKLOG => {
+            message = socket.recv(), if has_room(outbox) => {
                 heard = Instant::now();
                 match message {
                     Some(Ok(Message::Text(text))) => desk.take(&text),
@@ -78,6 +82,11 @@ async fn talk(socket: &mut WebSocket, mut desk: Desk, outbox: &Outbox) {
             }
         }
     }
+}
+
+/// Whether a further request may be taken in.
+fn has_room(outbox: &Outbox) -> bool {
+    outbox.backlog() < MOST_BACKLOG && outbox.long_bytes() < MOST_LONG_BYTES
 }
 
 /// Sends a message; returns whether the page is still there.
@@ -130,6 +139,9 @@ impl Desk {
             }
             Ok(request) => {
                 let id = request.id;
+                if text.len() > LONG_BYTES {
+                    self.outbox.note_long(id, text.len());
+                }
                 let outbox = self.outbox.clone();
                 guarded(&outbox, id, || self.dispatch(id, request.call));
             }

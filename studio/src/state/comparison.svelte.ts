@@ -8,7 +8,16 @@ import type { Session } from "./session.svelte";
 const MOST_NAMED = 5;
 
 /** Ends a search that nobody wants any more, or that cannot go on. */
-class GivenUp extends Error {}
+class GivenUp extends Error {
+  constructor(words = "The comparison was given up.") {
+    super(words);
+  }
+}
+
+/** Why a run cannot be compared. */
+function noDigest({ scene, status }: Session): GivenUp {
+  return new GivenUp(`${scene.name} cannot be compared, as its states have no digests. ${status.banner ?? ""}`.trim());
+}
 
 export class Comparison {
   /** What it does or has found; empty before. */
@@ -26,6 +35,7 @@ export class Comparison {
       this.words = `Comparing ${a.scene.name} and ${b.scene.name} at cycle ${cycle}…`;
       const [one, other] = await Promise.all([a.digestAt(cycle), b.digestAt(cycle)]);
       if (!one || !other) throw new GivenUp();
+      for (const [session, { digest }] of [[a, one], [b, other]] as const) if (digest === null) throw noDigest(session);
       return one.digest !== other.digest || one.cycle !== other.cycle;
     };
     try {
@@ -34,7 +44,7 @@ export class Comparison {
       this.words = cycle === null ? `No difference up to cycle ${last}.` : await this.#told(a, b, cycle);
     } catch (error) {
       if (!(error instanceof GivenUp)) throw error;
-      if (round === this.#round) this.words = "The comparison was given up.";
+      if (round === this.#round) this.words = error.message;
     } finally {
       if (round === this.#round) this.isRunning = false;
     }

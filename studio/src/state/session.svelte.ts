@@ -255,14 +255,17 @@ export class Session {
     this.#waiting.changed();
   }
 
-  /** Goes to a cycle; returns the digest of the state there, and the cycle, which is less where the run is over before. */
-  async digestAt(cycle: number): Promise<{ cycle: number; digest: string } | null> {
+  /**
+   * Goes to a cycle; returns the digest of the state there, and the cycle, which is less where the run is over before.
+   * There is no digest of a recording that is shown from its tables.
+   */
+  async digestAt(cycle: number): Promise<{ cycle: number; digest: string | null } | null> {
     this.#rewind.stop();
     if (!(await this.#seeker.to(cycle))) return null;
     return this.#waiting.for(() => {
       const { state, digest, cycle: at } = this.status;
-      const isThere = at === cycle || (state === "over" && at < cycle);
-      return digest !== null && isThere ? { cycle: at, digest } : null;
+      const isThere = (state === "paused" && at === cycle) || (state === "over" && at <= cycle);
+      return isThere ? { cycle: at, digest } : null;
     });
   }
 

@@ -57,6 +57,7 @@ export class Studio {
     const listener: Listener = {
       notice: (notice) => this.#notice(notice),
       frame: (bytes) => this.#frame(bytes),
+      problem: (problem) => this.problem(problem),
       lost: (attempt, wait_ms) => this.#lost(attempt, wait_ms),
     };
     this.#around = around;

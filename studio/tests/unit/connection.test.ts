@@ -33,7 +33,7 @@ beforeEach(() => {
   greetings = [];
   heard = [];
   connection = new Connection(
-    { notice: (notice) => heard.push(notice), frame: (bytes) => heard.push(`frame ${bytes.byteLength}`), lost: (n) => heard.push(`lost ${n}`) },
+    { notice: (notice) => heard.push(notice), frame: (bytes) => heard.push(`frame ${bytes.byteLength}`), lost: (n) => heard.push(`lost ${n}`), problem: ({ cause }) => heard.push(`problem ${cause}`) },
     {
       open: () => {
         sockets.push(new FakeSocket());
@@ -106,6 +106,12 @@ test("connecting now gives up the old socket, whose end is then nobody's loss", 
   connection.connect();
   expect([old.isClosed, old.onclose]).toEqual([true, null]);
   expect(heard).toEqual([]);
+});
+
+test("a problem of which the server cannot tell whose it is, is told", () => {
+  const problem = { place: "request", cause: "it cannot be read", remedy: "" };
+  sockets[0]!.onmessage!({ data: JSON.stringify({ id: 0, problem }) });
+  expect(heard).toEqual(["problem it cannot be read"]);
 });
 
 test("bytes are frames", () => {

@@ -204,6 +204,19 @@ test("a session that is closed on its way back complains of nothing, and asks fo
   expect([asked > 0, line().asked, studio.problems, closed.isMoving]).toEqual([true, [], [], false]);
 });
 
+test("a run whose states have no digests is not compared, and the reason is told", async () => {
+  void studio.open({ kind: "recording", path: "r" });
+  await settled();
+  await line().answer("open", { ...OPENED, session: 2, status: status({ session: 2, banner: "Recorded by another build." }) });
+  tell({ digest: "aa" });
+  studio.inStep = true;
+  studio.toggleComparison();
+  await settled();
+  await line().answer("seek", { is: "done" });
+  expect(studio.comparison.isRunning).toBe(false);
+  expect(studio.comparison.words).toBe("Hall cannot be compared, as its states have no digests. Recorded by another build.");
+});
+
 test("what is saved after a loss names the text that the page knows, not that of the file by now", async () => {
   const draft = draftOf(session());
   await settled();
