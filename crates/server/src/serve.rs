@@ -7,9 +7,9 @@ use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use std::io;
 use std::pin::{Pin, pin};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{Semaphore, watch};
@@ -20,13 +20,16 @@ use tokio::time::{sleep, timeout};
 pub(crate) struct Patience {
     /// The time for the head of a request, and between two requests.
     head: Duration,
-    /// The time of a whole connection; the browser opens another one.
+    /// The time after which a connection ends with the answer that is under way; the browser opens another one.
     longest: Duration,
+    /// The time in which a peer has to read something of such an answer.
+    reading: Duration,
 }
 
 impl Default for Patience {
     fn default() -> Self {
-        Self { head: Duration::from_secs(20), longest: Duration::from_secs(600) }
+        let [head, longest, reading] = [20, 600, 60].map(Duration::from_secs);
+        Self { head, longest, reading }
     }
 }
 
@@ -60,7 +63,7 @@ pub(crate) async fn serve(
         let _ = stream.set_nodelay(true);
         match (doors.enter(address.ip()), told.clone().try_acquire_owned()) {
             (Some(place), _) => {
-                let connection = Connection { stream, _place: place };
+                let connection = Connection { stream, stuck: Stuck::default(), _place: place };
                 tokio::spawn(converse(connection, routes.clone(), ending.clone(), patience));
             }
             (None, Ok(turn)) => drop(tokio::spawn(async move {
@@ -78,24 +81,56 @@ pub(crate) async fn serve(
     let _ = timeout(GRACE, emptied).await;
 }
 
-/// Serves one connection, until it ends, becomes a socket, or has had its time.
+/// Serves one connection, until it ends, becomes a socket, or has had its time. An answer that is under way then comes
+/// to its end, however long it takes to make or to send, unless its peer does not read it.
 async fn converse(
     connection: Connection,
     routes: Router,
     ending: watch::Receiver<bool>,
     patience: Patience,
 ) {
+    let stuck = connection.stuck.clone();
     let mut http = http1::Builder::new();
     let http = http.timer(TokioTimer::new()).header_read_timeout(patience.head);
     let served = http.serve_connection(TokioIo::new(connection), TowerToHyperService::new(routes));
     let mut served = pin!(served.with_upgrades());
     tokio::select! {
         _ = &mut served => return,
-        () = ended(ending) => {}
-        () = sleep(patience.longest) => {}
+        () = ended(ending.clone()) => {}
+        () = sleep(patience.longest) => {
+            served.as_mut().graceful_shutdown();
+            tokio::select! {
+                _ = &mut served => return,
+                () = ended(ending) => {}
+                () = stuck.lasts(patience.reading) => return,
+            }
+        }
     }
     served.as_mut().graceful_shutdown();
     let _ = timeout(GRACE, served).await;
+}
+
+/// The instant since which a peer takes nothing of what is written, while it does not.
+#[derive(Debug, Clone, Default)]
+struct Stuck(Arc<Mutex<Option<Instant>>>);
+
+impl Stuck {
+    /// Notes whether a write had to wait.
+    fn note(&self, waits: bool) {
+        let mut since = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        *since = if waits { since.or_else(|| Some(Instant::now())) } else { None };
+    }
+
+    /// Waits until the peer has taken nothing for so long.
+    async fn lasts(&self, longest: Duration) {
+        loop {
+            let since = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            match since.map_or(longest, |since| longest.saturating_sub(since.elapsed())) {
+                Duration::ZERO => return,
+                rest => sleep(rest).await,
+            }
+        }
+    }
 }
 
 /// Waits until the server ends.
@@ -117,6 +152,7 @@ async fn turn_away(mut stream: TcpStream) -> io::Result<()> {
 /// A connection, and its place among all.
 struct Connection {
     stream: TcpStream,
+    stuck: Stuck,
     _place: Place,
 }
 
@@ -136,7 +172,9 @@ impl AsyncWrite for Connection {
         context: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
-        Pin::new(&mut self.stream).poll_write(context, bytes)
+        let written = Pin::new(&mut self.stream).poll_write(context, bytes);
+        self.stuck.note(written.is_pending());
+        written
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
@@ -153,7 +191,6 @@ mod tests {
     use super::*;
     use axum::routing::get;
     use std::io::{Read, Write};
-    use std::time::Instant;
 
     /// A server of one word, with little patience; returns its address, and what ends it.
     fn impatient(longest: Duration) -> (std::net::SocketAddr, watch::Sender<bool>) {
@@ -161,12 +198,19 @@ mod tests {
         let address = listener.local_addr().expect("bound");
         listener.set_nonblocking(true).expect("set");
         let (ends, ending) = watch::channel(false);
-        let patience = Patience { head: Duration::from_millis(200), longest };
+        let [head, reading] = [200, 2000].map(Duration::from_millis);
+        let patience = Patience { head, longest, reading };
         std::thread::spawn(move || {
             let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
             runtime.expect("a runtime").block_on(async {
                 let listener = TcpListener::from_std(listener).expect("taken");
+                let late = || async {
+                    sleep(Duration::from_secs(3)).await;
+                    "late"
+                };
                 let routes = Router::new().route("/", get(|| async { "here" }));
+                let routes = routes.route("/late", get(late));
+                let routes = routes.route("/much", get(|| async { "much ".repeat(20 << 20) }));
                 serve(listener, routes, ending, patience).await;
             });
         });
@@ -212,6 +256,35 @@ mod tests {
             assert!(started.elapsed() < Duration::from_secs(30), "it goes on");
             std::thread::sleep(Duration::from_millis(10));
         }
+    }
+
+    #[test]
+    fn an_answer_that_takes_longer_than_a_connection_has_comes_whole() {
+        let (address, _ends) = impatient(Duration::from_millis(300));
+        let mut stream = connect(address);
+        stream.write_all(b"GET /late HTTP/1.1\r\nHost: a\r\n\r\n").expect("sent");
+        let said = heard(stream);
+        assert!(said.ends_with("late"), "{said}");
+    }
+
+    #[test]
+    fn who_does_not_read_an_answer_is_not_waited_for_and_who_reads_slowly_is() {
+        let (address, _ends) = impatient(Duration::from_millis(300));
+        let ask = || {
+            let mut stream = connect(address);
+            stream.write_all(b"GET /much HTTP/1.1\r\nHost: a\r\n\r\n").expect("sent");
+            stream
+        };
+        let asleep = ask();
+        let mut slow = ask();
+        let (mut part, mut bytes) = (vec![0; 2 << 20], 0);
+        while let Ok(read @ 1..) = slow.read(&mut part) {
+            bytes += read;
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        assert!(bytes > 100 << 20, "{bytes}");
+        std::thread::sleep(Duration::from_secs(5));
+        assert!(heard(asleep).len() < 100 << 20);
     }
 
     #[test]
