@@ -12,6 +12,9 @@ use sidestep::worlds::WORLDS;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
+/// Number of bodies up to which another seed takes less time than a thread that could be interrupted.
+const FEW_BODIES: usize = 100;
+
 /// A scenario that was read, checked and compiled. It never changes; simulations share it.
 ///
 /// Scenario(scenario=None, *, text=None, base=None): a path (or a file of another program that the command reads,
@@ -129,10 +132,15 @@ impl Made {
             Text::Own(_) => self,
             Text::Reseeded { of, .. } => of,
         };
-        let compiled = interruptible(py, || match self.compiled.reseeded(seed) {
+        let reseeded = || self.compiled.reseeded(seed);
+        let reseeded = match self.compiled.bodies() > FEW_BODIES {
+            true => interruptible(py, reseeded)?,
+            false => py.detach(reseeded),
+        };
+        let compiled = match reseeded {
             Some(compiled) => compiled,
-            None => self.compiled_with(seed),
-        })?;
+            None => interruptible(py, || self.compiled_with(seed))?,
+        };
         let compiled = compiled.map_err(|e| told(&e, self.is_dict))?;
         let text = Text::Reseeded { of: Arc::clone(of), seed, source: OnceLock::new() };
         Ok(Self::of(compiled, text, self.is_dict, self.unpacked.clone()))
