@@ -52,11 +52,11 @@ pub(super) fn contents(compiled: &Compiled) -> Said {
 
 /// Returns how often the airplanes decide, and for how long they fly.
 fn times(compiled: &Compiled) -> Lines {
-    let timing = &compiled.world.timing;
-    let (cycles, lasts_s) = (grouped(compiled.cycles), compiled.cycles as f64 * timing.dt_s);
-    let (dt_s, horizon_s) = (timing.dt_s, timing.horizon_s());
+    let dt_s = compiled.world.timing.dt_s;
+    let (cycles, lasts_s) = (grouped(compiled.cycles), compiled.cycles as f64 * dt_s);
+    let look_ahead_s = compiled.world.looks_ahead().look_ahead_s;
     vec![
-        line("time", format!("decides every {dt_s} s, looks {horizon_s} s ahead")),
+        line("time", format!("decides every {dt_s} s, looks {look_ahead_s} s ahead")),
         line("run", format!("at most {cycles} cycles ({lasts_s} s), seed {}", compiled.seed)),
     ]
 }
