@@ -98,6 +98,8 @@ pub struct Metrics {
     pub deadlines_missed: u64,
     /// Number of times that a group was too large to be optimized.
     pub groups_too_large: u64,
+    /// Number of airplanes that have not appeared yet.
+    pub not_appeared: u64,
     /// Number of airplanes that were removed before they had arrived.
     pub left: u64,
     /// Number of airplanes that arrived at the end of their recorded way, which nothing changed.
@@ -254,10 +256,17 @@ fn mean(sum: f64, n: usize) -> Option<f64> {
     (n > 0).then(|| sum / n as f64)
 }
 
-/// Returns the metrics of a run so far; `decide_s` is the time spent deciding, in seconds.
+/// Returns the number of airplanes that were not in the air before a cycle, because they come in later.
+fn not_appeared(world: &AirspaceWorld, now: Cycle) -> u64 {
+    // At the very start those are there that begin with it.
+    let later = |&i: &usize| world.appears_in(i) >= now.max(1);
+    (0..world.airplanes.len()).filter(later).count() as u64
+}
+
+/// Returns the metrics of a run until a cycle; `decide_s` is the time spent deciding, in seconds.
 pub fn metrics(
     world: &AirspaceWorld,
-    state: &AirspaceState,
+    (state, now): (&AirspaceState, Cycle),
     ledger: &Ledger,
     decide_s: f64,
 ) -> Metrics {
@@ -301,6 +310,7 @@ pub fn metrics(
         contacts_lost: ledger.count(EventKind::Unheard),
         deadlines_missed: ledger.count(EventKind::Deadline),
         groups_too_large: ledger.count(EventKind::GroupTooLarge),
+        not_appeared: not_appeared(world, now),
         left: count(state, Cell::has_left),
         replayed: replayed(world, state),
         orders: all.iter().map(|a| u64::from(a.orders)).sum(),

@@ -232,8 +232,8 @@ impl World for AirspaceWorld {
         view::place_rows()
     }
 
-    fn metrics(&self, state: &AirspaceState, books: &Books, _: Cycle, _: &Effort) -> Metrics {
-        metrics::metrics(self, state, &books.ledger, books.decide_ns as f64 / 1e9)
+    fn metrics(&self, state: &AirspaceState, books: &Books, now: Cycle, _: &Effort) -> Metrics {
+        metrics::metrics(self, (state, now), &books.ledger, books.decide_ns as f64 / 1e9)
     }
 
     fn agent_metrics(&self, state: &AirspaceState, _: &Books, _: Cycle) -> Value {

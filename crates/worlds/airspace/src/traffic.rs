@@ -350,7 +350,7 @@ fn heading(
 ) -> String {
     let horizon_s = horizon_s.unwrap_or(300.0);
     format!(
-        "format = 1\nworld = \"airspace\"\nname = {name:?}\ncycles = 4000\n\n\
+        "format = 1\nworld = \"airspace\"\nname = {name:?}\n\n\
          [airspace]\nvertical_m = {vertical_m:?}\nhorizon_s = {horizon_s:?}\ndt_s = {DT_S:?}\ndtau_s = 5.0\n\
          legs = {{ turns_s = [20.0, 40.0, 60.0], until_s = [240.0] }}\n{more}\n[airplane]\nseparation_m = {separation_m:?}\n"
     )
@@ -408,6 +408,20 @@ mod tests {
         }
         // MVP that the file does not ask for, but `--set`, looks as far.
         assert_eq!(compiled(&format!("{flights}DTLOOK 120")).world.mvp.look_ahead_s, 120.0);
+    }
+
+    #[test]
+    fn an_imported_flight_that_begins_late_in_a_long_day_is_flown_to_its_end() {
+        let short = compiled("CRE A1,A320,52,4,90,FL300,270");
+        let thrice_ahead = 530..=540;
+        assert!(thrice_ahead.contains(&short.cycles), "{}", short.cycles);
+        let text = "00:00:00.00>CRE A1,A320,52.0,4.0,90,FL300,270\n\
+                    13:00:00.00>CRE B2,A320,52.0,5.0,90,FL300,270\n";
+        let text = from_bluesky("day", &parse(&"day.scn", text)).expect("it has aircraft");
+        let mut run = airspace_run(&Source::new("day", text, ""), 1).expect("a scenario");
+        run.advance(run.plan().cycles);
+        let metrics = run.metrics();
+        assert_eq!((metrics.arrived, metrics.not_appeared), (2, 0));
     }
 
     #[test]

@@ -101,6 +101,7 @@ fn range(numbers: impl Iterator<Item = f64>) -> String {
 /// Returns the outcome of a run.
 pub(super) fn outcome(metrics: &Metrics) -> Lines {
     let mut lines = flights(metrics);
+    lines.extend(not_appeared(metrics));
     lines.extend(network(metrics));
     lines.extend(on_the_way(metrics));
     lines.extend(warning(&metrics.too_close));
@@ -153,6 +154,17 @@ fn network(m: &Metrics) -> Lines {
         lines.push(line("trouble", said.join(", ")));
     }
     lines
+}
+
+/// Returns the warning that a run was too short for some airplanes to be seen at all: they count among those
+/// that have not arrived.
+fn not_appeared(m: &Metrics) -> Option<(String, String)> {
+    let many = match m.not_appeared {
+        0 => return None,
+        1 => "1 airplane has".into(),
+        n => format!("{} airplanes have", grouped(n)),
+    };
+    Some(line("WARNING", format!("{many} not appeared by now: more cycles would show them")))
 }
 
 /// Returns lines on recorded ways, orders and removals; none where there were none.
@@ -225,4 +237,34 @@ fn flights(m: &Metrics) -> Lines {
             ),
         ),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::airspace_run;
+    use sidestep_kernel::{Simulation, World};
+    use sidestep_scenario::Source;
+
+    #[test]
+    fn a_run_that_ends_before_an_airplane_appears_says_so() {
+        let one = |y: u32, appears_s: u32| {
+            format!(
+                "[[airplanes]]\nat_m = [0, {y}]\nheading_deg = 0\nway_points_m = [[700, {y}]]\n\
+                 appears_s = {appears_s}\n"
+            )
+        };
+        let head = "format = 1\nworld = \"airspace\"\ncycles = 20\n";
+        let text = format!("{head}{}{}", one(0, 0), one(9000, 50));
+        let mut run = airspace_run(&Source::new("n", text, ""), 1).expect("a scenario");
+        let told = |run: &crate::AirspaceRun| {
+            let lines = run.world().outcome(&run.metrics());
+            lines.into_iter().any(|(_, words)| words.contains("1 airplane has not appeared"))
+        };
+        assert_eq!(run.metrics().not_appeared, 1, "the other one is there from the start");
+        run.advance(10);
+        assert_eq!(run.metrics().not_appeared, 1, "it would come in with the next cycle");
+        assert!(told(&run));
+        run.advance(1);
+        assert!(!told(&run) && run.metrics().not_appeared == 0);
+    }
 }
