@@ -349,8 +349,10 @@ fn heading(
     more: &str,
 ) -> String {
     let horizon_s = horizon_s.unwrap_or(300.0);
+    // Rust's own escapes are not those of TOML: an accent of its own would be `\u{301}`.
+    let name = toml::Value::from(name);
     format!(
-        "format = 1\nworld = \"airspace\"\nname = {name:?}\n\n\
+        "format = 1\nworld = \"airspace\"\nname = {name}\n\n\
          [airspace]\nvertical_m = {vertical_m:?}\nhorizon_s = {horizon_s:?}\ndt_s = {DT_S:?}\ndtau_s = 5.0\n\
          legs = {{ turns_s = [20.0, 40.0, 60.0], until_s = [240.0] }}\n{more}\n[airplane]\nseparation_m = {separation_m:?}\n"
     )
@@ -422,6 +424,16 @@ mod tests {
         run.advance(run.plan().cycles);
         let metrics = run.metrics();
         assert_eq!((metrics.arrived, metrics.not_appeared), (2, 0));
+    }
+
+    #[test]
+    fn any_name_of_a_file_is_the_name_of_its_scenario() {
+        let file = parse(&"f.scn", "00:00:00.00>CRE A1,A320,52.0,4.0,90,FL300,270\n");
+        for name in ["cafe\u{301}", "a \"b\" \\ 'c'", "tab\tline\nend", "\u{feff}\u{7f}\u{0}", ""] {
+            let text = from_bluesky(name, &file).expect("it has aircraft");
+            let compiled = Compiled::new(&Source::new(name, text, "")).expect("a scenario");
+            assert_eq!(compiled.name, name);
+        }
     }
 
     #[test]
