@@ -121,13 +121,11 @@ pub(super) fn poses(snapshot: &Snapshot) -> Said {
     Said { json, text }
 }
 
-/// Returns the pairs whose first fallbacks are not apart, in words.
-fn too_close(world: &AirspaceWorld, pairs: &[(u32, u32)]) -> Lines {
-    let warn = |&(a, b): &(u32, u32)| {
-        let [a, b] = [a, b].map(|id| world.called(id));
-        line("warning", format!("airplanes {a} and {b} start too close for the shield"))
-    };
-    pairs.iter().map(warn).collect()
+/// Returns the first pairs whose first fallbacks are not apart, and the number of others.
+fn too_close(world: &AirspaceWorld, pairs: &[(u32, u32)]) -> Option<(String, String)> {
+    let named = |&(a, b): &(u32, u32)| format!("{} and {}", world.called(a), world.called(b));
+    let told = first_named(pairs, named)?;
+    Some(line("warning", format!("start too close for the shield: {told}")))
 }
 
 /// Returns the traffic on the network, and its faults.
@@ -186,32 +184,31 @@ fn on_the_way(m: &Metrics) -> Lines {
 /// Number of pairs or airplanes that a warning names.
 const NAMED: usize = 5;
 
+/// Returns the first of many in words, and the number of others; `None` without any.
+fn first_named<T>(all: &[T], words: impl Fn(&T) -> String) -> Option<String> {
+    let mut named: Vec<String> = all.iter().take(NAMED).map(words).collect();
+    if all.len() > NAMED {
+        named.push(format!("and {} more", grouped((all.len() - NAMED) as u64)));
+    }
+    (!named.is_empty()).then(|| named.join(", "))
+}
+
 /// Returns the first airplanes whose errors exceeded the shield's bounds, and the number of others.
 fn beyond_bound(all: &[BeyondBound]) -> Option<(String, String)> {
-    let named = all.iter().take(NAMED).map(|one| {
+    let told = first_named(all, |one| {
         let name = one.callsign.clone().unwrap_or_else(|| one.airplane.to_string());
         format!("{name} at {} s", one.at_s)
-    });
-    let mut airplanes: Vec<String> = named.collect();
-    if all.len() > NAMED {
-        airplanes.push(format!("and {} more", grouped((all.len() - NAMED) as u64)));
-    }
-    let told = || line("WARNING", format!("errors beyond the bound: {}", airplanes.join(", ")));
-    (!all.is_empty()).then(told)
+    })?;
+    Some(line("WARNING", format!("errors beyond the bound: {told}")))
 }
 
 /// Returns the first pairs for which the shield promises nothing, and the number of others.
 fn warning(too_close: &[TooClose]) -> Option<(String, String)> {
-    let named = too_close.iter().take(NAMED).map(|TooClose { at_s, airplanes, callsigns }| {
+    let told = first_named(too_close, |TooClose { at_s, airplanes, callsigns }| {
         let [a, b] = callsigns.clone().unwrap_or_else(|| airplanes.map(|id| id.to_string()));
         if *at_s > 0.0 { format!("{a} and {b} at {at_s} s") } else { format!("{a} and {b}") }
-    });
-    let mut pairs: Vec<String> = named.collect();
-    if too_close.len() > NAMED {
-        pairs.push(format!("and {} more", grouped((too_close.len() - NAMED) as u64)));
-    }
-    let told = || line("WARNING", format!("too close for the shield: {}", pairs.join(", ")));
-    (!too_close.is_empty()).then(told)
+    })?;
+    Some(line("WARNING", format!("too close for the shield: {told}")))
 }
 
 fn flights(m: &Metrics) -> Lines {
@@ -241,9 +238,44 @@ fn flights(m: &Metrics) -> Lines {
 
 #[cfg(test)]
 mod tests {
+    use super::contents;
     use crate::airspace_run;
+    use crate::scenario::Compiled;
     use sidestep_kernel::{Simulation, World};
     use sidestep_scenario::Source;
+
+    /// Many airplanes in a heap.
+    fn heap(airspace: &str) -> Source {
+        let text = format!(
+            "format = 1\nworld = \"airspace\"\n[airspace]\nmethod = \"none\"\n{airspace}\n\
+             [airspace.generator]\nkind = \"superconflict\"\nn = 40\nradius_m = 2000\n"
+        );
+        Source::new("heap", text, "")
+    }
+
+    #[test]
+    fn check_names_the_first_pairs_without_a_promise_and_counts_the_others() {
+        let compiled = Compiled::new(&heap("")).expect("a scenario");
+        let pairs = compiled.too_close.len();
+        assert!(pairs > 50, "{pairs}");
+        let told = contents(&compiled).text;
+        let words = told.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(words.matches("too close for the shield").count(), 1, "{told}");
+        assert!(words.contains(&format!(", and {} more", pairs - 5)), "{told}");
+    }
+
+    #[test]
+    fn nothing_is_too_close_for_a_shield_that_is_not_there() {
+        let source = heap("shield = \"off\"");
+        let compiled = Compiled::new(&source).expect("a scenario");
+        assert_eq!(compiled.too_close, []);
+        assert!(!contents(&compiled).text.contains("too close"));
+        let mut run = compiled.start(&source, 1);
+        run.advance(3);
+        assert_eq!(run.metrics().too_close, []);
+        let lines = run.world().outcome(&run.metrics());
+        assert!(lines.iter().all(|(_, words)| !words.contains("too close")), "{lines:?}");
+    }
 
     #[test]
     fn a_run_that_ends_before_an_airplane_appears_says_so() {

@@ -67,7 +67,10 @@ impl<'a> Compiler<'a> {
         self.fits_deployment(&world)?;
         self.fits_a_pair(&world)?;
         self.fits_errors(&world)?;
-        let (fallbacks, too_close) = first(&world);
+        let (fallbacks, too_close) = match world.shield {
+            true => first(&world),
+            false => (vec![Side::default(); world.airplanes.len()], Vec::new()),
+        };
         let fallbacks = Arc::new(fallbacks);
         world.first_fallbacks = Arc::clone(&fallbacks);
         let head = &self.recipe.head;
