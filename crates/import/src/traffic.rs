@@ -8,9 +8,10 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
-use super::local_plane::LatLon;
+use super::local_plane::{LatLon, LocalPlane};
 use super::table::{CsvRow, CsvTable, Word};
-use sidestep_kernel::InputError;
+use sidestep_kernel::{InputError, math};
+use std::ops::RangeInclusive;
 
 /// All tracks of one file.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,6 +69,18 @@ pub fn parse(place: &dyn fmt::Display, text: &str) -> Result<RecordedTraffic, In
     tracks(&CsvTable::parse(place, text)?)
 }
 
+/// The range of times in s since the start of 1970. Milliseconds of our days are beyond it.
+const TIMES_S: RangeInclusive<f64> = -1e11..=1e11;
+
+/// The longest time in s between the first row and the last one, in time: no recording takes 30 years.
+const LONGEST_S: f64 = 1e9;
+
+/// The range of altitudes, in ft.
+const ALTITUDES_FT: RangeInclusive<f64> = -1e6..=1e6;
+
+/// The greatest speed between two rows, in m/s: beyond it one of the two places is wrong.
+const FASTEST_M_S: f64 = 1e6;
+
 /// The indices of the columns.
 struct Columns<'a> {
     place: &'a str,
@@ -104,12 +117,16 @@ impl<'a> Columns<'a> {
         let vertical_speed = self.vertical_speed.map(|column| row.field(column));
         let vertical_speed = vertical_speed.filter(|word| !word.text.is_empty());
         Ok(Sample {
-            time_s: row.field(self.time).number(&self.place)?,
+            time_s: self.time_s(row.field(self.time))?,
             position: LatLon {
                 lat_deg: self.within(row.field(self.lat), -90.0, 90.0)?,
                 lon_deg: self.within(row.field(self.lon), -180.0, 180.0)?,
             },
-            altitude_ft: row.field(self.altitude).number(&self.place)?,
+            altitude_ft: self.within(
+                row.field(self.altitude),
+                *ALTITUDES_FT.start(),
+                *ALTITUDES_FT.end(),
+            )?,
             ground_speed_kt: self.within(row.field(self.ground_speed), 0.0, 10_000.0)?,
             // 360 is north, as is 0.
             track_deg: self.within(row.field(self.track), 0.0, 360.0)? % 360.0,
@@ -117,12 +134,21 @@ impl<'a> Columns<'a> {
         })
     }
 
+    fn time_s(&self, word: Word) -> Result<f64, InputError> {
+        let value = word.number(&self.place)?;
+        if TIMES_S.contains(&value) {
+            return Ok(value);
+        }
+        let cause = format!("a time of {value:?} s since 1970");
+        Err(word.error(&self.place, cause, "give seconds; divide milliseconds by 1000"))
+    }
+
     fn within(&self, word: Word, min: f64, max: f64) -> Result<f64, InputError> {
         let value = word.number(&self.place)?;
         if (min..=max).contains(&value) {
             return Ok(value);
         }
-        let cause = format!("{value} is not between {min} and {max}");
+        let cause = format!("{value:?} is not between {min} and {max}");
         Err(word.error(&self.place, cause, "restore the value or delete the row"))
     }
 
@@ -136,34 +162,86 @@ impl<'a> Columns<'a> {
     }
 }
 
+/// A track that is being read, with the words of the times of its samples.
+struct Draft<'t> {
+    track: Track,
+    times: Vec<Word<'t>>,
+}
+
 fn tracks(table: &CsvTable) -> Result<RecordedTraffic, InputError> {
     let columns = Columns::find(table)?;
-    let mut by_aircraft: BTreeMap<&str, Track> = BTreeMap::new();
+    let mut by_aircraft: BTreeMap<&str, Draft<'_>> = BTreeMap::new();
     let mut rows = 0;
     for row in table.rows() {
         rows += 1;
         let icao24 = columns.icao24(row)?;
-        let track = by_aircraft.entry(icao24).or_insert_with(|| Track {
-            icao24: icao24.to_owned(),
-            callsign: String::new(),
-            samples: Vec::new(),
-        });
+        let Draft { track, times } = by_aircraft.entry(icao24).or_insert_with(|| draft(icao24));
         if let (Some(column), "") = (columns.callsign, track.callsign.as_str()) {
             row.field(column).text.clone_into(&mut track.callsign);
         }
         track.samples.push(columns.sample(row)?);
+        times.push(row.field(columns.time));
     }
-    let mut tracks: Vec<Track> = by_aircraft.into_values().collect();
-    let repeated_rows = tracks.iter_mut().map(sort_by_time).sum();
+    let mut drafts: Vec<Draft<'_>> = by_aircraft.into_values().collect();
+    let repeated_rows = drafts.iter_mut().map(sort_by_time).sum();
+    check_times(columns.place, &drafts)?;
+    check_speeds(columns.place, &drafts)?;
+    let tracks = drafts.into_iter().map(|draft| draft.track).collect();
     Ok(RecordedTraffic { tracks, rows, repeated_rows })
 }
 
+fn draft<'t>(icao24: &str) -> Draft<'t> {
+    let track = Track { icao24: icao24.to_owned(), callsign: String::new(), samples: Vec::new() };
+    Draft { track, times: Vec::new() }
+}
+
 /// Sorts the samples; of several at one instant the first is kept. Returns how many were removed.
-fn sort_by_time(track: &mut Track) -> usize {
-    let before = track.samples.len();
-    track.samples.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-    track.samples.dedup_by_key(|sample| sample.time_s);
-    before - track.samples.len()
+fn sort_by_time(draft: &mut Draft<'_>) -> usize {
+    let (samples, times) = (&mut draft.track.samples, &mut draft.times);
+    let before = samples.len();
+    let mut both: Vec<(Sample, Word<'_>)> = samples.drain(..).zip(times.drain(..)).collect();
+    both.sort_by(|(a, _), (b, _)| a.time_s.total_cmp(&b.time_s));
+    both.dedup_by_key(|(sample, _)| sample.time_s);
+    (*samples, *times) = both.into_iter().unzip();
+    before - samples.len()
+}
+
+/// Refuses rows that are a lifetime later than the first.
+fn check_times(place: &str, drafts: &[Draft<'_>]) -> Result<(), InputError> {
+    let all = || drafts.iter().flat_map(|draft| draft.track.samples.iter().zip(&draft.times));
+    let first_s = all().map(|(sample, _)| sample.time_s).fold(f64::INFINITY, f64::min);
+    let Some((late, word)) = all().find(|(sample, _)| sample.time_s - first_s > LONGEST_S) else {
+        return Ok(());
+    };
+    let cause = format!("{:?} s after the first row of the table", late.time_s - first_s);
+    let remedy =
+        format!("restore the time of one of the two: up to {LONGEST_S:e} s are between them");
+    Err(word.error(&place, cause, &remedy))
+}
+
+/// Refuses rows whose place nothing reaches from the one before, on the plane that is flown.
+fn check_speeds(place: &str, drafts: &[Draft<'_>]) -> Result<(), InputError> {
+    let samples = drafts.iter().flat_map(|draft| &draft.track.samples);
+    let Some(plane) = LocalPlane::about_all(samples.map(|sample| sample.position)) else {
+        return Ok(());
+    };
+    for Draft { track, times } in drafts {
+        for (pair, word) in track.samples.windows(2).zip(&times[1..]) {
+            let [from, to] = [pair[0], pair[1]].map(|sample| plane.to_plane_m(sample.position));
+            let (m, s) =
+                (math::hypot(to[0] - from[0], to[1] - from[1]), pair[1].time_s - pair[0].time_s);
+            if m / s >= FASTEST_M_S {
+                let icao24 = &track.icao24;
+                let cause =
+                    format!("{icao24} flies {:.0} km in {s} s, from its row before", m / 1e3);
+                let remedy = format!(
+                    "restore its place or its time, or delete the row: nothing flies {FASTEST_M_S:e} m/s"
+                );
+                return Err(word.error(&place, cause, &remedy));
+            }
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -214,6 +292,24 @@ mod tests {
             assert_eq!(error.position(), Some((2, column)), "{row}: {error}");
         }
         assert!(parse(&"t.csv", "time_s\n1\n").unwrap_err().cause().contains("icao24"));
+    }
+
+    #[test]
+    fn times_altitudes_and_jumps_that_cannot_be_are_pointed_at_in_the_users_own_rows() {
+        for (rows, place, cause) in [
+            ("1700000000000,a,,46,6,1,2,3,\n1700000010000,a,,46,6,1,2,3,\n", (2, 1), "since 1970"),
+            ("1,a,,46,6,1e7,2,3,\n", (2, 11), "not between"),
+            ("5,a,,46,6,1,2,3,\n2e9,b,,46,6,1,2,3,\n", (3, 1), "after the first row"),
+            (
+                "12,a,,46.02,6,1,2,3,\n10,a,,46,6,1,2,3,\n11,a,,-46.01,-174,1,2,3,\n",
+                (4, 1),
+                "a flies",
+            ),
+        ] {
+            let error = parsed(rows).expect_err(rows);
+            assert_eq!(error.position(), Some(place), "{error}");
+            assert!(error.cause().contains(cause), "{error}");
+        }
     }
 
     #[test]

@@ -13,17 +13,36 @@ pub fn read(
     file: &Path,
     overrides: &[String],
 ) -> Result<(Source, Box<dyn Compiled>), InputError> {
-    let source = source_of(worlds, file, overrides)?;
-    match worlds.compile(&source) {
-        Ok(compiled) => Ok((source, compiled)),
+    let (source, is_made) = made_or_read(worlds, file, overrides)?;
+    let told = match worlds.compile(&source) {
+        Ok(compiled) => return Ok((source, compiled)),
         // An error in another file, e.g. in a profile, has its own place.
-        Err(error) if overrides.is_empty() || error.place() != source.place => Err(error),
-        Err(error) => Err(explained(worlds, file, overrides, error)),
+        Err(error) if overrides.is_empty() || error.place() != source.place => error,
+        Err(error) => explained(worlds, file, overrides, error),
+    };
+    Err(if is_made { of_made_text(file, &source, told) } else { told })
+}
+
+/// Returns an error in a text that was made from a file of another program without a position: nobody has
+/// the lines of that text.
+fn of_made_text(file: &Path, source: &Source, error: InputError) -> InputError {
+    if ![source.place.as_str(), source.file_place()].contains(&error.place()) {
+        return error;
+    }
+    let place = format!("the scenario made from {}", file.display());
+    keyed(InputError::new(place, error.cause(), error.remedy()), error.key())
+}
+
+fn keyed(error: InputError, key: Option<&str>) -> InputError {
+    match key {
+        Some(key) => error.with_key(key),
+        None => error,
     }
 }
 
 /// Returns all that is wrong with a scenario and its overrides, see [`sidestep::problems`]; none of one
-/// that is right. An error that an override causes names it.
+/// that is right. An error that an override causes names it. Of a file of another program only the first
+/// is told: its author can mend no text that was made from it, and what else is wrong may follow.
 ///
 /// # Errors
 /// When the scenario cannot be read, or an override does not fit.
@@ -32,6 +51,9 @@ pub fn problems(
     file: &Path,
     overrides: &[String],
 ) -> Result<Vec<InputError>, InputError> {
+    if worlds.translate(file)?.is_some() {
+        return Ok(read(worlds, file, overrides).err().into_iter().collect());
+    }
     let of = |count: usize| {
         let source = source_of(worlds, file, &overrides[..count])?;
         Ok((sidestep::problems(worlds, &source), source.place))
@@ -58,11 +80,7 @@ pub fn problems(
 /// Returns an error with the override that causes it as its place.
 fn caused(file: &Path, override_text: &str, error: &InputError) -> InputError {
     let place = format!("{} with --set {override_text}", file.display());
-    let told = InputError::new(place, error.cause(), error.remedy());
-    match error.key() {
-        Some(key) => told.with_key(key),
-        None => told,
-    }
+    keyed(InputError::new(place, error.cause(), error.remedy()), error.key())
 }
 
 /// Returns the scenario in a file, or the one that a file of another format stands for, with
@@ -75,12 +93,20 @@ pub(crate) fn source_of(
     file: &Path,
     overrides: &[String],
 ) -> Result<Source, InputError> {
-    match worlds.translate(file)? {
-        Some(foreign) => {
-            Source::new(file.display().to_string(), foreign.scenario?, "").with(overrides)
-        }
-        None => Source::read(file, overrides),
-    }
+    Ok(made_or_read(worlds, file, overrides)?.0)
+}
+
+/// Returns the same, and whether its text was made from a file of another format.
+fn made_or_read(
+    worlds: Worlds,
+    file: &Path,
+    overrides: &[String],
+) -> Result<(Source, bool), InputError> {
+    let Some(foreign) = worlds.translate(file)? else {
+        return Ok((Source::read(file, overrides)?, false));
+    };
+    let source = Source::new(file.display().to_string(), foreign.scenario?, "");
+    Ok((source.with(overrides)?, true))
 }
 
 /// Returns the same error with its position in the file, or with the override that causes it: the
@@ -121,6 +147,27 @@ mod tests {
             ]
         );
         assert_eq!(problems(WORLDS, &file, &["airspace.dt_s=5".into()]), Ok(vec![]));
+    }
+
+    #[test]
+    fn errors_of_what_was_made_from_another_programs_file_point_at_no_line_of_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("a.scn");
+        // More orders than an airplane carries out: nothing is wrong with any of them.
+        let turns = (1..=20_000)
+            .map(|k| format!("00:10:{:05.2}>HDG A1 {}\n", 0.002 * f64::from(k), k % 360));
+        let text = "00:00:00.00>CRE A1,B744,0,-0.4,90,FL200,250\n".to_string()
+            + &turns.collect::<String>();
+        std::fs::write(&file, text).expect("written");
+        let error = read(WORLDS, &file, &[]).err().expect("wrong");
+        let place = format!("the scenario made from {}", file.display());
+        assert_eq!((error.place(), error.position()), (place.as_str(), None), "{error}");
+        assert!(error.cause().contains("orders") && error.key().is_some(), "{error}");
+        assert_eq!(problems(WORLDS, &file, &[]), Ok(vec![error.clone()]));
+        let other = read(WORLDS, &file, &["seed=3".into()]).err().expect("wrong");
+        assert_eq!(other, error, "no override causes it");
+        let caused = read(WORLDS, &file, &["airspace.dt_s=-3".into()]).err().expect("wrong");
+        assert!(caused.place().ends_with("a.scn with --set airspace.dt_s=-3"), "{caused}");
     }
 
     #[test]

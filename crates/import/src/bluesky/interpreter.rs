@@ -5,7 +5,8 @@ use std::fmt;
 
 use super::lines::Command;
 use super::values::{
-    Arguments, altitude_ft, heading_deg, is_latitude, number, positive, speed, switch,
+    Arguments, ZONE_HALF_HEIGHTS_FT, ZONE_RADII_NM, altitude_ft, heading_deg, is_latitude, number,
+    positive, speed, switch, vertical_speed_fpm, zone_size,
 };
 use super::{
     Change, MAX_AIRCRAFT, MAX_WAY_POINTS, Place, Resolution, ScnAircraft, ScnFile, Speed,
@@ -341,10 +342,10 @@ impl<'p> Interpreter<'p> {
             "ALT" => arguments.optional(altitude_ft)?.map(Change::AltitudeFt),
             "LNAV" => arguments.optional(switch)?.map(Change::LateralNavigation),
             "VNAV" => arguments.optional(switch)?.map(Change::VerticalNavigation),
-            _ => arguments.optional(number)?.map(Change::VerticalSpeedFpm),
+            _ => arguments.optional(vertical_speed_fpm)?.map(Change::VerticalSpeedFpm),
         };
         // ALT may have the vertical speed as a further argument.
-        let climb = if name == "ALT" { arguments.optional(number)? } else { None };
+        let climb = if name == "ALT" { arguments.optional(vertical_speed_fpm)? } else { None };
         let changes = change.into_iter().chain(climb.map(Change::VerticalSpeedFpm));
         self.drafts[index].aircraft.changes.extend(changes.map(|change| (time_s, change)));
         Ok(Outcome::Done)
@@ -394,8 +395,11 @@ impl<'p> Interpreter<'p> {
         }
         let traffic = &mut self.file.traffic;
         match name {
-            "ZONER" => traffic.zone_radius_nm = positive(place, value)?,
-            "ZONEDH" => traffic.zone_half_height_ft = positive(place, value)?,
+            "ZONER" => traffic.zone_radius_nm = zone_size(place, value, (&ZONE_RADII_NM, "NM"))?,
+            "ZONEDH" => {
+                traffic.zone_half_height_ft =
+                    zone_size(place, value, (&ZONE_HALF_HEIGHTS_FT, "ft"))?;
+            }
             "DTLOOK" => traffic.lookahead_s = positive(place, value)?,
             "NOISE" => traffic.noise = switch(place, value)?,
             _ if upper(value) == "STATEBASED" => traffic.detection = Some(true),

@@ -266,9 +266,17 @@ fn absurd_patterns_are_refused() {
         let file = scenario(command);
         assert_eq!((file.refused.len(), file.traffic.aircraft.len()), (1, 0), "{command}");
     }
-    for command in
-        [",HOLD", "SYN", "SYN SUPER", "SYN SUPER x", "ZONER -1", "NOISE maybe", "WIND 0,0,9"]
-    {
+    for command in [
+        ",HOLD",
+        "SYN",
+        "SYN SUPER",
+        "SYN SUPER x",
+        "ZONER -1",
+        "ZONER 600",
+        "ZONEDH 1",
+        "NOISE maybe",
+        "WIND 0,0,9",
+    ] {
         assert_eq!(scenario(command).unparsed.len(), 1, "{command}");
     }
 }

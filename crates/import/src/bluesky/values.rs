@@ -80,6 +80,16 @@ const LONGITUDE: Axis = Axis { positive: 'E', negative: 'W', max_deg: 360.0 };
 /// The range of altitudes, in ft; true airspeeds are finite at all of them.
 const ALTITUDES_FT: RangeInclusive<f64> = -10_000.0..=300_000.0;
 
+/// The range of vertical speeds, in ft/min: faster than any rocket, and slower than any instrument shows.
+const VERTICAL_SPEEDS_FPM: RangeInclusive<f64> = 0.001..=1_000_000.0;
+
+/// The range of the protected zone's radius, in nautical miles.
+pub(super) const ZONE_RADII_NM: RangeInclusive<f64> = 0.000_1..=500.0;
+
+/// The range of half the height of the protected zone, in ft: levels nearer than a meter are one for any
+/// altimeter.
+pub(super) const ZONE_HALF_HEIGHTS_FT: RangeInclusive<f64> = 3.3..=1_000_000.0;
+
 const MAX_SPEED_KT: f64 = 10_000.0;
 const MAX_MACH: f64 = 20.0;
 
@@ -198,6 +208,31 @@ pub(super) fn positive(place: &dyn fmt::Display, word: Word) -> Result<f64, Inpu
     Err(word.error(place, format!("{value} is not larger than 0"), "write a number such as 5"))
 }
 
+/// Reads a vertical speed in ft/min, up or down, or 0 for none.
+pub(super) fn vertical_speed_fpm(place: &dyn fmt::Display, word: Word) -> Result<f64, InputError> {
+    let value = word.number(place)?;
+    if value == 0.0 || VERTICAL_SPEEDS_FPM.contains(&value.abs()) {
+        return Ok(value);
+    }
+    let (least, most) = (VERTICAL_SPEEDS_FPM.start(), VERTICAL_SPEEDS_FPM.end());
+    let cause = format!("a vertical speed of {value:?} ft/min");
+    Err(word.error(place, cause, &format!("write {least} to {most} ft/min, up or down, or 0")))
+}
+
+/// Reads a size of the protected zone.
+pub(super) fn zone_size(
+    place: &dyn fmt::Display,
+    word: Word,
+    (range, unit): (&RangeInclusive<f64>, &str),
+) -> Result<f64, InputError> {
+    let value = word.number(place)?;
+    if range.contains(&value) {
+        return Ok(value);
+    }
+    let cause = format!("a zone of {value:?} {unit}");
+    Err(word.error(place, cause, &format!("write {} to {} {unit}", range.start(), range.end())))
+}
+
 /// Reads any number.
 pub(super) fn number(place: &dyn fmt::Display, word: Word) -> Result<f64, InputError> {
     word.number(place)
@@ -284,6 +319,28 @@ mod tests {
         }
         for text in ["FL", "F200", "high", "é€", "FL9999", "-1e5", "1e300"] {
             assert!(altitude_ft(&"f", word(text)).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn vertical_speeds_and_zones_are_those_of_aircraft() {
+        for fpm in ["0", "-1500", "0.5", "1e6"] {
+            assert!(vertical_speed_fpm(&"f", word(fpm)).is_ok(), "{fpm}");
+        }
+        for fpm in ["1e300", "-1e7", "1e-300", "up"] {
+            assert!(vertical_speed_fpm(&"f", word(fpm)).is_err(), "{fpm}");
+        }
+        for (text, range, is_right) in [
+            ("5", ZONE_RADII_NM, true),
+            ("600", ZONE_RADII_NM, false),
+            ("-5", ZONE_RADII_NM, false),
+            ("0", ZONE_RADII_NM, false),
+            ("1000", ZONE_HALF_HEIGHTS_FT, true),
+            ("1", ZONE_HALF_HEIGHTS_FT, false),
+            ("1e300", ZONE_HALF_HEIGHTS_FT, false),
+        ] {
+            let found = zone_size(&"f.scn", word(text), (&range, "u"));
+            assert_eq!(found.is_ok(), is_right, "{text}");
         }
     }
 

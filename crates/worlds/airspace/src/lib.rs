@@ -79,8 +79,7 @@ pub struct Scratch {
     exchanged: Traffic,
     events: Vec<Event>,
     flown: Vec<FlownLeg>,
-    /// Pairs without fallbacks that are apart, one of which has just come in: cycle and both
-    /// airplanes.
+    /// Pairs that were named, for which the shield promises nothing: cycle and both airplanes.
     too_close: Vec<(Cycle, Slot, Slot)>,
     /// Processor time spent deciding, in nanoseconds: reported beside the results, never part of
     /// them.

@@ -150,6 +150,12 @@ pub(super) const MEANINGS: &[Meaning] = &[
         meaning: "times that a group was too large to be optimized",
     },
     Meaning {
+        name: "not_appeared",
+        words: "airplanes that have not appeared",
+        unit: "",
+        meaning: "airplanes that had not appeared yet when the run ended",
+    },
+    Meaning {
         name: "left",
         words: "airplanes removed",
         unit: "",

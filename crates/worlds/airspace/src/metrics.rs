@@ -6,16 +6,16 @@ use super::state::{AirspaceState, Cell, PairRecord};
 use super::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Everything that a run counts beside its state, and that a checkpoint keeps.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Ledger {
     /// Pairs that came near each other, by ids.
     pub pairs: BTreeMap<(EntityId, EntityId), PairRecord>,
-    /// Pairs without fallbacks that are apart when the later one of them came under the method,
-    /// each with the cycle of that event.
-    pub too_close: BTreeSet<(Cycle, EntityId, EntityId)>,
+    /// Pairs for which the shield promises nothing, by rising ids, each with the first cycle in which it was
+    /// named.
+    pub too_close: BTreeMap<(EntityId, EntityId), Cycle>,
     /// Sums over optimizations.
     pub effort: Effort,
     /// Number of events of each kind.
@@ -27,6 +27,13 @@ pub struct Ledger {
 impl Ledger {
     pub(super) fn add_pair(&mut self, pair: (EntityId, EntityId), record: PairRecord) {
         self.pairs.entry(pair).and_modify(|r| r.add(record)).or_insert(record);
+    }
+
+    /// Counts a pair as one for which the shield promises nothing. It stays one pair, from the first cycle on,
+    /// when it is named again.
+    pub(super) fn add_too_close(&mut self, now: Cycle, (a, b): (EntityId, EntityId)) {
+        let first = self.too_close.entry((a.min(b), a.max(b))).or_insert(now);
+        *first = now.min(*first);
     }
 
     pub(super) fn add_event(&mut self, event: &Event) {
@@ -98,6 +105,8 @@ pub struct Metrics {
     pub deadlines_missed: u64,
     /// Number of times that a group was too large to be optimized.
     pub groups_too_large: u64,
+    /// Number of airplanes that have not appeared yet.
+    pub not_appeared: u64,
     /// Number of airplanes that were removed before they had arrived.
     pub left: u64,
     /// Number of airplanes that arrived at the end of their recorded way, which nothing changed.
@@ -254,10 +263,17 @@ fn mean(sum: f64, n: usize) -> Option<f64> {
     (n > 0).then(|| sum / n as f64)
 }
 
-/// Returns the metrics of a run so far; `decide_s` is the time spent deciding, in seconds.
+/// Returns the number of airplanes that were not in the air before a cycle, because they come in later.
+fn not_appeared(world: &AirspaceWorld, now: Cycle) -> u64 {
+    // At the very start those are there that begin with it.
+    let later = |&i: &usize| world.appears_in(i) >= now.max(1);
+    (0..world.airplanes.len()).filter(later).count() as u64
+}
+
+/// Returns the metrics of a run until a cycle; `decide_s` is the time spent deciding, in seconds.
 pub fn metrics(
     world: &AirspaceWorld,
-    state: &AirspaceState,
+    (state, now): (&AirspaceState, Cycle),
     ledger: &Ledger,
     decide_s: f64,
 ) -> Metrics {
@@ -301,18 +317,26 @@ pub fn metrics(
         contacts_lost: ledger.count(EventKind::Unheard),
         deadlines_missed: ledger.count(EventKind::Deadline),
         groups_too_large: ledger.count(EventKind::GroupTooLarge),
+        not_appeared: not_appeared(world, now),
         left: count(state, Cell::has_left),
         replayed: replayed(world, state),
         orders: all.iter().map(|a| u64::from(a.orders)).sum(),
         orders_delayed: all.iter().map(|a| u64::from(a.orders_delayed)).sum(),
-        too_close: ledger.too_close.iter().map(|pair| too_close(world, pair)).collect(),
+        too_close: too_close(world, ledger),
         beyond_bound: ledger.beyond_bound.iter().map(beyond_bound).collect(),
     }
 }
 
-fn too_close(world: &AirspaceWorld, &(cycle, a, b): &(Cycle, EntityId, EntityId)) -> TooClose {
-    let callsigns = world.callsigns([a, b]);
-    TooClose { at_s: world.starts_s(cycle), airplanes: [a, b], callsigns }
+/// Returns the pairs for which the shield promises nothing, by the time when that began.
+fn too_close(world: &AirspaceWorld, ledger: &Ledger) -> Vec<TooClose> {
+    let mut pairs: Vec<_> = ledger.too_close.iter().map(|(&pair, &cycle)| (cycle, pair)).collect();
+    pairs.sort_unstable();
+    let one = |(cycle, (a, b))| TooClose {
+        at_s: world.starts_s(cycle),
+        airplanes: [a, b],
+        callsigns: world.callsigns([a, b]),
+    };
+    pairs.into_iter().map(one).collect()
 }
 
 /// Returns whether all airplanes have arrived or left by now.
@@ -344,5 +368,37 @@ mod tests {
         assert_eq!((first.flown_s, first.delay_s(), first.delay_percent), (Some(20.0), None, None));
         let metrics = run.metrics();
         assert!(metrics.mean_delay_percent.is_some_and(f64::is_finite), "{metrics:?}");
+    }
+
+    #[test]
+    fn a_pair_that_is_named_again_is_one_pair_without_a_promise_since_the_first_time() {
+        let mut text =
+            "format = 1\nworld = \"airspace\"\nseed = 4\n[airspace]\nmethod = \"none\"\n\
+                        [airspace.generator]\nkind = \"random\"\nn = 12\nradius_m = 8000.0\n"
+                .to_string();
+        for (start, way) in [
+            (
+                "at_m = [-9000, 0]\nheading_deg = 0",
+                "[[0, 900], [3000, -3000], [-3000, -3000], [0, 3000], [5000, 0], [-5000, 0]]",
+            ),
+            (
+                "at_m = [9000, 2000]\nheading_deg = 180",
+                "[[0, -900], [-3000, 3000], [3000, 3000], [0, -3000], [-5000, 0], [5000, 0]]",
+            ),
+        ] {
+            text += &format!(
+                "[[airplanes]]\n{start}\nway_points_m = {way}\nv_m_s = 60\nintruder = true\n"
+            );
+        }
+        let mut run = airspace_run(&Source::new("n", text, ""), 1).expect("a scenario");
+        run.advance(run.plan().cycles);
+        let named = run.books().ledger.count(super::EventKind::Intruder);
+        let told = run.metrics().too_close;
+        let mut pairs: Vec<_> = told.iter().map(|one| one.airplanes).collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        assert_eq!(pairs.len(), told.len(), "{told:?}");
+        assert!(named > told.len() as u64, "one is named twice: {named}, {told:?}");
+        assert!(told.is_sorted_by_key(|one| one.at_s), "{told:?}");
     }
 }

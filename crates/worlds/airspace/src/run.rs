@@ -34,8 +34,8 @@ impl Compiled {
     /// checkpoints.
     pub fn start(self, source: &Source, workers: usize) -> AirspaceRun {
         let state = AirspaceState::restore(&self.world, &self.start_snapshot());
-        let too_close = self.too_close.iter().map(|&(a, b)| (0, a, b)).collect();
-        let ledger = Ledger { too_close, ..Ledger::default() };
+        let mut ledger = Ledger::default();
+        self.too_close.iter().for_each(|&pair| ledger.add_too_close(0, pair));
         let books = Books { ledger, rows: Rows::new(self.record), ..Books::default() };
         let plan = self.plan();
         Run::new(self.world, plan, (state, books), &source.text, workers)
@@ -103,7 +103,9 @@ impl World for AirspaceWorld {
         }
         ledger.effort.beacons.add(std::mem::take(&mut scratch.grouped));
         ledger.effort.traffic.add(std::mem::take(&mut scratch.exchanged));
-        ledger.too_close.extend(std::mem::take(&mut scratch.too_close));
+        for (now, a, b) in std::mem::take(&mut scratch.too_close) {
+            ledger.add_too_close(now, (a, b));
+        }
         books.decide_ns += std::mem::take(&mut scratch.decide_ns);
         books.gathered.events.append(&mut scratch.events);
         books.gathered.optimizations.append(&mut scratch.optimizations);
@@ -232,8 +234,8 @@ impl World for AirspaceWorld {
         view::place_rows()
     }
 
-    fn metrics(&self, state: &AirspaceState, books: &Books, _: Cycle, _: &Effort) -> Metrics {
-        metrics::metrics(self, state, &books.ledger, books.decide_ns as f64 / 1e9)
+    fn metrics(&self, state: &AirspaceState, books: &Books, now: Cycle, _: &Effort) -> Metrics {
+        metrics::metrics(self, (state, now), &books.ledger, books.decide_ns as f64 / 1e9)
     }
 
     fn agent_metrics(&self, state: &AirspaceState, _: &Books, _: Cycle) -> Value {

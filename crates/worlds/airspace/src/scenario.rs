@@ -263,6 +263,16 @@ mod tests {
         let endless = "[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[7000, 0]]\n\
                        orders = [{ at_s = 10.0, heading_deg = 90.0 }]\n";
         assert_eq!(compiled(endless).cycles, 400);
+        // One that comes in late, and one that is told something late, and neither ever ends.
+        for late in [
+            "appears_s = 4000.0\norders = [{ at_s = 10.0, heading_deg = 90.0 }]\n",
+            "orders = [{ at_s = 10.0, heading_deg = 90.0 }, { at_s = 4000.0, heading_deg = 0.0 }]\n",
+        ] {
+            let late = format!(
+                "[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[7000, 0]]\n{late}"
+            );
+            assert_eq!(compiled(&late).cycles, 2400, "{late}");
+        }
         let track = "[[airplanes]]\ntrack = [[0, 0, 0, 0], [3000, 100000, 0, 0]]\n";
         assert_eq!(compiled(track).cycles, 1800);
     }

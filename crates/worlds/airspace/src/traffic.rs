@@ -47,7 +47,7 @@ pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
     let plane = LocalPlane::about_all(aircraft.iter().map(|one| one.0.position()))?;
     let zone = (traffic.zone_radius_nm * NAUTICAL_MILE_M, traffic.zone_half_height_ft * FOOT_M);
     let more = settings(rules) + &origin(&plane);
-    let mut text = heading(name, zone, rules.horizon_s, &more);
+    let mut text = heading(name, zone, rules.look_ahead_s, &more);
     for one in &aircraft {
         write_aircraft(&mut text, &one.0, &plane);
     }
@@ -127,6 +127,10 @@ fn settings(rules: &Rules) -> String {
     // Writing to a string cannot fail.
     if let Some(method) = rules.method {
         let _ = writeln!(text, "method = {method:?}");
+    }
+    if let Some(s) = rules.look_ahead_s {
+        // BlueSky's own method looks as far ahead as the predictions of others, wherever it is chosen.
+        let _ = writeln!(text, "mvp = {{ look_ahead_s = {s:?} }}");
     }
     if rules.is_bare {
         text.push_str("shield = \"off\"\n");
@@ -345,8 +349,10 @@ fn heading(
     more: &str,
 ) -> String {
     let horizon_s = horizon_s.unwrap_or(300.0);
+    // Rust's own escapes are not those of TOML: an accent of its own would be `\u{301}`.
+    let name = toml::Value::from(name);
     format!(
-        "format = 1\nworld = \"airspace\"\nname = {name:?}\ncycles = 4000\n\n\
+        "format = 1\nworld = \"airspace\"\nname = {name}\n\n\
          [airspace]\nvertical_m = {vertical_m:?}\nhorizon_s = {horizon_s:?}\ndt_s = {DT_S:?}\ndtau_s = 5.0\n\
          legs = {{ turns_s = [20.0, 40.0, 60.0], until_s = [240.0] }}\n{more}\n[airplane]\nseparation_m = {separation_m:?}\n"
     )
@@ -355,6 +361,7 @@ fn heading(
 #[cfg(test)]
 mod tests {
     use super::super::airspace_run;
+    use super::super::scenario::Compiled;
     use super::*;
     use sidestep_import::bluesky::parse;
     use sidestep_kernel::Simulation;
@@ -376,6 +383,66 @@ mod tests {
         let metrics = run.metrics();
         assert_eq!(metrics.losses_of_separation, 0);
         assert!(metrics.min_separation_m.is_some_and(|d| d < 20_000.0), "they have met");
+    }
+
+    fn compiled(commands: &str) -> Compiled {
+        let line = |command: &str| format!("00:00:00.00>{command}\n");
+        let text: String = commands.lines().map(line).collect();
+        let text = from_bluesky("told", &parse(&"told.scn", &text)).expect("it has aircraft");
+        Compiled::new(&Source::new("told", text, "")).expect("a scenario")
+    }
+
+    #[test]
+    fn the_method_that_flies_looks_as_far_ahead_as_the_file_says_and_check_tells_it() {
+        let flights = "CRE A1,B744,0,-0.4,90,FL200,250\nCRE B2,B744,0,0.4,270,FL200,250\n";
+        for (settings, s) in [
+            ("RESO MVP\nDTLOOK 60", 60.0),
+            ("RESO MVP\nDTLOOK 1200", 1200.0),
+            ("RESO MVP", 300.0),
+            ("DTLOOK 120", 120.0),
+            ("", 300.0),
+        ] {
+            let compiled = compiled(&format!("{flights}{settings}"));
+            assert_eq!(compiled.world.looks_ahead().look_ahead_s, s, "{settings}");
+            assert_eq!(compiled.world.mvp.margin, 1.05, "{settings}");
+            let told = crate::words::contents(&compiled).text;
+            assert!(told.contains(&format!("decides every 10 s, looks {s} s ahead")), "{told}");
+        }
+        // MVP that the file does not ask for, but `--set`, looks as far.
+        assert_eq!(compiled(&format!("{flights}DTLOOK 120")).world.mvp.look_ahead_s, 120.0);
+    }
+
+    #[test]
+    fn an_imported_flight_that_begins_late_in_a_long_day_is_flown_to_its_end() {
+        let short = compiled("CRE A1,A320,52,4,90,FL300,270");
+        let thrice_ahead = 530..=540;
+        assert!(thrice_ahead.contains(&short.cycles), "{}", short.cycles);
+        let text = "00:00:00.00>CRE A1,A320,52.0,4.0,90,FL300,270\n\
+                    13:00:00.00>CRE B2,A320,52.0,5.0,90,FL300,270\n";
+        let text = from_bluesky("day", &parse(&"day.scn", text)).expect("it has aircraft");
+        let mut run = airspace_run(&Source::new("day", text, ""), 1).expect("a scenario");
+        run.advance(run.plan().cycles);
+        let metrics = run.metrics();
+        assert_eq!((metrics.arrived, metrics.not_appeared), (2, 0));
+    }
+
+    #[test]
+    fn any_name_of_a_file_is_the_name_of_its_scenario() {
+        let file = parse(&"f.scn", "00:00:00.00>CRE A1,A320,52.0,4.0,90,FL300,270\n");
+        for name in ["cafe\u{301}", "a \"b\" \\ 'c'", "tab\tline\nend", "\u{feff}\u{7f}\u{0}", ""] {
+            let text = from_bluesky(name, &file).expect("it has aircraft");
+            let compiled = Compiled::new(&Source::new(name, text, "")).expect("a scenario");
+            assert_eq!(compiled.name, name);
+        }
+    }
+
+    #[test]
+    fn check_tells_how_far_orca_looks_ahead() {
+        let text = "format = 1\nworld = \"airspace\"\nairspace.method = \"orca\"\n\
+                    [airspace.generator]\nkind = \"superconflict\"\nn = 3\n";
+        let compiled = Compiled::new(&Source::new("o", text, "")).expect("a scenario");
+        let told = crate::words::contents(&compiled).text;
+        assert!(told.contains("looks 45 s ahead"), "{told}");
     }
 
     #[test]

@@ -52,11 +52,11 @@ pub(super) fn contents(compiled: &Compiled) -> Said {
 
 /// Returns how often the airplanes decide, and for how long they fly.
 fn times(compiled: &Compiled) -> Lines {
-    let timing = &compiled.world.timing;
-    let (cycles, lasts_s) = (grouped(compiled.cycles), compiled.cycles as f64 * timing.dt_s);
-    let (dt_s, horizon_s) = (timing.dt_s, timing.horizon_s());
+    let dt_s = compiled.world.timing.dt_s;
+    let (cycles, lasts_s) = (grouped(compiled.cycles), compiled.cycles as f64 * dt_s);
+    let look_ahead_s = compiled.world.looks_ahead().look_ahead_s;
     vec![
-        line("time", format!("decides every {dt_s} s, looks {horizon_s} s ahead")),
+        line("time", format!("decides every {dt_s} s, looks {look_ahead_s} s ahead")),
         line("run", format!("at most {cycles} cycles ({lasts_s} s), seed {}", compiled.seed)),
     ]
 }
@@ -101,6 +101,7 @@ fn range(numbers: impl Iterator<Item = f64>) -> String {
 /// Returns the outcome of a run.
 pub(super) fn outcome(metrics: &Metrics) -> Lines {
     let mut lines = flights(metrics);
+    lines.extend(not_appeared(metrics));
     lines.extend(network(metrics));
     lines.extend(on_the_way(metrics));
     lines.extend(warning(&metrics.too_close));
@@ -120,13 +121,11 @@ pub(super) fn poses(snapshot: &Snapshot) -> Said {
     Said { json, text }
 }
 
-/// Returns the pairs whose first fallbacks are not apart, in words.
-fn too_close(world: &AirspaceWorld, pairs: &[(u32, u32)]) -> Lines {
-    let warn = |&(a, b): &(u32, u32)| {
-        let [a, b] = [a, b].map(|id| world.called(id));
-        line("warning", format!("airplanes {a} and {b} start too close for the shield"))
-    };
-    pairs.iter().map(warn).collect()
+/// Returns the first pairs whose first fallbacks are not apart, and the number of others.
+fn too_close(world: &AirspaceWorld, pairs: &[(u32, u32)]) -> Option<(String, String)> {
+    let named = |&(a, b): &(u32, u32)| format!("{} and {}", world.called(a), world.called(b));
+    let told = first_named(pairs, named)?;
+    Some(line("warning", format!("start too close for the shield: {told}")))
 }
 
 /// Returns the traffic on the network, and its faults.
@@ -155,6 +154,17 @@ fn network(m: &Metrics) -> Lines {
     lines
 }
 
+/// Returns the warning that a run was too short for some airplanes to be seen at all: they count among those
+/// that have not arrived.
+fn not_appeared(m: &Metrics) -> Option<(String, String)> {
+    let many = match m.not_appeared {
+        0 => return None,
+        1 => "1 airplane has".into(),
+        n => format!("{} airplanes have", grouped(n)),
+    };
+    Some(line("WARNING", format!("{many} not appeared by now: more cycles would show them")))
+}
+
 /// Returns lines on recorded ways, orders and removals; none where there were none.
 fn on_the_way(m: &Metrics) -> Lines {
     let mut lines = Vec::new();
@@ -174,32 +184,31 @@ fn on_the_way(m: &Metrics) -> Lines {
 /// Number of pairs or airplanes that a warning names.
 const NAMED: usize = 5;
 
+/// Returns the first of many in words, and the number of others; `None` without any.
+fn first_named<T>(all: &[T], words: impl Fn(&T) -> String) -> Option<String> {
+    let mut named: Vec<String> = all.iter().take(NAMED).map(words).collect();
+    if all.len() > NAMED {
+        named.push(format!("and {} more", grouped((all.len() - NAMED) as u64)));
+    }
+    (!named.is_empty()).then(|| named.join(", "))
+}
+
 /// Returns the first airplanes whose errors exceeded the shield's bounds, and the number of others.
 fn beyond_bound(all: &[BeyondBound]) -> Option<(String, String)> {
-    let named = all.iter().take(NAMED).map(|one| {
+    let told = first_named(all, |one| {
         let name = one.callsign.clone().unwrap_or_else(|| one.airplane.to_string());
         format!("{name} at {} s", one.at_s)
-    });
-    let mut airplanes: Vec<String> = named.collect();
-    if all.len() > NAMED {
-        airplanes.push(format!("and {} more", grouped((all.len() - NAMED) as u64)));
-    }
-    let told = || line("WARNING", format!("errors beyond the bound: {}", airplanes.join(", ")));
-    (!all.is_empty()).then(told)
+    })?;
+    Some(line("WARNING", format!("errors beyond the bound: {told}")))
 }
 
 /// Returns the first pairs for which the shield promises nothing, and the number of others.
 fn warning(too_close: &[TooClose]) -> Option<(String, String)> {
-    let named = too_close.iter().take(NAMED).map(|TooClose { at_s, airplanes, callsigns }| {
+    let told = first_named(too_close, |TooClose { at_s, airplanes, callsigns }| {
         let [a, b] = callsigns.clone().unwrap_or_else(|| airplanes.map(|id| id.to_string()));
         if *at_s > 0.0 { format!("{a} and {b} at {at_s} s") } else { format!("{a} and {b}") }
-    });
-    let mut pairs: Vec<String> = named.collect();
-    if too_close.len() > NAMED {
-        pairs.push(format!("and {} more", grouped((too_close.len() - NAMED) as u64)));
-    }
-    let told = || line("WARNING", format!("too close for the shield: {}", pairs.join(", ")));
-    (!too_close.is_empty()).then(told)
+    })?;
+    Some(line("WARNING", format!("too close for the shield: {told}")))
 }
 
 fn flights(m: &Metrics) -> Lines {
@@ -225,4 +234,69 @@ fn flights(m: &Metrics) -> Lines {
             ),
         ),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::contents;
+    use crate::airspace_run;
+    use crate::scenario::Compiled;
+    use sidestep_kernel::{Simulation, World};
+    use sidestep_scenario::Source;
+
+    /// Many airplanes in a heap.
+    fn heap(airspace: &str) -> Source {
+        let text = format!(
+            "format = 1\nworld = \"airspace\"\n[airspace]\nmethod = \"none\"\n{airspace}\n\
+             [airspace.generator]\nkind = \"superconflict\"\nn = 40\nradius_m = 2000\n"
+        );
+        Source::new("heap", text, "")
+    }
+
+    #[test]
+    fn check_names_the_first_pairs_without_a_promise_and_counts_the_others() {
+        let compiled = Compiled::new(&heap("")).expect("a scenario");
+        let pairs = compiled.too_close.len();
+        assert!(pairs > 50, "{pairs}");
+        let told = contents(&compiled).text;
+        let words = told.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(words.matches("too close for the shield").count(), 1, "{told}");
+        assert!(words.contains(&format!(", and {} more", pairs - 5)), "{told}");
+    }
+
+    #[test]
+    fn nothing_is_too_close_for_a_shield_that_is_not_there() {
+        let source = heap("shield = \"off\"");
+        let compiled = Compiled::new(&source).expect("a scenario");
+        assert_eq!(compiled.too_close, []);
+        assert!(!contents(&compiled).text.contains("too close"));
+        let mut run = compiled.start(&source, 1);
+        run.advance(3);
+        assert_eq!(run.metrics().too_close, []);
+        let lines = run.world().outcome(&run.metrics());
+        assert!(lines.iter().all(|(_, words)| !words.contains("too close")), "{lines:?}");
+    }
+
+    #[test]
+    fn a_run_that_ends_before_an_airplane_appears_says_so() {
+        let one = |y: u32, appears_s: u32| {
+            format!(
+                "[[airplanes]]\nat_m = [0, {y}]\nheading_deg = 0\nway_points_m = [[700, {y}]]\n\
+                 appears_s = {appears_s}\n"
+            )
+        };
+        let head = "format = 1\nworld = \"airspace\"\ncycles = 20\n";
+        let text = format!("{head}{}{}", one(0, 0), one(9000, 50));
+        let mut run = airspace_run(&Source::new("n", text, ""), 1).expect("a scenario");
+        let told = |run: &crate::AirspaceRun| {
+            let lines = run.world().outcome(&run.metrics());
+            lines.into_iter().any(|(_, words)| words.contains("1 airplane has not appeared"))
+        };
+        assert_eq!(run.metrics().not_appeared, 1, "the other one is there from the start");
+        run.advance(10);
+        assert_eq!(run.metrics().not_appeared, 1, "it would come in with the next cycle");
+        assert!(told(&run));
+        run.advance(1);
+        assert!(!told(&run) && run.metrics().not_appeared == 0);
+    }
 }

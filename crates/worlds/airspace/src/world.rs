@@ -342,7 +342,7 @@ impl AirspaceWorld {
     }
 
     /// Returns how far the method looks ahead, and how much separation it asks for.
-    fn looks_ahead(&self) -> Reactive {
+    pub(crate) fn looks_ahead(&self) -> Reactive {
         match self.method {
             Method::Mvp => self.mvp,
             Method::Orca => self.orca,

@@ -33,7 +33,7 @@ pub(super) fn name_intruders(turn: &mut Turn<'_>, own: &Own, all: &[Intruder], w
     }
     for one in reached.iter().filter(|one| !named.contains(&one.slot)) {
         state.name(slot, one.slot);
-        scratch.too_close.push((now, slot.min(one.slot), slot.max(one.slot)));
+        scratch.too_close.push((now, slot, one.slot));
         let apart_m = distance_m(state.airplanes[slot as usize].pose().at, one.at);
         let event = Event::of_pair(now, EventKind::Intruder, slot, one.slot);
         scratch.events.push(event.with(apart_m));

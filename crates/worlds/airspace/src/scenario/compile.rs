@@ -67,7 +67,10 @@ impl<'a> Compiler<'a> {
         self.fits_deployment(&world)?;
         self.fits_a_pair(&world)?;
         self.fits_errors(&world)?;
-        let (fallbacks, too_close) = first(&world);
+        let (fallbacks, too_close) = match world.shield {
+            true => first(&world),
+            false => (vec![Side::default(); world.airplanes.len()], Vec::new()),
+        };
         let fallbacks = Arc::new(fallbacks);
         world.first_fallbacks = Arc::clone(&fallbacks);
         let head = &self.recipe.head;
@@ -323,11 +326,22 @@ impl<'a> Compiler<'a> {
     }
 }
 
-/// Returns a number of cycles in which all should arrive. Flights that never end do not count.
+/// Returns a number of cycles in which all should arrive. Of flights that never end it counts what is
+/// known of them: that they begin, and their last order.
 fn enough_cycles(world: &AirspaceWorld) -> u64 {
-    let ends = (0..world.airplanes.len()).map(|i| world.ends_alone_s(i));
-    let longest_s = ends.filter(|s| s.is_finite()).fold(0.0, f64::max);
+    let ends_s = |i: usize| match world.ends_alone_s(i) {
+        s if s.is_finite() => s,
+        _ => told_until_s(world, i),
+    };
+    let longest_s = (0..world.airplanes.len()).map(ends_s).fold(0.0, f64::max);
     FEWEST_CYCLES.max((TIMES_ALONE * longest_s / world.timing.dt_s).ceil() as u64)
+}
+
+/// Returns the time until which something is told of an airplane that flies on for ever.
+fn told_until_s(world: &AirspaceWorld, i: usize) -> f64 {
+    let airplane = &world.airplanes[i];
+    let last_s = airplane.orders.last().map_or(0.0, |order| order.at_s);
+    last_s.max(world.starts_s(world.appears_in(i)))
 }
 
 /// Returns first fallbacks that are apart as far as possible, and the pairs that are not apart.

@@ -28,7 +28,7 @@ pub(crate) fn lost_and_named(run: &AirspaceRun) -> (Pairs, Pairs) {
     let ledger = &run.books().ledger;
     let lost = ledger.pairs.iter().filter(|(_, record)| record.losses > 0).map(|(pair, _)| *pair);
     let errs = |id: &u32| ledger.beyond_bound.contains_key(id);
-    let named = ledger.too_close.iter().map(|&(_, a, b)| (a, b));
+    let named = ledger.too_close.keys().copied();
     let beyond = ledger.pairs.keys().copied().filter(|(a, b)| errs(a) || errs(b));
     (lost.collect(), named.chain(beyond).collect())
 }

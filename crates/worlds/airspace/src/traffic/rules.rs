@@ -11,7 +11,9 @@ pub(crate) struct Rules {
     pub(super) method: Option<&'static str>,
     /// Whether conflicts are left as they are, by the shield too.
     pub(super) is_bare: bool,
-    pub(super) horizon_s: Option<f64>,
+    /// The look-ahead that the file asks for, or that its method has in BlueSky; `None` where it says
+    /// nothing about either.
+    pub(super) look_ahead_s: Option<f64>,
     pub(super) wind_m_s: Option<[f64; 2]>,
     /// Commands that cannot be flown.
     pub(crate) refused: Vec<InputError>,
@@ -38,14 +40,15 @@ pub(super) fn rules(place: &str, file: &ScnFile, dt_s: f64) -> Rules {
         refuse("WIND", cause, "give one wind below the speed of all aircraft");
         None
     });
-    let horizon_s = file.commands.contains_key("DTLOOK").then_some(traffic.lookahead_s);
-    if let Some(s) = horizon_s.filter(|s| !(dt_s..=LONGEST_S).contains(s)) {
+    let given_s = file.commands.contains_key("DTLOOK").then_some(traffic.lookahead_s);
+    if let Some(s) = given_s.filter(|s| !(dt_s..=LONGEST_S).contains(s)) {
         let cause = format!("a look-ahead of {s} s");
         refuse("DTLOOK", cause, &format!("give {dt_s} to {LONGEST_S} s"));
     }
     let (method, is_bare) = resolution(traffic);
-    rules.horizon_s = horizon_s.filter(|s| (dt_s..=LONGEST_S).contains(s));
-    Rules { method, is_bare, wind_m_s, ..rules }
+    let given_s = given_s.filter(|s| (dt_s..=LONGEST_S).contains(s));
+    let usual_s = (method == Some("mvp")).then(|| Traffic::default().lookahead_s);
+    Rules { method, is_bare, look_ahead_s: given_s.or(usual_s), wind_m_s, ..rules }
 }
 
 /// Longest look-ahead of a scenario in seconds.
@@ -113,7 +116,7 @@ mod tests {
             assert_eq!(told, [""; 0], "{commands}");
         }
         let (rules, _) = found("DTLOOK 120\nWIND 0,1,,270,36");
-        assert_eq!(rules.horizon_s, Some(120.0));
+        assert_eq!(rules.look_ahead_s, Some(120.0));
         let [east, north] = rules.wind_m_s.expect("a wind");
         assert!((east - 18.52).abs() < 1e-9 && north.abs() < 1e-9, "{east} {north}");
     }
@@ -132,7 +135,7 @@ mod tests {
             let [one] = &told[..] else { panic!("{commands}: {told:?}") };
             assert!(one.contains(&format!("{name}: ")), "{one}");
             assert_eq!(rules.refused[0].position(), Some((line, 1)), "{commands}");
-            assert_eq!((rules.horizon_s, rules.wind_m_s), (None, None), "{commands}");
+            assert_eq!((rules.look_ahead_s, rules.wind_m_s), (None, None), "{commands}");
         }
     }
 }
