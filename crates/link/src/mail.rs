@@ -106,6 +106,22 @@ impl Mail {
         Some(self.now().saturating_sub(heard))
     }
 
+    /// Whether no letter to another node has come for some time although there are some, over a straight way that seems
+    /// to be open.
+    pub fn is_deaf(&self, member: &Member, within: Duration) -> bool {
+        let since = self.others.get(&Party::Node(member.agent)).and_then(|o| o.post.waits_since());
+        since.is_some_and(|since| self.now().saturating_sub(since) > within)
+            && self.wire.is_open_to(member)
+    }
+
+    /// Closes the straight ways to all other nodes, and opens them anew.
+    ///
+    /// # Errors
+    /// When an endpoint cannot be had again.
+    pub fn reopen(&mut self) -> Result<(), WireError> {
+        self.wire.reopen()
+    }
+
     /// Whether all letters to all others have come.
     pub fn has_delivered(&self) -> bool {
         self.others.values().all(|other| other.post.has_delivered())

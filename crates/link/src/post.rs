@@ -27,8 +27,10 @@ const AGAIN_AT_ONCE: usize = 16;
 pub(crate) struct Post {
     /// Letters that the other may not have, from the oldest on. Others may wait for the same.
     waiting: VecDeque<Arc<Word>>,
-    /// Number of the oldest of them.
+    /// Number of the oldest of them,
     oldest: u64,
+    /// and the time since when it is that.
+    oldest_since: Option<Duration>,
     /// Time at which they are sent again.
     again_at: Option<Duration>,
     wait: Duration,
@@ -43,6 +45,7 @@ impl Default for Post {
         Self {
             waiting: VecDeque::new(),
             oldest: 0,
+            oldest_since: None,
             again_at: None,
             wait: FIRST_WAIT,
             next: 0,
@@ -64,6 +67,7 @@ impl Post {
     /// Keeps a letter until it is acknowledged, and returns its number.
     pub(crate) fn send(&mut self, word: Arc<Word>, now: Duration) -> u64 {
         self.waiting.push_back(word);
+        self.oldest_since.get_or_insert(now);
         self.again_at.get_or_insert(now + self.wait);
         self.oldest + self.waiting.len() as u64 - 1
     }
@@ -92,7 +96,8 @@ impl Post {
         self.waiting.drain(..new as usize);
         self.oldest += new;
         self.wait = FIRST_WAIT;
-        self.again_at = (!self.waiting.is_empty()).then_some(now + self.wait);
+        self.oldest_since = (!self.waiting.is_empty()).then_some(now);
+        self.again_at = self.oldest_since.map(|since| since + self.wait);
     }
 
     /// Returns the frames that are due.
@@ -110,6 +115,11 @@ impl Post {
             due.acknowledge = due.again.is_empty();
         }
         due
+    }
+
+    /// Returns the time since when no letter has come, though there are some; none where all have come.
+    pub(crate) fn waits_since(&self) -> Option<Duration> {
+        self.oldest_since
     }
 
     /// Returns the time at which frames are due next.
@@ -241,5 +251,22 @@ mod tests {
         post.on_received(u64::MAX, Duration::ZERO);
         assert!(post.has_delivered());
         assert_eq!(post.send(letter(1), Duration::ZERO), 1);
+    }
+
+    #[test]
+    fn it_is_known_since_when_no_letter_has_come() {
+        let at = Duration::from_secs;
+        let (mut post, word) = (Post::default(), Arc::new(Word::Hello));
+        assert_eq!(post.waits_since(), None);
+        for second in 1..4 {
+            post.send(word.clone(), at(second));
+        }
+        assert_eq!(post.waits_since(), Some(at(1)));
+        post.on_received(2, at(8));
+        assert_eq!(post.waits_since(), Some(at(8)), "two have come then");
+        post.on_received(2, at(9));
+        assert_eq!(post.waits_since(), Some(at(8)), "none has since");
+        post.on_received(3, at(10));
+        assert_eq!(post.waits_since(), None);
     }
 }

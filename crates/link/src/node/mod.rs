@@ -20,6 +20,9 @@ use turn::{Ends, Turn};
 /// Time between two reports of a node.
 const REPORT: Duration = Duration::from_millis(500);
 
+/// Time in which no letter comes to another node before the link is taken for deaf, if it seems to be open.
+const DEAF: Duration = Duration::from_secs(5);
+
 /// Time after which it looks around, at most.
 const LOOK: Duration = Duration::from_millis(100);
 
@@ -70,6 +73,8 @@ pub struct Node {
     /// The part of a cycle that was logged last.
     part: (Cycle, &'static str),
     report_at: Instant,
+    /// Time before which no link is opened anew.
+    mend_at: Instant,
     looks: Looks,
 }
 
@@ -97,6 +102,7 @@ impl Node {
             status: Status::default(),
             part: Default::default(),
             report_at: Instant::now(),
+            mend_at: Instant::now(),
             looks: Box::new(|_| {}),
         }
     }
@@ -119,7 +125,7 @@ impl Node {
                 return Ok(self.status);
             };
             self.go_on();
-            self.report();
+            self.report()?;
             let silent = self.mail.silent_for(Party::Server);
             // What has come while this process stood still is heard first.
             if heard == 0 && silent.is_some_and(|silent| silent > self.lease) {
@@ -259,15 +265,28 @@ impl Node {
     }
 
     /// Tells the server how this node is, now and then.
-    fn report(&mut self) {
+    fn report(&mut self) -> Result<(), NodeError> {
         let now = Instant::now();
         if now < self.report_at {
-            return;
+            return Ok(());
         }
         self.report_at = now + REPORT;
         self.note_status();
         (self.looks)(&self.status);
         self.mail.note(Party::Server, Word::Status(self.status.clone()));
+        self.mend_links(now)
+    }
+
+    /// Opens the straight ways anew when one of them is deaf: alive at both ends, and nothing comes through. Zenoh leaves
+    /// such links behind where opening one took as long as it may, and on a busy machine that is not rare.
+    fn mend_links(&mut self, now: Instant) -> Result<(), NodeError> {
+        // Of two, the one with the higher id has opened the link.
+        let mut before = self.members.iter().filter(|member| member.agent < self.agent);
+        let deaf = before.find(|member| self.mail.is_deaf(member, DEAF));
+        let Some(deaf) = deaf.filter(|_| now >= self.mend_at) else { return Ok(()) };
+        tracing::warn!(agent = self.agent, other = deaf.agent, "a link is deaf: opened anew");
+        self.mend_at = now + 2 * DEAF;
+        Ok(self.mail.reopen()?)
     }
 
     fn note_status(&mut self) {

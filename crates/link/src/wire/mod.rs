@@ -36,6 +36,19 @@ pub trait Wire: Send {
     fn join(&mut self, _me: EntityId, _members: &[Member]) -> Result<(), WireError> {
         Ok(())
     }
+
+    /// Whether there is a straight way to another node that seems to be open, whatever comes through.
+    fn is_open_to(&self, _member: &Member) -> bool {
+        false
+    }
+
+    /// Closes the straight ways to all other nodes, and opens them anew.
+    ///
+    /// # Errors
+    /// When an endpoint cannot be had again.
+    fn reopen(&mut self) -> Result<(), WireError> {
+        Ok(())
+    }
 }
 
 impl<W: Wire + ?Sized> Wire for Box<W> {
@@ -49,5 +62,13 @@ impl<W: Wire + ?Sized> Wire for Box<W> {
 
     fn join(&mut self, me: EntityId, members: &[Member]) -> Result<(), WireError> {
         (**self).join(me, members)
+    }
+
+    fn is_open_to(&self, member: &Member) -> bool {
+        (**self).is_open_to(member)
+    }
+
+    fn reopen(&mut self) -> Result<(), WireError> {
+        (**self).reopen()
     }
 }

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use zenoh::key_expr::KeyExpr;
 use zenoh::pubsub::Subscriber;
 use zenoh::qos::CongestionControl;
@@ -24,12 +24,18 @@ use zenoh::{Config, Session, Wait};
 const LEASE_MS: u64 = 2_000;
 
 /// Time that opening a link may take at either end, in milliseconds. Zenoh's own, ten seconds, is how long it
-/// takes to come back after a partition.
-const OPENED_WITHIN_MS: u64 = 1_000;
+/// takes to come back after a partition. It must not be short either: a link whose opening is broken off at the very
+/// end stays alive and deaf (`Wire::reopen`).
+const OPENED_WITHIN_MS: u64 = 3_000;
+
+/// Time in which the endpoints of a session that was closed can be had again.
+const FREED_WITHIN: Duration = Duration::from_secs(5);
 
 /// Settings of a Zenoh session.
 #[derive(Debug, Clone, Default)]
 struct Settings<'a> {
+    /// Name of the session by which others know it; none for one that Zenoh makes up.
+    id: Option<String>,
     mode: &'a str,
     listen: &'a [String],
     connect: &'a [String],
@@ -67,6 +73,9 @@ impl Settings<'_> {
             ("transport/unicast/open_timeout", OPENED_WITHIN_MS.to_string()),
             ("transport/unicast/accept_timeout", OPENED_WITHIN_MS.to_string()),
         ];
+        if let Some(id) = &self.id {
+            keys.push(("id", format!("{id:?}")));
+        }
         if let Some(tls) = self.tls {
             let path = |path: &PathBuf| serde_json::json!(path).to_string();
             let [certificate, key] = [path(&tls.certificate), path(&tls.key)];
@@ -109,6 +118,12 @@ pub struct ZenohWire {
     tls: Option<Tls>,
     /// All other nodes, rising.
     others: Vec<Party>,
+    /// Those of them that this one opens links to,
+    connect: Vec<String>,
+    /// itself as they know it,
+    me_there: u128,
+    /// and how often it has opened them.
+    opened: u32,
 }
 
 /// A session, and who is sent to over it.
@@ -116,6 +131,14 @@ struct Line {
     keys: BTreeMap<Party, KeyExpr<'static>>,
     _heard: Vec<Subscriber<()>>,
     session: Session,
+}
+
+/// The bits of a session's name that tell whose it is: the others count how often that one has opened it.
+const NAME: u128 = u128::MAX >> 32;
+
+/// Returns the name of a node in its present life.
+fn name(member: &Member) -> u128 {
+    u128::from(member.agent) << 64 | u128::from(member.life.0)
 }
 
 /// The key under which frames for most nodes are published. No party has that name.
@@ -197,7 +220,8 @@ impl ZenohWire {
     ) -> Result<Self, WireError> {
         trusted(connect, tls)?;
         let connected_within = Some(within);
-        let settings = Settings { mode: "client", connect, tls, connected_within, listen: &[] };
+        let settings =
+            Settings { mode: "client", connect, tls, connected_within, ..Settings::default() };
         Self::over(me, &settings).map_err(|reason| {
             // The other end may have begun to listen meanwhile.
             let endpoint = connect.join(", ");
@@ -208,8 +232,20 @@ impl ZenohWire {
     fn over(me: Party, settings: &Settings<'_>) -> Result<Self, String> {
         let (arrives, arrived) = channel();
         let hub = Line::new(settings.open()?, me, &arrives)?;
-        let (listens, ports, tls) = (Vec::new(), Vec::new(), settings.tls.cloned());
-        Ok(Self { me, arrived, arrives, hub, mesh: None, listens, ports, tls, others: Vec::new() })
+        Ok(Self {
+            me,
+            arrived,
+            arrives,
+            hub,
+            mesh: None,
+            listens: Vec::new(),
+            ports: Vec::new(),
+            tls: settings.tls.cloned(),
+            others: Vec::new(),
+            connect: Vec::new(),
+            me_there: 0,
+            opened: 0,
+        })
     }
 
     /// Lets this node be reached by others at endpoints of its own, once it joins them.
@@ -218,11 +254,14 @@ impl ZenohWire {
         Self { listens, ports, ..self }
     }
 
-    fn open_mesh(&mut self, connect: &[String]) -> Result<(), WireError> {
+    fn open_mesh(&mut self) -> Result<(), WireError> {
         // Held until now, so that nobody else has them.
         self.ports.clear();
-        let (listen, tls) = (&self.listens, self.tls.as_ref());
-        let settings = Settings { mode: "peer", listen, connect, tls, connected_within: None };
+        // A name of its own each time: others may not have noticed yet that the one before is gone.
+        self.opened += 1;
+        let id = Some(format!("{:x}", u128::from(self.opened) << 96 | self.me_there));
+        let (listen, connect, tls) = (&self.listens, &self.connect, self.tls.as_ref());
+        let settings = Settings { id, mode: "peer", listen, connect, tls, connected_within: None };
         let open = settings.open().and_then(|session| Line::new(session, self.me, &self.arrives));
         self.mesh = Some(open.map_err(|reason| taken(listen, reason))?);
         Ok(())
@@ -249,7 +288,8 @@ pub(super) fn asking(
         host_and_port(endpoint)?;
     }
     let connected_within = Some(within);
-    let settings = Settings { mode: "client", connect, tls, connected_within, listen: &[] };
+    let settings =
+        Settings { mode: "client", connect, tls, connected_within, ..Settings::default() };
     let no_answer = |reason| WireError::NoAnswer { endpoint: connect.join(", "), reason };
     settings.open().map_err(no_answer)
 }
@@ -283,8 +323,30 @@ impl Wire for ZenohWire {
         }
         // One connection for each two: of the one with the higher id.
         let before = members.iter().filter(|member| member.agent < me);
-        let connect: Vec<String> = before.flat_map(|member| member.listens.clone()).collect();
-        self.open_mesh(&connect)
+        self.connect = before.flat_map(|member| member.listens.clone()).collect();
+        self.me_there = members.iter().find(|member| member.agent == me).map_or(0, name);
+        self.open_mesh()
+    }
+
+    fn is_open_to(&self, member: &Member) -> bool {
+        let is_it = |id: zenoh::session::ZenohId| {
+            u128::from_le_bytes(id.to_le_bytes()) & NAME == name(member)
+        };
+        self.mesh.as_ref().is_some_and(|mesh| mesh.session.info().peers_zid().wait().any(is_it))
+    }
+
+    fn reopen(&mut self) -> Result<(), WireError> {
+        let Some(mesh) = self.mesh.take() else { return Ok(()) };
+        // What it has not sent is lost, as on the way.
+        let _ = mesh.session.close().wait();
+        drop(mesh);
+        let until = Instant::now() + FREED_WITHIN;
+        loop {
+            match self.open_mesh() {
+                Err(_) if Instant::now() < until => std::thread::sleep(FREED_WITHIN / 100),
+                opened => return opened,
+            }
+        }
     }
 }
 

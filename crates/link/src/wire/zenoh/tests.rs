@@ -8,7 +8,6 @@ use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
 
 /// Time that nothing here takes.
 const LONG: Duration = Duration::from_secs(30);
@@ -25,8 +24,9 @@ fn free() -> String {
 
 fn line(mode: &str, me: Party, [listen, connect]: [&[String]; 2]) -> (Line, Receiver<Vec<u8>>) {
     let connected_within = (mode == "client").then_some(LONG);
-    let session =
-        Settings { mode, listen, connect, connected_within, tls: None }.open().expect("open");
+    let session = Settings { mode, listen, connect, connected_within, ..Settings::default() }
+        .open()
+        .expect("open");
     let (arrives, arrived) = channel();
     (Line::new(session, me, &arrives).expect("a line"), arrived)
 }
@@ -193,6 +193,89 @@ fn frames_vanish_in_a_partition_and_letters_do_not() {
     assert!(hear(&mut node, Word::Close(2), LONG), "a letter comes in the end");
     assert!(healed.elapsed() < Duration::from_secs(8), "{:?}", healed.elapsed());
     assert!(!hear(&mut node, Word::Hello, SOON), "a note that was cut off is gone");
+}
+
+/// Carries what one end of a link sends, but from the third frame on only those of one byte, signs of life, while the link
+/// is deaf.
+fn carry_deaf(mut from: TcpStream, mut to: TcpStream, is_deaf: bool) -> std::io::Result<()> {
+    for k in 0.. {
+        let mut length = [0; 2];
+        from.read_exact(&mut length)?;
+        let mut frame = vec![0; usize::from(u16::from_le_bytes(length))];
+        from.read_exact(&mut frame)?;
+        // Two open the link.
+        if k < 2 || frame.len() == 1 || !is_deaf {
+            to.write_all(&length)?;
+            to.write_all(&frame)?;
+        }
+    }
+    Ok(())
+}
+
+/// Returns an endpoint from which connections are carried to another, the first as deaf links.
+fn deaf_at_first(server: &str) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let endpoint = format!("tcp/{}", listener.local_addr().expect("bound"));
+    let server = server.trim_start_matches("tcp/").to_string();
+    std::thread::spawn(move || {
+        for (k, near) in listener.incoming().flatten().enumerate() {
+            let Ok(far) = TcpStream::connect(&server) else { continue };
+            let both = [(near.try_clone(), far.try_clone(), k == 0), (Ok(far), Ok(near), false)];
+            for (from, to, is_deaf) in both {
+                std::thread::spawn(move || {
+                    let (from, to) = (from?, to?);
+                    let ends = [from.try_clone()?, to.try_clone()?];
+                    let carried = carry_deaf(from, to, is_deaf);
+                    ends.iter().try_for_each(|end| end.shutdown(std::net::Shutdown::Both))?;
+                    carried
+                });
+            }
+        }
+    });
+    endpoint
+}
+
+/// A link over which signs of life come and nothing else: Zenoh keeps it for good, and the wire sees it and opens it anew.
+#[test]
+fn a_link_that_lives_and_is_deaf_is_found_out_and_opened_anew() {
+    let at = [free()];
+    let _hub = ZenohWire::server(&at, None).expect("a server");
+    let held = [0, 1].map(|_| hold("tcp/127.0.0.1:0").expect("a free port"));
+    let lives = [5, 6].map(crate::words::Life);
+    let seen_at = [deaf_at_first(&held[0].endpoint), held[1].endpoint.clone()];
+    let members: Vec<Member> = (0..)
+        .zip(lives)
+        .zip(seen_at)
+        .map(|((agent, life), seen)| Member { agent, life, listens: vec![seen] })
+        .collect();
+    let [mut first, mut second] = [0, 1]
+        .map(|agent| ZenohWire::node(Party::Node(agent), &at, None, LONG).expect("it answers"));
+    let [first_held, second_held] = held;
+    first = first.listening(vec![first_held]);
+    second = second.listening(vec![second_held]);
+    first.join(0, &members).expect("a mesh");
+    second.join(1, &members).expect("a mesh");
+    let until = Instant::now() + LONG;
+    while !second.is_open_to(&members[0]) {
+        assert!(Instant::now() < until, "there is no link");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let mut comes = |second: &mut ZenohWire, within: Duration| {
+        let until = Instant::now() + within;
+        while Instant::now() < until {
+            second.send(&[Party::Node(0)], b"frame");
+            if first.receive(Duration::from_millis(20)).is_some() {
+                return true;
+            }
+        }
+        false
+    };
+    assert!(!comes(&mut second, Duration::from_millis(LEASE_MS)), "it is deaf");
+    assert!(second.is_open_to(&members[0]), "and nobody says so");
+    second.reopen().expect("its endpoint is free again");
+    assert!(comes(&mut second, LONG), "it is heard");
+    let other = Member { agent: 0, life: crate::words::Life(7), listens: Vec::new() };
+    assert!(!second.is_open_to(&other), "another life of it is not there");
 }
 
 /// An end that takes connections and answers nobody, as one behind a cut cable, holds up nobody for long.
