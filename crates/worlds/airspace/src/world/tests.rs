@@ -45,6 +45,58 @@ proptest! {
     }
 }
 
+/// Returns the seconds of the flight alone of the first airplane of a scenario.
+fn alone_s(airspace: &str, airplanes: &str) -> f64 {
+    let text = format!("format = 1\nworld = \"airspace\"\n[airspace]\n{airspace}\n{airplanes}");
+    Compiled::new(&Source::new("a", text, "")).unwrap_or_else(|e| panic!("{e}")).world.alone_s[0]
+}
+
+#[test]
+fn a_long_flight_in_small_steps_is_not_endless() {
+    let far = "[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[200000, 0]]\n";
+    for (dtau_s, more) in [(0.005, ""), (0.005, "leaves_s"), (1.0, "")] {
+        let told =
+            if more.is_empty() { "" } else { "orders = [{ at_s = 9000.0, leaves = true }]\n" };
+        let found_s =
+            alone_s(&format!("dtau_s = {dtau_s:?}\nhorizon_s = 50.0"), &format!("{far}{told}"));
+        assert!((found_s - 199_900.0 / 35.0).abs() <= 1.0, "{dtau_s} {more}: {found_s}");
+    }
+}
+
+#[test]
+fn the_slowest_flights_are_followed_to_their_end() {
+    let slow = |to_m: f64| {
+        let airplane = format!(
+            "[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[{to_m:?}, 0]]\nv_m_s = 0.001\n"
+        );
+        alone_s("", &airplane)
+    };
+    // To within 100 m.
+    assert!((slow(1000.0) - 900_000.0).abs() < 1000.0, "{}", slow(1000.0));
+    assert_eq!(slow(1e9), f64::INFINITY);
+    // A headwind that leaves no speed over the ground that counts.
+    let held = "[[airplanes]]\nat_m = [-1e9, 0]\nheading_deg = 0\nway_points_m = [[1e9, 0]]\n";
+    assert_eq!(alone_s("wind_m_s = [-34.9999999999999, 0.0]", held), f64::INFINITY);
+}
+
+#[test]
+fn speeds_that_rounding_would_swallow_are_refused_with_the_least_one() {
+    let slow = |more: &str| {
+        format!(
+            "format = 1\nworld = \"airspace\"\n{more}[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\n\
+             way_points_m = [[9, 0]]\n"
+        )
+    };
+    for text in [
+        slow("[airplane]\nv_m_s = 1e-14\n"),
+        slow("") + "v_m_s = 1e-300\n",
+        slow("") + "orders = [{ at_s = 5, speed_m_s = 1e-5 }]\n",
+    ] {
+        let error = Compiled::new(&Source::new("s", text, "")).expect_err("refused").to_string();
+        assert!(error.contains("give 0.001 to 1e6 m/s"), "{error}");
+    }
+}
+
 #[test]
 fn an_order_after_the_arrival_makes_no_flight_endless() {
     let alone_s = |at_s: f64| {
