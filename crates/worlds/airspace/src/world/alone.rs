@@ -68,7 +68,7 @@ impl Alone<'_> {
         let omega = air.steer(&pilot, self.pose, self.next);
         let before = self.pose;
         self.pose = air.blown(before.step(model.v_m_s, omega, world.timing.dtau_s));
-        let next = pilot.next(self.pose, self.next);
+        let next = pilot.next((before, self.pose), self.next);
         // Where rounding swallows a step it swallows all that come.
         let is_stuck = is_told_nothing && self.pose == before && self.next == next;
         self.next = next;

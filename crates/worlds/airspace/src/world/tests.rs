@@ -21,8 +21,9 @@ proptest! {
         let (mut pose, mut next, mut steps) = (world.airplanes[0].start, 0, 0);
         while next < goals.len() {
             let omega = air.steer(&pilot, pose, next);
-            pose = air.blown(pose.step(pilot.model.v_m_s, omega, 1.0));
-            next = pilot.next(pose, next);
+            let before = pose;
+            pose = air.blown(before.step(pilot.model.v_m_s, omega, 1.0));
+            next = pilot.next((before, pose), next);
             steps += 1;
         }
         prop_assert_eq!(world.alone_s[0], f64::from(steps));
@@ -94,6 +95,18 @@ fn speeds_that_rounding_would_swallow_are_refused_with_the_least_one() {
     ] {
         let error = Compiled::new(&Source::new("s", text, "")).expect_err("refused").to_string();
         assert!(error.contains("give 0.001 to 1e6 m/s"), "{error}");
+    }
+}
+
+#[test]
+fn an_airplane_that_turns_round_in_a_step_arrives() {
+    for (v_m_s, omega_deg_s) in [(10.0, 180.0), (10.0, 360.0), (30.0, 90.0), (25.0, 120.0)] {
+        let model = format!(
+            "[airplane]\nv_m_s = {v_m_s:?}\nomega_max_deg_s = {omega_deg_s:?}\nseparation_m = 10.0\n"
+        );
+        let flight = "[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[205, 0], [205, 33], [1, 7]]\n";
+        let found_s = alone_s("method = \"none\"", &format!("{model}{flight}"));
+        assert!(found_s < 800.0 / v_m_s, "{v_m_s} m/s, {omega_deg_s} deg/s: {found_s} s");
     }
 }
 
