@@ -2,7 +2,7 @@
 //! orders.
 
 use super::flight::{FlightOrder, MAX_ORDERS, Task, Track, TrackPoint};
-use super::scenario::{Measure, TurnRate, Turns};
+use super::scenario::{Measure, Speed, TurnRate, Turns};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::{InputError, math};
@@ -34,7 +34,7 @@ pub(super) struct AirplaneSection {
     #[serde(default)]
     orders: Vec<Spanned<OrderSection>>,
     /// Speed, if not that of all.
-    pub(super) v_m_s: Option<Measure>,
+    pub(super) v_m_s: Option<Number<Speed>>,
     /// Greatest turn rate, if not that of all.
     pub(super) omega_max_deg_s: Option<Number<TurnRate>>,
     /// Distance that others have to keep, if not that of all.
@@ -53,7 +53,7 @@ struct OrderSection {
     /// Heading to fly until sent to a way-point.
     heading_deg: Option<Value>,
     /// Speed to fly with.
-    speed_m_s: Option<Measure>,
+    speed_m_s: Option<Number<Speed>>,
     /// Level to go to.
     altitude_m: Option<Value>,
     /// Rate of the change of level.

@@ -31,7 +31,7 @@ use values::{
     Cooling, Decision, Fading, Gibibytes, HeadingNoise, Inflation, LevelGap, LookAhead, Rounds,
     Step, Tolerance, Weight,
 };
-pub(super) use values::{Measure, TurnRate, Turns};
+pub(super) use values::{Measure, Speed, TurnRate, Turns};
 
 /// Sets of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]

@@ -1,5 +1,6 @@
 //! A compiled airspace: everything that stays fixed during a run.
 
+mod alone;
 #[cfg(test)]
 mod tests;
 
@@ -18,7 +19,7 @@ use sidestep_collectives::{Estimator, Order, Settings};
 use sidestep_kernel::control::Teams;
 use sidestep_kernel::network::Network;
 use sidestep_kernel::stream::Streams;
-use sidestep_kernel::{Cycle, EntityId, Slot, interrupt};
+use sidestep_kernel::{Cycle, EntityId, Slot};
 use std::sync::Arc;
 
 /// The methods by which airplanes choose their actions.
@@ -143,9 +144,6 @@ pub enum Grouping {
     Heard,
 }
 
-/// Number of steps after which a flight alone is taken to be endless.
-const ENDLESS_STEPS: usize = 1_000_000;
-
 impl AirspaceWorld {
     /// Returns the call sign of an airplane, if it has one.
     pub(crate) fn callsign(&self, id: EntityId) -> Option<String> {
@@ -220,48 +218,6 @@ impl AirspaceWorld {
     /// Returns the properties of the air, which are the same for all airplanes.
     pub fn air(&self) -> Air {
         Air { timing: self.timing, passing: self.passing, wind_m_s: self.wind_m_s }
-    }
-
-    /// Returns the seconds that a flight would take alone, from when the method takes it over;
-    /// infinite if it would never end.
-    fn alone_s(&self, i: usize) -> f64 {
-        let airplane = &self.airplanes[i];
-        let joins_s = self.starts_s(self.joins_in(i));
-        if airplane.track.as_ref().is_some_and(|track| track.ends_s() <= joins_s) {
-            return 0.0;
-        }
-        let is_endless =
-            airplane.keeps_a_heading(airplane.orders.len()) && airplane.leaves_s == f64::INFINITY;
-        let air = self.air();
-        let mut pose = airplane.track.as_ref().map_or(airplane.start, |t| t.pose_at(joins_s));
-        let (mut orders, mut next) = (0, 0);
-        let mut step = 0;
-        while step < ENDLESS_STEPS {
-            interrupt::look();
-            let flown_s = step as f64 * self.timing.dtau_s;
-            if step % self.timing.points_per_dt() == 0 {
-                (orders, next) = self.after_orders(i, orders, next, joins_s + flown_s);
-            }
-            let Stage { model, mission, .. } = self.stage(i as Slot, orders);
-            if next == mission.len() || joins_s + flown_s >= airplane.leaves_s {
-                return flown_s;
-            }
-            // Endless only after the last order, because the flight may end before that one.
-            if is_endless && orders as usize == airplane.orders.len() {
-                return f64::INFINITY;
-            }
-            let pilot = air.pilot(model, mission);
-            if airplane.orders.is_empty() && airplane.leaves_s == f64::INFINITY {
-                let straight = air.straight_steps(&pilot, pose, next);
-                pose = air.glided(pose, model.v_m_s, straight);
-                step += straight;
-            }
-            let omega = air.steer(&pilot, pose, next);
-            pose = air.blown(pose.step(model.v_m_s, omega, self.timing.dtau_s));
-            next = pilot.next(pose, next);
-            step += 1;
-        }
-        f64::INFINITY
     }
 
     /// Returns when an airplane's flight would end if it were alone, in seconds after the start of

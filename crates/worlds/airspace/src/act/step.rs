@@ -45,9 +45,10 @@ fn fly(world: &AirspaceWorld, flight: &mut Flight<'_>, Moment { k, step, .. }: M
             let omega = way.omegas_rad_s[k];
             let altitude_m = flight.altitude_after_m(stage, dtau_s);
             flight.altitude_m = altitude_m;
-            flight.pose = air.blown(flight.pose.step(stage.model.v_m_s, omega, dtau_s));
+            let before = flight.pose;
+            flight.pose = air.blown(before.step(stage.model.v_m_s, omega, dtau_s));
             let pilot = air.pilot(stage.model, stage.mission);
-            flight.next = pilot.next(flight.pose, flight.next);
+            flight.next = pilot.next((before, flight.pose), flight.next);
             flight.next == stage.mission.len()
         }
         Course::Track(track) => {

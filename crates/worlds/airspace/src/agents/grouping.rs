@@ -97,6 +97,8 @@ pub struct Agent {
     /// Items that have not been passed on: airplane, and whether it is the report.
     kept: BTreeSet<(EntityId, bool)>,
     has_reported: bool,
+    /// Whether anything on which its going on depends has changed since it looked last.
+    is_stale: bool,
     found: Option<Found>,
 }
 
@@ -115,6 +117,7 @@ impl Agent {
             heard: BTreeSet::new(),
             kept: BTreeSet::new(),
             has_reported: is_sure,
+            is_stale: true,
             found: None,
         }
     }
@@ -138,12 +141,14 @@ impl Agent {
         match item {
             Item::Beacon(beacon) => {
                 let is_own = id == from;
-                if self.roster.note_beacon(beacon, is_own) {
+                let is_new = self.roster.note_beacon(beacon, is_own);
+                if is_new {
                     self.kept.insert((id, false));
                 }
                 if is_own {
                     self.heard.insert(id);
                 }
+                self.is_stale |= is_new | is_own;
                 false
             }
             Item::Report { heard, .. } => {
@@ -151,6 +156,7 @@ impl Agent {
                 if is_new {
                     self.kept.insert((id, true));
                 }
+                self.is_stale |= is_new;
                 is_new && self.others().any(|(_, other)| other == id)
             }
         }
@@ -164,13 +170,18 @@ impl Agent {
     /// Takes out the items that have to go on, of those `about` these airplanes.
     fn passed_on(&mut self, about: &BTreeSet<EntityId>) -> Vec<Vec<Item>> {
         let due = |id: EntityId| self.roster.knows(id) && self.is_lacked(id);
+        // Most of what comes has come before, and is kept no longer.
+        let is_kept =
+            |id: &EntityId| [false, true].iter().any(|&of| self.kept.contains(&(*id, of)));
         let due: Vec<(EntityId, bool)> = about
             .iter()
-            .filter(|&&id| due(id))
+            .filter(|id| is_kept(id) && due(**id))
             .flat_map(|&id| [(id, false), (id, true)])
             .filter(|key| self.kept.contains(key))
             .collect();
-        self.kept.retain(|key| !due.contains(key));
+        for key in &due {
+            self.kept.remove(key);
+        }
         let items: Vec<Item> =
             due.iter().filter_map(|&(id, is_report)| self.roster.item(id, is_report)).collect();
         items.chunks(MOST_ITEMS).map(<[Item]>::to_vec).collect()
@@ -181,9 +192,31 @@ impl Agent {
         self.others().all(|(place, id)| self.gone[place] || self.heard.contains(&id))
     }
 
+    /// Returns whether it has all that its group depends on, or can come to have.
+    fn has_all(&mut self) -> bool {
+        let present = self.present();
+        self.missing(&present).is_empty() && (present.is_empty() || self.roster.settle())
+    }
+
+    /// Returns the others near it from which something may come, with their places.
+    fn present(&self) -> Vec<(usize, EntityId)> {
+        self.others().filter(|&(place, _)| !self.gone[place]).collect()
+    }
+
+    /// Returns the places of those of whom something is missing.
+    fn missing(&self, present: &[(usize, EntityId)]) -> Vec<usize> {
+        // Where nothing is lost it does not matter by whom an item has come.
+        let is_heard = |id| self.start.certainty == Certainty::Sure || self.heard.contains(&id);
+        let lacks = |id: EntityId| !is_heard(id) || !self.roster.is_known(id);
+        present.iter().filter(|(_, id)| lacks(*id)).map(|(place, _)| *place).collect()
+    }
+
     /// Continues as far as the messages heard allow.
     fn go_on(&mut self) -> Vec<Vec<Item>> {
         let mut said = Vec::new();
+        if !std::mem::take(&mut self.is_stale) {
+            return said;
+        }
         if !self.has_reported && self.has_listened() {
             self.has_reported = true;
             let (about, heard): (_, Vec<_>) = (self.id(), self.heard.iter().copied().collect());
@@ -191,7 +224,7 @@ impl Agent {
             // Also one that has heard nobody: those who hear it wait for that.
             said.push(vec![Item::Report { about, heard }]);
         }
-        if self.found.is_none() && self.has_reported && link::Agent::awaits(self).is_empty() {
+        if self.found.is_none() && self.has_reported && self.has_all() {
             self.find();
         }
         said
@@ -263,13 +296,8 @@ impl link::Agent for Agent {
         if self.found.is_some() {
             return Vec::new();
         }
-        let is_present = |&(place, _): &(usize, EntityId)| !self.gone[place];
-        // Where nothing is lost it does not matter by whom an item has come.
-        let is_heard = |id| self.start.certainty == Certainty::Sure || self.heard.contains(&id);
-        let lacks = |id: EntityId| !is_heard(id) || !self.roster.is_known(id);
-        let present: Vec<(usize, EntityId)> = self.others().filter(is_present).collect();
-        let missing: Vec<usize> =
-            present.iter().filter(|(_, id)| lacks(*id)).map(|(place, _)| *place).collect();
+        let present = self.present();
+        let missing = self.missing(&present);
         if !missing.is_empty() || self.roster.is_complete(self.id()) {
             return missing;
         }
@@ -286,7 +314,7 @@ impl link::Agent for Agent {
     }
 
     fn without(&mut self, other: usize, _: bool) -> Vec<Vec<Item>> {
-        self.gone[other] = true;
+        (self.gone[other], self.is_stale) = (true, true);
         self.go_on()
     }
 

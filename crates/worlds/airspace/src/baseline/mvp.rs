@@ -65,6 +65,7 @@ pub(in super::super) fn headings(
         found.filter_map(|(j, closest)| Some((j, closest?))).collect()
     };
     let found: Vec<Vec<(usize, Closest)>> = all.iter().map(conflicts).collect();
+    let by_slot = by_slot(all);
     // As in BlueSky, the headings are kept only while nobody is in conflict.
     let is_anybody_in_conflict = found.iter().any(|conflicts| !conflicts.is_empty());
     for ((own, conflicts), memory) in all.iter().zip(&found).zip(&mut *resolving) {
@@ -74,11 +75,24 @@ pub(in super::super) fn headings(
         memory.with.extend(conflicts.iter().map(|(j, _)| all[*j].slot));
         memory.with.sort_unstable();
         memory.with.dedup();
-        let other = |slot: &Slot| all.iter().find(|other| other.slot == *slot);
         let is_on = |other: &Moving| meets(own, other) && is_on(own, other, settings);
-        memory.with.retain(|slot| other(slot).is_some_and(is_on));
+        memory.with.retain(|&slot| of_slot(&by_slot, slot).is_some_and(is_on));
     }
     resolving.iter().map(|memory| (!memory.with.is_empty()).then_some(memory.heading_rad)).collect()
+}
+
+/// Returns all airplanes by rising slot, because each looks for many of the others among them.
+fn by_slot(all: &[Moving]) -> Vec<&Moving> {
+    let mut by_slot: Vec<&Moving> = all.iter().collect();
+    // A stable sort: of those with one slot the first one counts.
+    by_slot.sort_by_key(|one| one.slot);
+    by_slot
+}
+
+/// Returns the first airplane with a slot, if there is one.
+fn of_slot<'a>(by_slot: &[&'a Moving], slot: Slot) -> Option<&'a Moving> {
+    let first = by_slot.partition_point(|one| one.slot < slot);
+    by_slot.get(first).copied().filter(|one| one.slot == slot)
 }
 
 /// Returns the closest approach of two airplanes if one enters the other's zone within the time of
@@ -179,6 +193,17 @@ mod tests {
                 assert!((found_deg - expected).abs() < 1e-3, "{found_deg} for {expected}");
             }
         }
+    }
+
+    #[test]
+    fn others_are_found_by_their_slots_in_whatever_order_they_come() {
+        let all = [7, 2, 9, 2, 4].map(|slot| moving(slot, [f64::from(slot), 0.0], 0.0));
+        let by_slot = by_slot(&all);
+        for slot in 0..12 {
+            assert_eq!(of_slot(&by_slot, slot), all.iter().find(|one| one.slot == slot), "{slot}");
+        }
+        let first: *const Moving = of_slot(&by_slot, 2).expect("there are two");
+        assert!(std::ptr::eq(first, &all[1]));
     }
 
     #[test]

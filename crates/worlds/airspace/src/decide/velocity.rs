@@ -93,7 +93,7 @@ pub(super) fn step(world: &AirspaceWorld, known: &mut Known, heading_rad: Option
         None => air.steer(&pilot, pose, known.next),
     };
     known.pose = air.blown(pose.step(model.v_m_s, omega_rad_s, pilot.dtau_s));
-    known.next = pilot.next(known.pose, known.next);
+    known.next = pilot.next((pose, known.pose), known.next);
     omega_rad_s
 }
 

@@ -58,8 +58,9 @@ fn way(world: &AirspaceWorld, known: Known, action: Action) -> Way {
         let held = action.held_rad_s(k as f64 * dtau_s);
         let omega = held.unwrap_or_else(|| air.steer(&pilot, pose, next));
         omegas_rad_s.push(omega);
-        pose = air.blown(pose.step(model.v_m_s, omega, dtau_s));
-        next = pilot.next(pose, next);
+        let before = pose;
+        pose = air.blown(before.step(model.v_m_s, omega, dtau_s));
+        next = pilot.next((before, pose), next);
     }
     Way { omegas_rad_s }
 }

@@ -33,8 +33,18 @@ pub(crate) fn flown(
     drive(&mut transport, &mut pilots, schedule.begins, Pilot::has_decided);
     turn.scratch.decide_ns += clock.thread_cpu_ns() - began_ns;
     drive(&mut transport, &mut pilots, schedule.begins, Pilot::is_done);
-    let over = |pilot: Pilot| pilot.into_outcome().expect("in memory all come to an end");
-    pilots.into_iter().map(over).collect()
+    concluded(pilots)
+}
+
+/// Returns what comes of the talks of a group. Where one waits for what never comes, all stay on their orbits, since
+/// plans that are sure are safe only if all fly them.
+fn concluded(pilots: Vec<Pilot>) -> Vec<(Control, Considered)> {
+    let all_have_ended = pilots.iter().all(Pilot::is_done);
+    let one = |pilot: Pilot| match all_have_ended {
+        true => pilot.into_outcome().expect("it has come to an end"),
+        false => pilot.given_up(),
+    };
+    pilots.into_iter().map(one).collect()
 }
 
 /// Lets pilots that have begun a cycle talk until all have come to an end.
@@ -96,4 +106,41 @@ fn pilots(world: &AirspaceWorld, flown: &[Slot], memories: Vec<Memory>) -> Vec<P
     let world = Arc::new(world.clone());
     let pilot = |(&slot, memory)| Pilot::remembering(world.clone(), slot, memory);
     flown.iter().zip(memories).map(pilot).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::events::EventKind;
+    use crate::pilot::{Course, Fleet};
+    use crate::{AirspaceRun, airspace_run};
+    use sidestep_scenario::Source;
+
+    /// Returns the pilots of a group that looks for itself; the first one is of another build, and nobody takes it in.
+    fn begun(run: &AirspaceRun) -> Vec<Pilot> {
+        let world = run.world();
+        let pilot = |sight: Sight| {
+            let build = if sight.own.id == 0 { "another" } else { "this" };
+            let pilot = Pilot::new(world.clone(), sight.own.id, Default::default());
+            let mut pilot = pilot.of_build(build);
+            pilot.begin_by(sight, Schedule::of_cycle(0, None));
+            pilot
+        };
+        run.sights().into_iter().map(pilot).collect()
+    }
+
+    #[test]
+    fn a_group_in_which_one_waits_for_ever_stays_on_its_orbits() {
+        let text = "format = 1\nworld = \"airspace\"\n[airspace]\ndeployment = \"team\"\ngroups = \"heard\"\n\
+                    [airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 3000.0\n";
+        let run = airspace_run(&Source::new("g", text, ""), 1).expect("a scenario");
+        let mut pilots = begun(&run);
+        fly_all(run.world(), run.state(), (0, Schedule::of_cycle(0, None)), &mut pilots);
+        assert!(pilots.iter().all(|pilot| !pilot.is_done()));
+        for (control, _) in concluded(pilots) {
+            assert_eq!(control.course, Course::Orbit);
+            let told: Vec<EventKind> = control.events.iter().map(|event| event.kind).collect();
+            assert_eq!(told, [EventKind::Deadline]);
+        }
+    }
 }

@@ -95,6 +95,25 @@ fn every_method_decides_alike_whether_groups_are_heard_or_announced() {
     }
 }
 
+/// As fast as scenarios allow: a filed flight, and a glitch of a recording in a wind.
+const FAST: &str = "[airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 5000.0\n\
+    [[airplanes]]\nat_m = [0, -4000]\nheading_deg = 90\nway_points_m = [[0, 5e8]]\nv_m_s = 1e6\nintruder = true\n\
+    [[airplanes]]\ntrack = [[0, 0, -4000, 0], [10, 0, -3000, 0], [11, 999995, -3000, 0], [12, 0, -2800, 0], [90, 0, 5000, 0]]\n";
+
+#[test]
+fn intruders_of_any_speed_that_a_scenario_allows_are_heard_of() {
+    for wind in ["", "wind_m_s = [-20, 10]\n"] {
+        for network in ["", "network = { duplication = 0.3 }\n"] {
+            let scenario = scenario(&format!("deployment = \"team\"\n{wind}{network}"), FAST);
+            let mut run = run(&scenario, "groups = \"heard\"");
+            run.advance(4);
+            let metrics = run.metrics();
+            assert_eq!((metrics.contacts_lost, metrics.deadlines_missed), (0, 0), "{metrics:?}");
+        }
+        is_alike(&scenario(&format!("deployment = \"team\"\n{wind}"), FAST), 4);
+    }
+}
+
 /// A network that may lose messages, and loses none: airplanes report whom they hear.
 #[test]
 fn who_loses_nothing_and_cannot_know_it_finds_the_same_group() {

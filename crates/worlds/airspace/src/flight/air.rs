@@ -73,6 +73,10 @@ impl Air {
         }
         let step_m = distance_m(pose.at, self.glided(pose, pilot.model.v_m_s, 1).at);
         let near_m = self.passing.tolerance_m.max(2.0 * pilot.model.turn_radius_m()) + step_m;
+        // Where the wind holds it in place, a step may be lost in rounding.
+        if step_m <= 0.0 {
+            return 0;
+        }
         // The conversion saturates, also where the distance is nearer than that.
         ((distance_m(pose.at, goal) - near_m) / step_m) as usize
     }

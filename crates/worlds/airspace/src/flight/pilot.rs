@@ -1,7 +1,7 @@
 //! Predictions: a pilot flies actions and missions step by step, and returns the way.
 
 use super::action::Action;
-use super::motion::{Model, Point, Pose, Timing, sinc};
+use super::motion::{Model, Point, Pose, Timing, distance_m, sinc};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
@@ -23,6 +23,10 @@ pub enum After {
 /// that circle. Such a way-point counts as *passed* when it is abeam on the near side. That happens
 /// within one turn round the circle, and there the airplane is as near as it can be without flying
 /// away first.
+///
+/// An airplane that turns by more than a radian in a step looks too rarely for that: it flies over a way-point, or
+/// past where it is abeam, between two looks. It passes a way-point in the step in which it comes nearest to it, if
+/// it is less than a step's way from it at either end.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Passing {
     /// Distance in meters below which a way-point is reached.
@@ -32,13 +36,22 @@ pub struct Passing {
 }
 
 impl Passing {
-    /// Returns whether an airplane at `pose` is done with the way-point `goal`; its tightest turn
-    /// has this radius, and it flies `step_m` meters from one look to the next.
+    /// Returns whether an airplane at `pose`, and at `before` one step earlier, is done with the way-point `goal`;
+    /// its tightest turn has this radius, and it flies `step_m` meters from one look to the next.
     #[inline]
-    pub fn is_done(&self, pose: Pose, goal: Point, radius_m: f64, step_m: f64) -> bool {
+    pub fn is_done(
+        &self,
+        (before, pose): (Pose, Pose),
+        goal: Point,
+        radius_m: f64,
+        step_m: f64,
+    ) -> bool {
         let (dx, dy) = (goal[0] - pose.at[0], goal[1] - pose.at[1]);
         let square = dx * dx + dy * dy;
         if square < self.tolerance_m * self.tolerance_m {
+            return true;
+        }
+        if self.passes && step_m > radius_m && is_flown_over((before, pose), goal, step_m) {
             return true;
         }
         // No point farther than a diameter lies in a turning circle.
@@ -47,12 +60,26 @@ impl Passing {
         }
         // The circles' centers are a radius to the left and right: the goal is inside when its
         // distance to the nearer center is below the radius.
-        let (sin, cos) = (math::sin(pose.heading_rad), math::cos(pose.heading_rad));
-        let (ahead, left) = (cos * dx + sin * dy, cos * dy - sin * dx);
+        let [ahead, left] = seen_from(pose, goal);
         let is_inside = square < 2.0 * radius_m * left.abs();
         // Abeam since the last look: on a circle, ahead changes by less than a step per step.
         is_inside && left.abs() < radius_m && (-step_m..=0.0).contains(&ahead)
     }
+}
+
+/// Returns how far ahead of an airplane a place is, and how far to its left.
+#[inline]
+fn seen_from(pose: Pose, place: Point) -> Point {
+    let (dx, dy) = (place[0] - pose.at[0], place[1] - pose.at[1]);
+    let (sin, cos) = (math::sin(pose.heading_rad), math::cos(pose.heading_rad));
+    [cos * dx + sin * dy, cos * dy - sin * dx]
+}
+
+/// Returns whether an airplane comes nearest to a place within a step of `step_m` meters, and is nearer than that at
+/// either end of it.
+fn is_flown_over((before, pose): (Pose, Pose), place: Point, step_m: f64) -> bool {
+    let comes_nearest = seen_from(before, place)[0] > 0.0 && seen_from(pose, place)[0] <= 0.0;
+    comes_nearest && distance_m(before.at, place).min(distance_m(pose.at, place)) < step_m
 }
 
 /// The way that an action leads.
@@ -146,12 +173,12 @@ impl Pilot<'_> {
         }
     }
 
-    /// Returns the way-point after those that are done with at `pose`.
+    /// Returns the way-point after those that are done with at a pose, which is one step after the pose `before`.
     #[inline]
-    pub fn next(&self, pose: Pose, mut next: usize) -> usize {
+    pub fn next(&self, (before, pose): (Pose, Pose), mut next: usize) -> usize {
         let (radius_m, step_m) = (self.model.turn_radius_m(), self.model.v_m_s * self.dtau_s);
         while let Some(&goal) = self.mission.get(next) {
-            if !self.passing.is_done(pose, goal, radius_m, step_m) {
+            if !self.passing.is_done((before, pose), goal, radius_m, step_m) {
                 break;
             }
             next += 1;
@@ -164,7 +191,7 @@ impl Pilot<'_> {
         let mut points = Vec::with_capacity(timing.horizon);
         let (mut flight, mut next, mut counted) = (Flight::new(pose), next, timing.horizon);
         for k in 0..timing.horizon {
-            let flown_s = k as f64 * self.dtau_s;
+            let (flown_s, before) = (k as f64 * self.dtau_s, flight.pose);
             let goal = self.mission.get(next).filter(|_| action.held_rad_s(flown_s).is_none());
             if self.after == After::Pursue {
                 // An airplane that returns to its last way-point turns to the side that rounding
@@ -179,7 +206,7 @@ impl Pilot<'_> {
             }
             points.push(flight.pose.at);
             if next < self.mission.len() {
-                next = self.next(flight.pose, next);
+                next = self.next((before, flight.pose), next);
                 if next == self.mission.len() {
                     counted = k + 1;
                 }
@@ -192,7 +219,6 @@ impl Pilot<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::action::{Legs, actions};
-    use super::super::motion::distance_m;
     use super::*;
     use proptest::prelude::*;
 
@@ -235,8 +261,9 @@ mod tests {
             let predicted = pilot.predict(action, pose, next, &timing);
             for (k, point) in predicted.points.iter().enumerate() {
                 let omega = pilot.omega_rad_s(action, pose, next, k as f64);
-                pose = pose.step(model.v_m_s, omega, 1.0);
-                next = pilot.next(pose, next);
+                let before = pose;
+                pose = before.step(model.v_m_s, omega, 1.0);
+                next = pilot.next((before, pose), next);
                 prop_assert!(distance_m(*point, pose.at) < 1e-6, "step {k}");
             }
         }
@@ -265,6 +292,27 @@ mod tests {
             let last = flown.counted - 1;
             let nearest_m = (0..=last).map(apart_m).fold(f64::INFINITY, f64::min);
             prop_assert!(apart_m(last) < tolerance_m || apart_m(last) < nearest_m + 35.0);
+        }
+
+        /// As above, for airplanes that turn as fast as scenarios allow, in steps of all lengths.
+        #[test]
+        fn nobody_orbits_a_way_point_for_ever_however_fast_it_turns(
+            heading_rad in -3.2f64..3.2, x in -300.0f64..300.0, y in -300.0f64..300.0,
+            v_m_s in 5.0f64..40.0, omega_deg_s in 20.0f64..360.0, tolerance_m in 0.001f64..3.0,
+            dtau_s in prop::sample::select(vec![0.1, 0.25, 0.5, 1.0, 2.0, 5.0]),
+        ) {
+            let omega_max_rad_s = omega_deg_s.to_radians();
+            let model = Model { v_m_s, omega_max_rad_s, ..model() };
+            let mission = [[x, y]];
+            let passing = Passing { tolerance_m, passes: true };
+            let pilot = Pilot { model: &model, mission: &mission, passing, after: After::Straight, dtau_s };
+            let pose = Pose { at: [0.0, 0.0], heading_rad };
+            let timing = Timing { dt_s: 5.0, dtau_s, horizon: (200.0 / dtau_s) as usize };
+            let flown = pilot.predict(Action::Proceed, pose, 0, &timing);
+            prop_assert!(flown.counted < timing.horizon, "still flying to {mission:?}");
+            let end = flown.points[flown.counted - 1];
+            let near_m = tolerance_m.max(2.0 * model.turn_radius_m()).max(2.0 * v_m_s * dtau_s);
+            prop_assert!(distance_m(end, mission[0]) < near_m, "{end:?} is not {mission:?}");
         }
     }
 }

@@ -4,6 +4,8 @@ use super::airplane::Airplane;
 use super::motion::{Model, Point};
 use super::order::Task;
 use sidestep_kernel::math;
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Distance of the point for which an airplane that keeps a heading steers: so far ahead that the
 /// bearing equals the heading wherever the airplane is.
@@ -24,7 +26,7 @@ pub(crate) struct Stage<'a> {
 #[derive(Debug, Clone)]
 pub(crate) struct Later {
     model: Model,
-    mission: Vec<Point>,
+    mission: Arc<[Point]>,
     altitude_m: f64,
     climb_m_s: f64,
     /// Number of way-points done with when it starts, if not as many as before.
@@ -38,12 +40,14 @@ impl Later {
     }
 }
 
-/// Returns the parts of a flight after each of its orders.
+/// Returns the parts of a flight after each of its orders. Parts on the same way share its way-points, because
+/// there may be ten thousand of each.
 pub(crate) fn later(airplane: &Airplane) -> Vec<Later> {
-    let mut route = airplane.mission.clone();
+    let mut route: Arc<[Point]> = airplane.mission.as_slice().into();
+    let mut straight = BTreeMap::new();
     let mut now = Later {
         model: airplane.model.clone(),
-        mission: route.clone(),
+        mission: Arc::clone(&route),
         altitude_m: airplane.altitude_m,
         climb_m_s: 0.0,
         next: None,
@@ -53,23 +57,52 @@ pub(crate) fn later(airplane: &Airplane) -> Vec<Later> {
         now.next = None;
         match &order.task {
             Task::Heading(heading_rad) => {
-                let ahead =
-                    [FAR_AHEAD_M * math::cos(*heading_rad), FAR_AHEAD_M * math::sin(*heading_rad)];
                 // As many as on the route, so that the number of those done with stays valid.
-                now.mission = vec![ahead; route.len()];
+                let of = (heading_rad.to_bits(), route.len());
+                let way = straight.entry(of).or_insert_with(|| ahead(*heading_rad, route.len()));
+                now.mission = Arc::clone(way);
             }
             Task::Speed(v_m_s) => now.model.v_m_s = *v_m_s,
             Task::Altitude { altitude_m, climb_m_s } => {
                 (now.altitude_m, now.climb_m_s) = (*altitude_m, *climb_m_s);
             }
-            Task::Proceed => now.mission.clone_from(&route),
+            Task::Proceed => now.mission = Arc::clone(&route),
             Task::WayPoints(way_points) => {
-                route.clone_from(way_points);
-                now.mission.clone_from(way_points);
-                now.next = Some(0);
+                route = way_points.as_slice().into();
+                (now.mission, now.next) = (Arc::clone(&route), Some(0));
             }
         }
         all.push(now.clone());
     }
     all
+}
+
+/// Returns way-points that lead along a heading for ever.
+fn ahead(heading_rad: f64, way_points: usize) -> Arc<[Point]> {
+    let far = [FAR_AHEAD_M * math::cos(heading_rad), FAR_AHEAD_M * math::sin(heading_rad)];
+    vec![far; way_points].into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::Compiled;
+    use sidestep_scenario::Source;
+
+    #[test]
+    fn orders_after_which_an_airplane_flies_the_same_way_share_its_way_points() {
+        let text = "format = 1\nworld = \"airspace\"\n[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\n\
+                    way_points_m = [[9000, 0], [18000, 0]]\norders = [\n\
+                    { at_s = 1, speed_m_s = 30 }, { at_s = 2, altitude_m = 90 }, { at_s = 3, heading_deg = 9 },\n\
+                    { at_s = 4, speed_m_s = 31 }, { at_s = 5, proceeds = true }, { at_s = 6, heading_deg = 9 },\n\
+                    { at_s = 7, way_points_m = [[0, 9000]] }, { at_s = 8, speed_m_s = 32 }]\n";
+        let world = Compiled::new(&Source::new("o", text, "")).expect("a scenario").world;
+        let all = later(&world.airplanes[0]);
+        let is_shared = |a: usize, b: usize| Arc::ptr_eq(&all[a].mission, &all[b].mission);
+        assert!([(0, 1), (0, 4), (2, 3), (2, 5), (6, 7)].into_iter().all(|(a, b)| is_shared(a, b)));
+        let counts: Vec<usize> = all.iter().map(|one| one.mission.len()).collect();
+        assert_eq!(counts, [2, 2, 2, 2, 2, 2, 1, 1]);
+        assert_eq!(all.iter().map(|one| one.next).collect::<Vec<_>>()[5..], [None, Some(0), None]);
+        assert_ne!(all[2].mission[0], all[0].mission[0]);
+    }
 }

@@ -3,7 +3,7 @@
 mod conclude;
 mod turn;
 
-use super::control::{Control, Memory};
+use super::control::{Control, Course, Memory};
 use super::early::Early;
 use super::schedule::{Schedule, patience};
 use super::sight::Sight;
@@ -14,6 +14,7 @@ use crate::agents::traffic::Traffic;
 use crate::agents::{Frame, Party, Progress, Radio, Talk};
 use crate::avoid::Beset;
 use crate::decide::{Considered, Manner};
+use crate::events::{Event, EventKind};
 use crate::world::{AirspaceWorld, Grouping};
 use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{Refusal, Refused, digest, open};
@@ -210,6 +211,21 @@ impl Pilot {
     pub(crate) fn into_outcome(mut self) -> Option<(Control, Considered)> {
         let control = self.control()?;
         Some((control, self.turn.take()?.considered))
+    }
+
+    /// Returns what it does where its group does not come to an end in the present cycle: it stays on its orbit.
+    ///
+    /// # Panics
+    /// When it has not begun a cycle.
+    pub(crate) fn given_up(mut self) -> (Control, Considered) {
+        let mut turn = self.turn.take().expect("it has begun a cycle");
+        let (is_over, now) = (matches!(turn.stage, Stage::Over), turn.sight.cycle);
+        turn.note_traffic(0);
+        let mut control = Control { course: Course::Orbit, memory: self.memory, ..turn.control };
+        if !is_over {
+            control.events.push(Event::of(now, EventKind::Deadline, self.id));
+        }
+        (control, Considered::default())
     }
 
     /// Returns how far it has come in the talk that it is in, if it is in one.

@@ -1,10 +1,9 @@
 //! Airplanes: their model, generated traffic, flight plans and recorded tracks.
 
 use super::compile::Compiler;
-use super::values::{Measure, TurnRate, Turns};
+use super::values::{Measure, Speed, TurnRate, Turns};
 use crate::flight::Airplane;
-use crate::flight::Track;
-use crate::flight::{Model, Pose, Timing};
+use crate::flight::{FASTEST_M_S, Model, Pose, Timing, Track};
 use crate::flight_plan::AirplaneSection;
 use crate::generate::GeneratorKind;
 use crate::generate::{Order, generate};
@@ -28,7 +27,7 @@ pub(super) struct GeneratorSection {
 #[serde(deny_unknown_fields, default)]
 pub(super) struct ModelSection {
     /// Speed.
-    v_m_s: Option<Measure>,
+    v_m_s: Option<Number<Speed>>,
     /// Greatest turn rate.
     omega_max_deg_s: Option<Number<TurnRate>>,
     /// Distance that all keep from each other.
@@ -176,9 +175,11 @@ impl Compiler<'_> {
         replay: Replay,
     ) -> Result<Airplane, InputError> {
         let top_m_s = track.top_speed_m_s();
-        if top_m_s >= 1e6 {
+        if top_m_s >= FASTEST_M_S {
             let cause = format!("a track with {top_m_s:e} m/s between two of its points");
-            let remedy = "leave out points that nothing reaches: nothing is faster than 1e6 m/s";
+            let remedy = format!(
+                "leave out points that nothing reaches: nothing is faster than {FASTEST_M_S:e} m/s"
+            );
             return Err(self.source.error(section.span(), cause, remedy));
         }
         if section.get_ref().v_m_s.is_none() {

@@ -1,10 +1,11 @@
 //! Values of airplanes that check themselves on reading.
 
+use crate::flight::FASTEST_M_S;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use sidestep_scenario::{AboveBelow, Number, Rule, refused, schema_by_hand};
 
-/// A speed or a separation.
+/// A separation.
 pub(crate) type Measure = Number<AboveBelow<0, 1_000_000>>;
 
 /// Defines rules for numbers with bounds, whose errors give the reason for the bounds.
@@ -31,6 +32,7 @@ macro_rules! bounds {
 }
 
 bounds! {
+    Speed, 1e-3, FASTEST_M_S, "0.001 to 1e6 m/s", "slower steps are lost in rounding, and nothing is faster";
     TurnRate, 1e-3, 360.0, "0.001 to 360 degrees per second", "slower turns make orbits without end";
     Decision, 0.01, 3600.0, "0.01 to 3600 s", "nobody avoids others by one decision an hour";
     Step, 0.001, 3600.0, "0.001 to 3600 s", "a step is part of dt_s, and a run has many";

@@ -21,8 +21,9 @@ proptest! {
         let (mut pose, mut next, mut steps) = (world.airplanes[0].start, 0, 0);
         while next < goals.len() {
             let omega = air.steer(&pilot, pose, next);
-            pose = air.blown(pose.step(pilot.model.v_m_s, omega, 1.0));
-            next = pilot.next(pose, next);
+            let before = pose;
+            pose = air.blown(before.step(pilot.model.v_m_s, omega, 1.0));
+            next = pilot.next((before, pose), next);
             steps += 1;
         }
         prop_assert_eq!(world.alone_s[0], f64::from(steps));
@@ -42,6 +43,70 @@ proptest! {
         );
         let world = Compiled::new(&Source::new("w", text, "")).expect("a scenario").world;
         prop_assert!(world.alone_s[0] < 3000.0, "{wind:?}: {}", world.alone_s[0]);
+    }
+}
+
+/// Returns the seconds of the flight alone of the first airplane of a scenario.
+fn alone_s(airspace: &str, airplanes: &str) -> f64 {
+    let text = format!("format = 1\nworld = \"airspace\"\n[airspace]\n{airspace}\n{airplanes}");
+    Compiled::new(&Source::new("a", text, "")).unwrap_or_else(|e| panic!("{e}")).world.alone_s[0]
+}
+
+#[test]
+fn a_long_flight_in_small_steps_is_not_endless() {
+    let far = "[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[200000, 0]]\n";
+    for (dtau_s, more) in [(0.005, ""), (0.005, "leaves_s"), (1.0, "")] {
+        let told =
+            if more.is_empty() { "" } else { "orders = [{ at_s = 9000.0, leaves = true }]\n" };
+        let found_s =
+            alone_s(&format!("dtau_s = {dtau_s:?}\nhorizon_s = 50.0"), &format!("{far}{told}"));
+        assert!((found_s - 199_900.0 / 35.0).abs() <= 1.0, "{dtau_s} {more}: {found_s}");
+    }
+}
+
+#[test]
+fn the_slowest_flights_are_followed_to_their_end() {
+    let slow = |to_m: f64| {
+        let airplane = format!(
+            "[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[{to_m:?}, 0]]\nv_m_s = 0.001\n"
+        );
+        alone_s("", &airplane)
+    };
+    // To within 100 m.
+    assert!((slow(1000.0) - 900_000.0).abs() < 1000.0, "{}", slow(1000.0));
+    assert_eq!(slow(1e9), f64::INFINITY);
+    // A headwind that leaves no speed over the ground that counts.
+    let held = "[[airplanes]]\nat_m = [-1e9, 0]\nheading_deg = 0\nway_points_m = [[1e9, 0]]\n";
+    assert_eq!(alone_s("wind_m_s = [-34.9999999999999, 0.0]", held), f64::INFINITY);
+}
+
+#[test]
+fn speeds_that_rounding_would_swallow_are_refused_with_the_least_one() {
+    let slow = |more: &str| {
+        format!(
+            "format = 1\nworld = \"airspace\"\n{more}[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\n\
+             way_points_m = [[9, 0]]\n"
+        )
+    };
+    for text in [
+        slow("[airplane]\nv_m_s = 1e-14\n"),
+        slow("") + "v_m_s = 1e-300\n",
+        slow("") + "orders = [{ at_s = 5, speed_m_s = 1e-5 }]\n",
+    ] {
+        let error = Compiled::new(&Source::new("s", text, "")).expect_err("refused").to_string();
+        assert!(error.contains("give 0.001 to 1e6 m/s"), "{error}");
+    }
+}
+
+#[test]
+fn an_airplane_that_turns_round_in_a_step_arrives() {
+    for (v_m_s, omega_deg_s) in [(10.0, 180.0), (10.0, 360.0), (30.0, 90.0), (25.0, 120.0)] {
+        let model = format!(
+            "[airplane]\nv_m_s = {v_m_s:?}\nomega_max_deg_s = {omega_deg_s:?}\nseparation_m = 10.0\n"
+        );
+        let flight = "[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[205, 0], [205, 33], [1, 7]]\n";
+        let found_s = alone_s("method = \"none\"", &format!("{model}{flight}"));
+        assert!(found_s < 800.0 / v_m_s, "{v_m_s} m/s, {omega_deg_s} deg/s: {found_s} s");
     }
 }
 

@@ -11,13 +11,30 @@ pub(super) struct Roster {
     reports: BTreeMap<EntityId, Vec<EntityId>>,
     /// Whether all hear all that are near them, without a report.
     is_sure: bool,
+    settling: Settling,
+}
+
+/// The chain from the own airplane, as far as all is known that it depends on.
+#[derive(Debug)]
+struct Settling {
+    from: EntityId,
+    chain: BTreeSet<EntityId>,
+    /// Those in it of whom not all is known yet that they have heard, each with the number of those looked at.
+    due: Vec<(EntityId, usize)>,
+}
+
+impl Settling {
+    fn new(from: EntityId) -> Self {
+        Self { from, chain: BTreeSet::from([from]), due: vec![(from, 0)] }
+    }
 }
 
 impl Roster {
     /// Returns the roster of an airplane that has heard nothing yet.
     pub(super) fn new(own: Beacon, is_sure: bool) -> Self {
+        let settling = Settling::new(own.own.id);
         let beacons = BTreeMap::from([(own.own.id, own)]);
-        Self { beacons, reports: BTreeMap::new(), is_sure }
+        Self { beacons, reports: BTreeMap::new(), is_sure, settling }
     }
 
     /// Notes a beacon. Returns whether there was none of the airplane; what it says itself counts for more than
@@ -26,6 +43,11 @@ impl Roster {
         let id = beacon.own.id;
         if !is_own && self.beacons.contains_key(&id) {
             return false;
+        }
+        let is_other = |known: &Beacon| known.near != beacon.near;
+        if self.beacons.get(&id).is_some_and(is_other) {
+            // Somebody has lied about it, and whatever followed from that is void.
+            self.settling = Settling::new(self.settling.from);
         }
         self.beacons.insert(id, beacon).is_none()
     }
@@ -101,6 +123,35 @@ impl Roster {
             }
         }
         (chain, is_complete)
+    }
+
+    /// Returns the same as [`Self::is_complete`] for the own airplane, and goes on from where it stopped before: each
+    /// link is looked at once, however often something comes that is not yet all.
+    pub(super) fn settle(&mut self) -> bool {
+        let mut settling = std::mem::replace(&mut self.settling, Settling::new(0));
+        let is_complete = self.settle_from(&mut settling);
+        self.settling = settling;
+        is_complete
+    }
+
+    fn settle_from(&self, Settling { chain, due, .. }: &mut Settling) -> bool {
+        while let Some(&(id, looked_at)) = due.last() {
+            let heard = self.heard_by(id).filter(|_| self.knows(id));
+            let Some(heard) = heard else { return false };
+            let Some(&other) = heard.get(looked_at) else {
+                due.pop();
+                continue;
+            };
+            if !self.is_known(other) {
+                return false;
+            }
+            // What is known of two does not change any more, nor whether they hear each other.
+            due.last_mut().expect("it is there").1 += 1;
+            if self.is_linked(id, other) && chain.insert(other) {
+                due.push((other, 0));
+            }
+        }
+        true
     }
 
     /// Returns whether all is known on which the group of an airplane depends.

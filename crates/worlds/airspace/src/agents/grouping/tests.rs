@@ -144,6 +144,51 @@ proptest! {
     }
 }
 
+proptest! {
+    /// Items come in any order, again and again, and of some airplanes somebody has lied before they come themselves.
+    #[test]
+    fn what_is_known_is_enough_as_soon_as_it_is_when_all_is_looked_at_anew(
+        seed in any::<u64>(), n in 1usize..10, near in 0.1f64..1.0, heard in 0.3f64..1.0,
+        is_sure in any::<bool>(),
+    ) {
+        let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(908));
+        let links = Links::drawn(n, near, heard, &mut draws);
+        let ids = |of: &[bool]| (0..n).filter(|&j| of[j]).map(id).collect::<Vec<_>>();
+        let beacon = |i: usize| Beacon { own: sighted(i), near: ids(&links.near[i]), intruders: Vec::new() };
+        let mut roster = Roster::new(beacon(0), is_sure);
+        for _ in 0..12 * n {
+            let i = draws.below(n as u32) as usize;
+            let lie = Beacon { near: Vec::new(), ..beacon(i) };
+            // Whether it is new does not matter here.
+            let _ = match draws.below(4) {
+                0 if i > 0 => roster.note_beacon(lie, false),
+                0 | 1 => roster.note_report(id(i), ids(&links.hears[i])),
+                _ => roster.note_beacon(beacon(i), i > 0 && draws.below(2) == 0),
+            };
+            prop_assert_eq!(roster.settle(), roster.is_complete(id(0)));
+        }
+    }
+}
+
+/// A crowd in which everybody sees everybody, each of whom passes on what all have heard already: each look at all
+/// links at each message would take minutes.
+#[test]
+fn a_crowd_of_hundreds_is_found_at_once() {
+    let n = 600;
+    let all: Vec<Vec<bool>> = (0..n).map(|i| (0..n).map(|j| i != j).collect()).collect();
+    let links = Links { near: all.clone(), hears: all };
+    let mut agent = links.agent(0, Certainty::Sure);
+    agent.start();
+    let near = |i: usize| (0..n).filter(|&j| j != i).map(id).collect();
+    for i in (1..n).rev() {
+        let beacon = Beacon { own: sighted(i), near: near(i), intruders: Vec::new() };
+        for from in [i, 1 + i % (n - 1), i] {
+            assert!(agent.on_message(from, vec![Item::Beacon(beacon.clone())]).is_empty());
+        }
+    }
+    assert_eq!(agent.outcome().expect("all is known").members.len(), n);
+}
+
 #[test]
 fn among_those_that_all_see_each_other_nothing_is_passed_on() {
     let mut draws = Streams::new(Seed(1)).draws(0, 0, Purpose(906));
