@@ -20,6 +20,8 @@ pub(super) const SHARES: &str = "shares";
 const VARIANTS: &str = "variants";
 const RUNS: &str = "runs";
 const SCENARIO: &str = "scenario.toml";
+/// Key of the fingerprint of all scenarios in the key-value pairs of a table.
+pub(super) const FINGERPRINT: &str = "sidestep.fingerprint";
 const SCRATCH: &str = "joining.partial";
 
 /// The content of `sweep.json`.

@@ -118,7 +118,8 @@ fn variants(plan: &Plan, table: &RunTable) -> Option<Table> {
     }
     let mut runs = vec![0u64; plan.variants.len()];
     if let Some(Values::I64(of)) = table.column("variant").map(|c| &c.values) {
-        of.options().flatten().filter_map(|v| usize::try_from(*v).ok()).for_each(|v| runs[v] += 1);
+        let numbers = of.options().flatten().filter_map(|v| usize::try_from(*v).ok());
+        numbers.for_each(|v| runs.get_mut(v).into_iter().for_each(|runs| *runs += 1));
     }
     let mut columns = vec!["variant", "runs"];
     columns.extend(plan.parameters.iter().map(String::as_str));
@@ -141,8 +142,8 @@ fn why_enough(plan: &Plan, table: &RunTable) -> Option<Table> {
     let names = plan.names();
     let mut rows = Table::new("Why so many runs", "", &["variant", "runs", "why"]);
     for Stopped { variant, runs, reason } in &stopped {
-        let name = names[*variant as usize].clone();
-        rows.row([name, runs.to_string(), reason.words().to_string()]);
+        let name = names.get(*variant as usize).cloned();
+        rows.row([name.unwrap_or_default(), runs.to_string(), reason.words().to_string()]);
     }
     (!stopped.is_empty()).then_some(rows)
 }
@@ -196,7 +197,8 @@ fn tell_plan(document: &mut Document, folder: &Folder, table: &RunTable) {
     document.tables(why_enough(plan, table).map(Table::folded));
     document.commands("How to run it again", again(folder));
     if let Ok(text) = std::fs::read_to_string(folder.scenario(0)) {
-        let title = format!("The scenario of the first variant: {}", plan.names()[0]);
+        let name = plan.names().into_iter().next().unwrap_or_default();
+        let title = format!("The scenario of the first variant: {name}");
         document.push(Block::Code(Code { title, language: "toml", text }));
     }
 }

@@ -18,12 +18,25 @@ pub(super) fn share_of(shard: Shard) -> Share {
     Share { index: shard.index, count: shard.count }
 }
 
+/// Refuses a folder that has more or fewer scenarios than its plan has variants: the runs of a variant would be taken for
+/// those of another.
+pub(super) fn check_variants(folder: &Folder) -> Result<(), InputError> {
+    let (planned, there) = (folder.plan().variants.len(), folder.manifest().fingerprints.len());
+    if planned == there {
+        return Ok(());
+    }
+    let cause = format!("its plan has {planned} variants, and there are {there} scenarios");
+    let remedy = "`sweep.json` was changed: put it back as it was, or sweep into a new folder";
+    Err(InputError::new(folder.path().display(), cause, remedy))
+}
+
 /// Passes on all finished runs, except those of the share `but`.
 pub(super) fn gather(
     folder: &Folder,
     but: Option<Shard>,
     mut each: impl FnMut(Outcome),
 ) -> Result<(), InputError> {
+    check_variants(folder)?;
     folder.parts(|part| table_of(part).outcomes(&mut each))?;
     folder.journals(but.map(share_of), &mut each)
 }

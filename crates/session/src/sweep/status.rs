@@ -1,6 +1,6 @@
 //! The state of a sweep that others work on, as its folder tells it; looking changes nothing.
 
-use super::gather::{Folder, table_of};
+use super::gather::{Folder, check_variants, table_of};
 use super::stamped::{Read, now_unix_s};
 use serde::Serialize;
 use sidestep::experiment::sweep::{Outcome, Plan, Shard};
@@ -96,6 +96,7 @@ impl Found {
 pub fn status(folder: &Folder) -> Result<Status, InputError> {
     let (plan, now_s) = (folder.plan(), now_unix_s());
     let (mut found, mut shares) = (Found::default(), Vec::new());
+    check_variants(folder)?;
     let is_complete = folder.is_complete();
     if is_complete {
         table_of(folder.results()?).outcomes(|outcome| found.note(outcome));

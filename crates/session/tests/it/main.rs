@@ -1,6 +1,7 @@
 //! Tests of everything that a session does, with a world that only these tests know.
 
 mod builds;
+mod changed;
 mod controls;
 mod exports;
 mod orders;

@@ -4,7 +4,8 @@ use super::baseline::{Baseline, Search};
 use super::file::{Sweep, Until};
 use super::variant::{Base, Setting, Variant};
 use crate::scenario::Seeds;
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use sidestep_kernel::InputError;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -15,7 +16,10 @@ use std::str::FromStr;
 /// A cell has the number `variant * replicates + replicate`, so rows sorted by cell are sorted by
 /// variant. Cells are run replicate by replicate, so that the first results are a small complete
 /// experiment.
+///
+/// A plan that is read back is checked ([`Plan::check`]): everybody else may believe it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(remote = "Self")]
 pub struct Plan {
     /// Name of the sweep; may be empty.
     pub name: String,
@@ -43,6 +47,20 @@ pub struct Plan {
 
 /// Largest number of runs of a sweep: joining a table of ten million takes some gigabytes.
 const MOST_RUNS: u64 = 10_000_000;
+
+impl Serialize for Plan {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        Self::serialize(self, to)
+    }
+}
+
+impl<'de> Deserialize<'de> for Plan {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let plan = Self::deserialize(from)?;
+        plan.check().map_err(D::Error::custom)?;
+        Ok(plan)
+    }
+}
 
 /// The unit of work: a variant with a seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -102,6 +120,27 @@ impl Plan {
             place: &sweep.place,
         };
         search.found(|k| self.names().swap_remove(k), |setting| self.word(setting))
+    }
+
+    /// Checks that the parts of the plan fit together, as they do in every plan that [`Plan::new`] makes.
+    ///
+    /// # Errors
+    /// What does not fit, in words.
+    pub fn check(&self) -> Result<(), String> {
+        let (variants, replicates) = (self.variants.len(), u64::from(self.replicates));
+        if variants == 0 || replicates == 0 {
+            return Err(format!("a plan of {variants} variants with {replicates} runs each"));
+        }
+        if (variants as u64).checked_mul(replicates).is_none_or(|runs| runs > MOST_RUNS) {
+            return Err(format!("{variants} variants with {replicates} runs each are too many"));
+        }
+        let last = self.first_seed.checked_add(replicates);
+        if last.is_none_or(|last| last > i64::MAX as u64) {
+            return Err(format!("{replicates} seeds from {} on run over", self.first_seed));
+        }
+        self.until.iter().try_for_each(Until::check)?;
+        self.variants.iter().try_for_each(|variant| variant.check(&self.parameters))?;
+        self.baseline.iter().try_for_each(|baseline| baseline.check(variants))
     }
 
     /// Returns the names of the variants in tables and figures: their parameters, in short
