@@ -116,7 +116,7 @@ pub(crate) fn exact(args: &ExactArgs, console: Console) -> Result<ExitCode, Fail
         summary.comparison = Some(compare(compiled, &source, &chosen, cycles, runs)?);
     }
     summary.pomdp = export(&model, &args.export)?;
-    console.result(&summary, || text(&summary, named(compiled, &source)));
+    console.result(&summary, || text(&summary, named(compiled, &source)))?;
     Ok(match summary.comparison {
         Some(Comparison { agrees: false, .. }) => ExitCode::Failed,
         _ => ExitCode::Done,

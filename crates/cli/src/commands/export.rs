@@ -140,7 +140,7 @@ pub(crate) fn export(args: &ExportArgs, console: Console) -> Result<ExitCode, Fa
     match export::export(&recorded, &wanted(args), &Watch::new(console)) {
         Err(Failure::Interrupted) => Ok(ExitCode::Interrupted),
         written => {
-            report(args.to, &written?, console);
+            report(args.to, &written?, console)?;
             Ok(ExitCode::Done)
         }
     }
@@ -189,7 +189,7 @@ fn check_options(args: &ExportArgs) -> Result<(), InputError> {
 }
 
 /// Prints which files were written.
-fn report(form: Form, written: &Written, console: Console) {
+fn report(form: Form, written: &Written, console: Console) -> Result<(), Failure> {
     let Written { paths, is_confirmed, film } = written;
     let json = json!({ "written": paths, "digest_confirmed": is_confirmed });
     let names = paths.iter().map(|path| format!("{}\n", path.display())).collect::<String>();
@@ -202,7 +202,7 @@ fn report(form: Form, written: &Written, console: Console) {
         let size = if paths.iter().all(|path| path.is_file()) { size } else { String::new() };
         let film = film.map_or(String::new(), |film| film_words(form, film, &paths[0]));
         format!("{names}{size}{confirmed}{film}")
-    });
+    })
 }
 
 /// Returns how long a film is, or how to join its frames.

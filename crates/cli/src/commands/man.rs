@@ -33,7 +33,7 @@ pub(crate) fn man(args: &ManArgs, console: Console) -> Result<ExitCode, Failure>
         InputError::new(folder.display(), format!("cannot write manual pages: {e}"), remedy)
     })?;
     let said = || format!("Wrote manual pages to {}.\n", folder.display());
-    console.result(&json!({ "folder": folder }), said);
+    console.result(&json!({ "folder": folder }), said)?;
     Ok(ExitCode::Done)
 }
 

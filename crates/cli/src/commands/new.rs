@@ -47,7 +47,7 @@ pub(crate) fn new(args: &NewArgs, console: Console) -> Result<ExitCode, Failure>
     write_new(&path, kind.default_scenario())?;
     let next = format!("Try:\n  sidestep check {0}\n  sidestep run {0}\n", path.display());
     let json = json!({ "file": path, "world": args.world });
-    console.result(&json, || format!("Wrote {}\n{next}", path.display()));
+    console.result(&json, || format!("Wrote {}\n{next}", path.display()))?;
     Ok(ExitCode::Done)
 }
 

@@ -92,7 +92,7 @@ pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Fa
         "figures": shown,
     });
     let more = shown.map_or(String::new(), |folder| format!("{folder}\n"));
-    console.result(&json, || format!("{html}\n{}\n{more}", markdown.display()));
+    console.result(&json, || format!("{html}\n{}\n{more}", markdown.display()))?;
     Ok(ExitCode::Done)
 }
 

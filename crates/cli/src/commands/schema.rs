@@ -63,11 +63,11 @@ pub(crate) fn schema(args: &SchemaArgs, console: Console) -> Result<ExitCode, Fa
     let schema = schema.expect("the parser takes these names alone");
     let text = format!("{schema:#}\n");
     match &args.out {
-        None => console.result(&schema, || text),
+        None => console.result(&schema, || text)?,
         Some(file) => {
             write(file, &text)?;
             let written = serde_json::json!({ "file": file, "of": args.of });
-            console.result(&written, || told(file, &schema));
+            console.result(&written, || told(file, &schema))?;
         }
     }
     Ok(ExitCode::Done)

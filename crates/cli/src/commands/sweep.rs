@@ -160,7 +160,7 @@ fn share(args: &ShareArgs, console: Console) -> Result<ExitCode, Failure> {
     interrupt::listen()?;
     let ended = sweep::share(worlds(), &folder, args.shard, workers, &Watch::new(console))?;
     let told = Told { plan: folder.plan(), folder: Some(&folder), console };
-    Ok(tell_share(told, args.shard, ended))
+    tell_share(told, args.shard, ended)
 }
 
 fn collect(args: &FolderArgs, console: Console) -> Result<ExitCode, Failure> {
@@ -172,7 +172,7 @@ fn collect(args: &FolderArgs, console: Console) -> Result<ExitCode, Failure> {
 
 fn status(args: &FolderArgs, console: Console) -> Result<ExitCode, Failure> {
     let folder = Folder::open(&args.folder)?;
-    tell_status(&folder, &sweep::status(&folder)?, console);
+    tell_status(&folder, &sweep::status(&folder)?, console)?;
     Ok(ExitCode::Done)
 }
 
@@ -198,6 +198,6 @@ fn plan(args: &PlanArgs, console: Console) -> Result<ExitCode, Failure> {
             ("join them", format!("sidestep sweep collect {dir}")),
         ];
         aligned(&lines.map(|(name, value)| (name.to_string(), value)))
-    });
+    })?;
     Ok(ExitCode::Done)
 }

@@ -2,6 +2,7 @@
 
 use super::say::counted;
 use crate::console::{Console, aligned, duration, grouped};
+use crate::exit::Failure;
 use serde_json::json;
 use sidestep_session::sweep::{Folder, ShareStatus, Status};
 
@@ -9,7 +10,14 @@ use sidestep_session::sweep::{Folder, ShareStatus, Status};
 const NAMED: usize = 5;
 
 /// Prints how far a sweep is.
-pub(crate) fn tell_status(folder: &Folder, status: &Status, console: Console) {
+///
+/// # Errors
+/// When that cannot be written.
+pub(crate) fn tell_status(
+    folder: &Folder,
+    status: &Status,
+    console: Console,
+) -> Result<(), Failure> {
     let plan = folder.plan();
     let mut json = json!({ "folder": folder.path(), "name": plan.name, "world": plan.world });
     if let (Some(all), Ok(serde_json::Value::Object(told))) =
@@ -23,7 +31,7 @@ pub(crate) fn tell_status(folder: &Folder, status: &Status, console: Console) {
         let name = if plan.name.is_empty() { &plan.world } else { &plan.name };
         let (runs, all) = (grouped(status.runs), counted(status.of as usize, "run"));
         format!("# {name}: {runs} {of} {all}\n\n{}", aligned(&lines(folder, status)))
-    });
+    })
 }
 
 fn lines(folder: &Folder, status: &Status) -> Vec<(String, String)> {
