@@ -9,8 +9,8 @@ use crate::worlds;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use sidestep::kernel::{Cycle, InputError};
-use sidestep_session::Recorded;
 use sidestep_session::export::{self, Export, Film, Written};
+use sidestep_session::{Recorded, shown};
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -191,7 +191,8 @@ fn check_options(args: &ExportArgs) -> Result<(), InputError> {
 /// Prints which files were written.
 fn report(form: Form, written: &Written, console: Console) -> Result<(), Failure> {
     let Written { paths, is_confirmed, film } = written;
-    let json = json!({ "written": paths, "digest_confirmed": is_confirmed });
+    let shown: Vec<String> = paths.iter().map(shown).collect();
+    let json = json!({ "written": shown, "digest_confirmed": is_confirmed });
     let names = paths.iter().map(|path| format!("{}\n", path.display())).collect::<String>();
     let short = || names.clone();
     console.result_or_short(&json, short, || {

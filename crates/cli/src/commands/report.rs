@@ -11,7 +11,7 @@ use sidestep::kernel::InputError;
 use sidestep_document::Document;
 use sidestep_report::{Print, SvgFile};
 use sidestep_session::report::document;
-use sidestep_session::{replace, write_png};
+use sidestep_session::{replace, shown, write_png};
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -174,7 +174,7 @@ fn renamed(text: &str) -> Result<(String, String), InputError> {
 fn pages(args: &ReportArgs) -> Result<Pages, InputError> {
     let html = args.out.clone().unwrap_or_else(|| args.folder.join("report.html"));
     let ending = html.extension().and_then(|e| e.to_str());
-    let stem = html.file_stem().and_then(|stem| stem.to_str());
+    let stem = html.file_stem().map(shown);
     let (Some("html" | "htm"), Some(stem)) = (ending, stem) else {
         let cause = "the page is HTML, and Markdown is written beside it";
         return Err(InputError::new(html.display(), cause, "give a name that ends in .html"));

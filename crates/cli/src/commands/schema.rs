@@ -8,6 +8,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::Value;
 use sidestep::kernel::InputError;
 use sidestep::scenario::Kind;
+use sidestep_session::shown;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -66,7 +67,7 @@ pub(crate) fn schema(args: &SchemaArgs, console: Console) -> Result<ExitCode, Fa
         None => console.result(&schema, || text)?,
         Some(file) => {
             write(file, &text)?;
-            let written = serde_json::json!({ "file": file, "of": args.of });
+            let written = serde_json::json!({ "file": shown(file), "of": args.of });
             console.result(&written, || told(file, &schema))?;
         }
     }

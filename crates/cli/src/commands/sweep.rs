@@ -11,6 +11,7 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 use sidestep::experiment::sweep::Shard;
 use sidestep::kernel::InputError;
+use sidestep_session::shown;
 use sidestep_session::sweep::{self, Folder};
 use std::path::{Path, PathBuf};
 
@@ -183,7 +184,7 @@ fn plan(args: &PlanArgs, console: Console) -> Result<ExitCode, Failure> {
     let folder = sweep::planned(worlds(), &wanted, &args.out, workers, &watch)?;
     let plan = folder.plan();
     let json = json!({
-        "folder": args.out,
+        "folder": shown(&args.out),
         "variants": plan.variants.len(),
         "replicates": plan.replicates,
         "cells": plan.runs(),

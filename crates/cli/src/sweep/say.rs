@@ -7,8 +7,8 @@ use serde_json::json;
 use sidestep::experiment::sweep::rounds::{Stopped, stopped};
 use sidestep::experiment::sweep::{LeftOut, Plan, RunTable, Shard, Summary};
 use sidestep_document::Table;
+use sidestep_session::shown;
 use sidestep_session::sweep::{self, Done, Effort, Ended, Folder};
-use std::path::Path;
 
 /// Largest number of failed runs that are listed.
 const NAMED: usize = 5;
@@ -68,7 +68,7 @@ pub(crate) fn tell(told: Told<'_>, ended: Ended, already: &str) -> Result<ExitCo
 fn interrupted(told: Told<'_>, finished: usize) -> Result<ExitCode, Failure> {
     let Told { plan, folder, console } = told;
     let path = folder.map(Folder::path);
-    match path.map(Path::display) {
+    match path.map(shown) {
         None => console.note("Interrupted; nothing is kept without --out DIR."),
         Some(path) => {
             let all = plan.runs();
@@ -78,7 +78,7 @@ fn interrupted(told: Told<'_>, finished: usize) -> Result<ExitCode, Failure> {
             ));
         }
     }
-    let json = json!({ "status": "interrupted", "runs": finished, "folder": path });
+    let json = json!({ "status": "interrupted", "runs": finished, "folder": path.map(shown) });
     console.result(&json, String::new)?;
     Ok(ExitCode::Interrupted)
 }

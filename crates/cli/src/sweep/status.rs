@@ -4,6 +4,7 @@ use super::say::counted;
 use crate::console::{Console, aligned, duration, grouped};
 use crate::exit::Failure;
 use serde_json::json;
+use sidestep_session::shown;
 use sidestep_session::sweep::{Folder, ShareStatus, Status};
 
 /// Largest number of failed runs that are listed.
@@ -19,7 +20,8 @@ pub(crate) fn tell_status(
     console: Console,
 ) -> Result<(), Failure> {
     let plan = folder.plan();
-    let mut json = json!({ "folder": folder.path(), "name": plan.name, "world": plan.world });
+    let mut json =
+        json!({ "folder": shown(folder.path()), "name": plan.name, "world": plan.world });
     if let (Some(all), Ok(serde_json::Value::Object(told))) =
         (json.as_object_mut(), serde_json::to_value(status))
     {
