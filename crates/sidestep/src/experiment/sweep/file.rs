@@ -286,11 +286,7 @@ impl Sweep {
     /// # Errors
     /// When seeds are varied as if they were a parameter.
     pub fn check(&self) -> Result<(), InputError> {
-        let design = &self.design;
-        let listed =
-            design.list.iter().flat_map(|v| &v.settings).chain(&self.fixed).map(|s| &s.key);
-        let ranges = design.hypercube.iter().flat_map(|h| &h.ranges).map(|r| &r.key);
-        let mut keys = listed.chain(ranges).chain(design.factors.iter().map(|f| &f.key));
+        let mut keys = self.design.keys().chain(self.fixed.iter().map(|s| s.key.as_str()));
         if keys.any(|key| key == "seed") {
             let cause = "`seed` is set: each variant is run with the same seeds";
             let remedy = "give `replicates` and `first_seed` instead";
