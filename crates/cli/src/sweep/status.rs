@@ -53,15 +53,13 @@ fn lines(folder: &Folder, status: &Status) -> Vec<(String, String)> {
     for failure in status.failures.iter().take(NAMED) {
         line("", format!("{}, seed {}: {}", failure.variant, failure.seed, failure.why));
     }
-    let (is_all, nobody) = (status.runs == status.of, status.left_s.is_none());
+    let is_all = status.runs == status.of;
     let next = match status.is_complete {
         true => Some(("look at it", format!("sidestep report {path}"))),
+        // Two processes that do the same only stand in each other's way.
+        false if status.is_worked_on => None,
         false if is_all => Some(("join them", format!("sidestep sweep collect {path}"))),
-        // Where a precision ends the sweep nobody knows what is left, so that tells nothing.
-        false if nobody && !status.until_precise => {
-            Some(("go on", format!("sidestep resume {path}")))
-        }
-        false => None,
+        false => Some(("go on", format!("sidestep resume {path}"))),
     };
     lines.extend(next.map(|(name, words)| (name.to_string(), words)));
     lines

@@ -21,6 +21,11 @@ use crate::format::{self, FormatVersion};
 /// none.
 const SYNC_EVERY: Duration = Duration::from_millis(200);
 
+/// Number of further tries to lock a journal that is locked,
+const LOCK_TRIES: usize = 5;
+/// and the time between two.
+const LOCK_AGAIN: Duration = Duration::from_millis(10);
+
 /// The sweep that a journal is of.
 #[derive(Debug, Clone, Copy)]
 pub struct Origin<'a> {
@@ -111,8 +116,31 @@ impl Journal {
     }
 }
 
+/// Whether a process writes the journal at `path`; none where the file system has no locks.
+pub(super) fn is_locked(path: &Path) -> Option<bool> {
+    match File::open(path) {
+        Err(_) => Some(false),
+        Ok(file) => match file.try_lock_shared() {
+            Ok(()) => Some(false),
+            Err(TryLockError::WouldBlock) => Some(true),
+            Err(TryLockError::Error(_)) => None,
+        },
+    }
+}
+
+/// Locks a file, against others who write it. Who asks whether it is locked has a lock for a moment, which is waited for.
+fn try_lock(file: &File) -> Result<(), TryLockError> {
+    for _ in 0..LOCK_TRIES {
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => std::thread::sleep(LOCK_AGAIN),
+            other => return other,
+        }
+    }
+    file.try_lock()
+}
+
 fn lock(file: &File, path: &Path) -> Result<(), InputError> {
-    let cause = match file.try_lock() {
+    let cause = match try_lock(file) {
         Ok(()) => return Ok(()),
         Err(TryLockError::WouldBlock) => "another process is running this share".to_string(),
         // Some network file systems have no locks: there, the user's scheduler must prevent two
@@ -265,7 +293,9 @@ mod tests {
         let journal = opened(&path);
         let error = refused(&path, OF);
         assert!(error.cause().contains("another process"), "{error}");
+        assert_eq!(is_locked(&path), Some(true));
         drop(journal);
+        assert_eq!(is_locked(&path), Some(false), "also after a kill: the system takes locks away");
         let error = refused(&path, Origin { program_version: "0.2.0", ..OF });
         assert!(error.cause().contains("sidestep 0.1.0"), "{error}");
         let error = refused(&path, Origin { fingerprint: "g", ..OF });

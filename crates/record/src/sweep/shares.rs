@@ -9,7 +9,7 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::{RecordError, RoleColumn};
 
 use super::folder::{FINGERPRINT, SHARES, SweepFolder};
-use super::journal::{Journal, Origin, read_journal};
+use super::journal::{Journal, Origin, is_locked, read_journal};
 use crate::whole::{self, WholeTable};
 
 /// A share of the cells: number `index` of `count`.
@@ -112,6 +112,11 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         shares.sort();
         shares.dedup();
         Ok(shares.into_iter().map(|share| (share, done.contains(&share))).collect())
+    }
+
+    /// Whether a process writes the journal of a share now; none where the file system has no locks.
+    pub fn is_locked(&self, share: Share) -> Option<bool> {
+        is_locked(&self.share_file(share, "journal"))
     }
 
     /// Passes on the finished runs of a share that is in progress or was stopped.

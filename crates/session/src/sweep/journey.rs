@@ -173,7 +173,9 @@ pub fn go_on<'a>(
     let mut log = Log::new(folder.plan());
     gather(folder, Some(Shard::ALL), |outcome| log.note(&outcome))?;
     let mut effort = Effort::default();
-    if let Some(mut journal) = folder.journal(share_of(Shard::ALL), |o: Outcome| log.note(&o))? {
+    // Locked until all is joined, so that nobody else begins to join.
+    let mut journal = folder.journal(share_of(Shard::ALL), |o: Outcome| log.note(&o))?;
+    if let Some(journal) = &mut journal {
         with_work(worlds, folder, engine.into(), watcher, |work| {
             let mut keep = |outcome: &Outcome| Ok(journal.append(&Stamped::now(outcome))?);
             effort = log.run_all(work, &mut keep).map_err(|e| saved(e, folder.path()))?;
