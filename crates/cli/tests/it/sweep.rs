@@ -271,6 +271,23 @@ fn a_variant_that_was_changed_or_is_gone_stops_the_sweep_until_it_is_back() {
 }
 
 #[test]
+fn a_plan_that_a_precision_ends_names_only_commands_that_run_it() {
+    let place = place();
+    let plan = ["sweep", "plan", "s.toml", "--cycles", "50", "--until", "ci=0.5", "--max", "12"];
+    let told = place.run(&[&plan[..], &["--out", "d"]].concat());
+    assert_eq!(told.code(), 0, "{}", told.err());
+    assert!(told.out().contains("at most 12 of each, at most 12 in all"), "{}", told.out());
+    let status = place.run(&["sweep", "status", "d"]).out();
+    assert!(status.contains("of at most 12") && status.contains("sidestep resume d"), "{status}");
+    let commands = told.out();
+    let commands: Vec<&str> =
+        commands.lines().filter_map(|l| l.split_once("sidestep ")).map(|p| p.1).collect();
+    assert_eq!(commands, ["resume d"]);
+    let ended = place.run(&["resume", "d"]);
+    assert_eq!(ended.code(), 0, "{}", ended.err());
+}
+
+#[test]
 fn the_status_of_a_sweep_that_somebody_works_on_names_no_second_command() {
     let place = place();
     place.json(&["sweep", "plan", "s.toml", "--cycles", "100000000", "--out", "d"]);
