@@ -210,7 +210,7 @@ fn shielded(results: &[MethodResult]) -> Option<String> {
     (!names.is_empty()).then(|| {
         format!(
             "The shield changed commands of {}: there it is the shield that keeps airplanes apart, in part \
-             or in whole. Fly the methods bare with --set shield=off.",
+             or in whole. Fly the methods bare with --set airspace.shield=off.",
             names.join(", ")
         )
     })
