@@ -5,7 +5,7 @@ use super::words::{count, duration};
 use crate::sweep::{Finished, Folder, finished, picture_of};
 use crate::{Error, Watcher};
 use sidestep::experiment::sweep::rounds::{Stopped, stopped};
-use sidestep::experiment::sweep::{Plan, RunTable, Summary};
+use sidestep::experiment::sweep::{Cell, Plan, Role, RunTable, Summary};
 use sidestep::kernel::ports::Values;
 use sidestep::scenario::Worlds;
 use sidestep_document::Table;
@@ -37,11 +37,7 @@ pub(super) fn document(
     tell_results(&mut document, &summary);
     tell_failures(&mut document, plan, &table);
     let pictures = pictures(worlds, folder, &table, watcher)?;
-    if !pictures.is_empty() {
-        document.section("Where everybody went");
-        let text = "The run of the first seed, of the first variants.";
-        document.paragraph(text).pictures(pictures);
-    }
+    tell_pictures(&mut document, pictures);
     tell_methods(&mut document, &summary);
     tell_plan(&mut document, folder, &table);
     Ok(document)
@@ -203,6 +199,17 @@ fn tell_plan(document: &mut Document, folder: &Folder, table: &RunTable) {
     }
 }
 
+fn tell_pictures(document: &mut Document, Pictures { all, remarks }: Pictures) {
+    if all.is_empty() && remarks.is_empty() {
+        return;
+    }
+    document.section("Where everybody went");
+    document.paragraph("The run of the first seed, of the first variants.").pictures(all);
+    remarks.into_iter().for_each(|remark| {
+        document.warning(remark);
+    });
+}
+
 fn tell_failures(document: &mut Document, plan: &Plan, table: &RunTable) {
     let Some(column) = table.column("failure") else { return };
     let failed = (0..table.runs()).filter(|&row| !column.values.text(row).is_empty());
@@ -224,32 +231,61 @@ fn tell_failures(document: &mut Document, plan: &Plan, table: &RunTable) {
     document.tables([rows]);
 }
 
+/// Pictures of some runs, and why there is none of others.
+#[derive(Default)]
+struct Pictures {
+    all: Vec<Picture>,
+    remarks: Vec<String>,
+}
+
 /// Returns a picture of one run of each of the first variants, except of those that took long.
 fn pictures(
     worlds: Worlds,
     folder: &Folder,
     table: &RunTable,
     watcher: &dyn Watcher,
-) -> Result<Vec<Picture>, Error> {
+) -> Result<Pictures, Error> {
     let plan = folder.plan();
-    let cells = table.column("cell");
-    let took_s = |id: u64| {
-        let row = (0..table.runs())
-            .find(|&row| cells.and_then(|c| c.values.number(row)) == Some(id as f64))?;
-        table.column("run_wall_s")?.values.number(row)
-    };
-    let mut pictures = Vec::new();
-    for (variant, name) in (0u32..).zip(plan.names()).take(DRAWN) {
+    let digests = table.of_role(Role::Digest).next();
+    let mut pictures = Pictures::default();
+    for (variant, title) in (0u32..).zip(plan.names()).take(DRAWN) {
         let cell = plan.cell(variant, 0);
-        if took_s(cell.id).is_some_and(|took_s| took_s <= LONGEST_S)
-            && let Some(svg) = picture_of(worlds, folder, cell, watcher)?
-        {
-            let caption = format!(
-                "Seed {}; its digest and metrics are in row {} of results.parquet.",
-                cell.seed, cell.id
-            );
-            pictures.push(Picture { title: name, caption, svg });
+        let Some(row) = row_of(table, cell.id).filter(|row| is_short(table, *row)) else {
+            continue;
+        };
+        let digest = digests.map_or_else(String::new, |c| c.values.text(row));
+        match picture_of(worlds, folder, cell, &digest, watcher)? {
+            Ok(svg) => {
+                let caption = caption(folder, cell, row);
+                pictures.all.push(Picture { title, caption, svg });
+            }
+            Err(why) => {
+                let seed = cell.seed;
+                let remark = format!("There is no picture of {title}, seed {seed}: {why}.");
+                pictures.remarks.push(remark);
+            }
         }
     }
     Ok(pictures)
+}
+
+fn caption(folder: &Folder, cell: Cell, row: usize) -> String {
+    let (seed, id) = (cell.seed, cell.id);
+    match folder.is_complete() {
+        true => format!("Seed {seed}; its digest and metrics are in row {row} of results.parquet."),
+        false => format!("Seed {seed}; its cell has the number {id}."),
+    }
+}
+
+/// Returns the row of a cell, counted from 0.
+fn row_of(table: &RunTable, cell: u64) -> Option<usize> {
+    let cells = table.column("cell")?;
+    (0..table.runs()).find(|&row| cells.values.number(row) == Some(cell as f64))
+}
+
+/// Whether a run did not fail, and is quickly made again.
+fn is_short(table: &RunTable, row: usize) -> bool {
+    let number = |name: &str| table.column(name).and_then(|c| c.values.number(row));
+    let failed = table.column("failure").is_some_and(|c| !c.values.text(row).is_empty());
+    !failed && number("run_wall_s").is_some_and(|took_s| took_s <= LONGEST_S)
 }

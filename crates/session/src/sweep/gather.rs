@@ -1,5 +1,6 @@
 //! The folder of a sweep, and the finished runs in it.
 
+use crate::identity::Maker;
 use sidestep::experiment::sweep::{Outcome, Plan, Role, RunTable, Shard};
 use sidestep::kernel::InputError;
 use sidestep_record::WholeTable;
@@ -16,6 +17,15 @@ pub(super) fn table_of(file: WholeTable<Role>) -> RunTable {
 /// Converts a share to the type that folders use.
 pub(super) fn share_of(shard: Shard) -> Share {
     Share { index: shard.index, count: shard.count }
+}
+
+/// Refuses another build: results may change between builds, so only one makes all runs.
+pub(super) fn check_build(folder: &Folder) -> Result<(), InputError> {
+    let manifest = folder.manifest();
+    let maker = Maker { version: manifest.program_version.clone(), build: manifest.build.clone() };
+    maker.check(folder.path(), "sweep", |wrote| {
+        format!("go on with sidestep {wrote}, or sweep into a new folder")
+    })
 }
 
 /// Refuses a folder that has more or fewer scenarios than its plan has variants: the runs of a variant would be taken for

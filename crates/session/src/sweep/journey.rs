@@ -2,13 +2,12 @@
 
 use super::crew::Engine;
 use super::effort::Effort;
-use super::gather::{Folder, gather, share_of, table_of};
+use super::gather::{Folder, check_build, gather, share_of, table_of};
 use super::look::finished;
 use super::piles::{PILE, Piles};
 use super::prepare::{Make, prepare};
 use super::stamped::Stamped;
 use super::work::{Take, Work};
-use crate::identity::Maker;
 use crate::identity::build;
 use crate::watcher::{Progress, Watched};
 use crate::{Error, Watcher};
@@ -145,15 +144,6 @@ fn the_same(
     let remedy =
         format!("name another folder, or go on with what is there: sidestep resume {there}");
     Err(InputError::new(there, "the folder holds another sweep", remedy).into())
-}
-
-/// Refuses another build: results may change between builds, so only one makes all runs.
-fn check_build(folder: &Folder) -> Result<(), InputError> {
-    let manifest = folder.manifest();
-    let maker = Maker { version: manifest.program_version.clone(), build: manifest.build.clone() };
-    maker.check(folder.path(), "sweep", |wrote| {
-        format!("go on with sidestep {wrote}, or sweep into a new folder")
-    })
 }
 
 /// Runs all cells that are not finished, and joins all runs into one table.
