@@ -5,6 +5,7 @@ mod changed;
 mod controls;
 mod exports;
 mod orders;
+mod places;
 mod pond;
 mod runs;
 mod support;
