@@ -98,7 +98,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         let file = staging.path().join(MANIFEST);
         disk::replace(&file, &json(&manifest, &file)?)?;
         disk::sync_below(staging.path())?;
-        staging.take_place_of(path)?;
+        staging.take_place()?;
         Ok(Self { path: path.to_path_buf(), manifest })
     }
 

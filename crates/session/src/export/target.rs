@@ -79,7 +79,12 @@ impl Target {
         &self,
         fill: impl FnOnce(&Path) -> Result<T, Error>,
     ) -> Result<T, Error> {
-        let mut growing = self.path.as_os_str().to_owned();
+        // Of a link, the folder that it leads to: the link stays.
+        let path = match self.path.is_symlink() {
+            true => self.path.canonicalize().map_err(|e| Error::write(&self.path, &e))?,
+            false => self.path.clone(),
+        };
+        let mut growing = path.as_os_str().to_owned();
         growing.push(".partial");
         let growing = PathBuf::from(growing);
         let failed = |e: std::io::Error| Error::write(&self.path, &e);
@@ -87,9 +92,7 @@ impl Target {
         remove(&growing).map_err(failed)?;
         std::fs::create_dir_all(&growing).map_err(failed)?;
         let filled = fill(&growing).and_then(|done| {
-            remove(&self.path)
-                .and_then(|()| std::fs::rename(&growing, &self.path))
-                .map_err(failed)?;
+            remove(&path).and_then(|()| std::fs::rename(&growing, &path)).map_err(failed)?;
             Ok(done)
         });
         filled.inspect_err(|_| drop(remove(&growing)))
