@@ -108,6 +108,18 @@ fn methods_are_compared_on_the_same_traffic() {
 }
 
 #[test]
+fn seeds_that_run_over_are_told_as_such() {
+    let place = Place::new();
+    place.write("six.toml", SIX);
+    let last = ["compare", "six.toml", "--methods", "none", "--seed", "9223372036854775807"];
+    let told = place.run(&[&last[..], &["--runs", "2"]].concat());
+    assert_eq!((told.code(), told.out().as_str()), (2, ""));
+    let cause = "2 seeds from 9223372036854775807 on run over";
+    assert!(told.err().contains(cause) && !told.err().contains("line"), "{}", told.err());
+    assert_eq!(place.run(&[&last[..], &["--runs", "1"]].concat()).code(), 0);
+}
+
+#[test]
 fn the_advice_to_fly_methods_without_the_shield_is_accepted() {
     let place = Place::new();
     place.write("six.toml", SIX);

@@ -88,11 +88,8 @@ impl Plan {
             }
         }
         let first_seed = sweep.first_seed.unwrap_or(base.seed);
-        let last = first_seed.checked_add(u64::from(sweep.replicates));
-        if last.is_none_or(|last| last > i64::MAX as u64) {
-            let cause = format!("{} seeds from {first_seed} on run over", sweep.replicates);
-            return Err(InputError::new(&sweep.place, cause, "begin with a smaller seed"));
-        }
+        check_seeds(first_seed, sweep.replicates.into())
+            .map_err(|cause| InputError::new(&sweep.place, cause, "begin with a smaller seed"))?;
         let mut plan = Self {
             name: sweep.name.clone(),
             world: base.world.into(),
@@ -134,10 +131,7 @@ impl Plan {
         if (variants as u64).checked_mul(replicates).is_none_or(|runs| runs > MOST_RUNS) {
             return Err(format!("{variants} variants with {replicates} runs each are too many"));
         }
-        let last = self.first_seed.checked_add(replicates);
-        if last.is_none_or(|last| last > i64::MAX as u64) {
-            return Err(format!("{replicates} seeds from {} on run over", self.first_seed));
-        }
+        check_seeds(self.first_seed, replicates)?;
         self.until.iter().try_for_each(Until::check)?;
         self.variants.iter().try_for_each(|variant| variant.check(&self.parameters))?;
         self.baseline.iter().try_for_each(|baseline| baseline.check(variants))
@@ -229,6 +223,17 @@ impl Plan {
             .flat_map(move |replicate| (0..variants).map(move |v| self.cell(v, replicate)));
         let cells = cells.filter(|c| c.replicate < self.runs_of(c.variant));
         cells.filter(move |c| (u64::from(c.variant) + u64::from(c.replicate)) % count == index)
+    }
+}
+
+/// Checks that runs with seeds from `first` on have seeds that scenarios can have, up to 2^63 - 1.
+///
+/// # Errors
+/// What is wrong, in words.
+pub fn check_seeds(first: u64, runs: u64) -> Result<(), String> {
+    match first.checked_add(runs.saturating_sub(1)).is_some_and(|last| last <= i64::MAX as u64) {
+        true => Ok(()),
+        false => Err(format!("{runs} seeds from {first} on run over")),
     }
 }
 
