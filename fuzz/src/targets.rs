@@ -12,7 +12,7 @@ use sidestep::kernel::checkpoint;
 use sidestep::learn::{effector, sensor};
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
-use sidestep_record::sweep::read_journal;
+use sidestep_record::sweep::{Origin, read_journal};
 use sidestep_record::{McapRun, RunView, read_table};
 use sidestep_server::protocol::Edit;
 use std::sync::LazyLock;
@@ -46,7 +46,10 @@ pub(crate) const TARGETS: &[Target] = &[
     ("mrclam", |data| drop(mrclam::read(mrclam_folder(data)))),
     ("learn_csv", |data| text(data, learned)),
     ("checkpoint", |data| drop(checkpoint::decode_header(data))),
-    ("journal", |data| drop(read_journal(&file("f.jsonl", data), "0", |_: serde_json::Value| {}))),
+    ("journal", |data| {
+        let of = Origin { program_version: "0", fingerprint: "" };
+        drop(read_journal(&file("f.jsonl", data), of, |_: serde_json::Value| {}));
+    }),
     ("manifest", |data| drop(RunView::open(run_folder(data)))),
     ("mcap", |data| drop(McapRun::open(&file("f.mcap", data)))),
     ("request", |data| text(data, |t| drop(sidestep_server::decode(t)))),

@@ -25,6 +25,8 @@ class SweepStatus:
     failed: int
     #: The first of them: dicts of ``cell``, ``variant``, ``seed`` and ``why``.
     failures: list[dict[str, Any]]
+    #: Whether somebody works on it: by the locks of its journals, or by how long ago the last runs came in.
+    is_worked_on: bool
     #: The shares that somebody has begun: dicts of ``share``, ``runs``, ``of``, ``is_done`` and ``idle_s``.
     shares: list[dict[str, Any]]
     #: Finished runs per second of late; None before the second run, and once the sweep is complete.

@@ -1,11 +1,13 @@
 //! The command line: options of every command, and examples.
 
 use crate::commands::{Command, GROUPS};
-use crate::console::prose_columns;
+use crate::console::{Console, prose_columns, written};
+use crate::exit::ExitCode;
 use clap::builder::Styles;
 use clap::{CommandFactory, FromArgMatches, Parser};
 use std::ffi::OsString;
 use std::fmt::Write;
+use std::io::Write as _;
 
 /// Display order of global options: after those of each command.
 const LAST: usize = 900;
@@ -38,9 +40,22 @@ Exit codes: 0 done, 1 the command failed or the answer is no, \
 impl Cli {
     /// Returns the arguments of this process; ends it when they are wrong, or ask for help.
     pub(crate) fn of_process() -> Self {
-        let matches = command().get_matches_from(without_help_of_help(std::env::args_os()));
-        Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+        let words = without_help_of_help(std::env::args_os());
+        let matches = command().try_get_matches_from(words).unwrap_or_else(|error| end(&error));
+        Self::from_arg_matches(&matches).unwrap_or_else(|error| end(&error))
     }
+}
+
+/// Ends the process with help or with what is wrong about its arguments.
+fn end(told: &clap::Error) -> ! {
+    let code = match written(told.print().and_then(|()| std::io::stdout().flush())) {
+        Err(failure) if !told.use_stderr() => {
+            Console::new(false, false).error(&failure);
+            ExitCode::from(&failure) as i32
+        }
+        _ => told.exit_code(),
+    };
+    std::process::exit(code)
 }
 
 /// Returns the arguments with `help --help` as `help`: the command `help` has no options of its own.

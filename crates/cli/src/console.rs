@@ -1,9 +1,10 @@
 //! Output of the command: results on standard output, everything else on standard error.
 
+use crate::exit::Failure;
 use serde::Serialize;
 use sidestep_document::Table;
 use std::fmt::Display;
-use std::io::{IsTerminal, Write};
+use std::io::{self, IsTerminal, Write};
 use std::ops::Range;
 
 pub(crate) use sidestep::kernel::words::{LINE_COLS, aligned, fixed, grouped, wrapped};
@@ -31,23 +32,32 @@ impl Console {
     }
 
     /// Prints a command's result: one JSON object, or the result of `text`.
-    pub(crate) fn result(self, json: &impl Serialize, text: impl FnOnce() -> String) {
-        if self.json {
-            let object = serde_json::to_string_pretty(json).expect("results are plain data");
-            write_out(&format!("{object}\n"));
-        } else {
-            write_out(&text());
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub(crate) fn result(
+        self,
+        json: &impl Serialize,
+        text: impl FnOnce() -> String,
+    ) -> Result<(), Failure> {
+        if !self.json {
+            return write_out(&text());
         }
+        let object = serde_json::to_string_pretty(json).expect("results are plain data");
+        write_out(&format!("{object}\n"))
     }
 
     /// Prints a result like [`Console::result`], with a shorter text if the console is quiet.
+    ///
+    /// # Errors
+    /// When it cannot be written.
     pub(crate) fn result_or_short(
         self,
         json: &impl Serialize,
         short: impl FnOnce() -> String,
         text: impl FnOnce() -> String,
-    ) {
-        self.result(json, || if self.quiet { short() } else { text() });
+    ) -> Result<(), Failure> {
+        self.result(json, || if self.quiet { short() } else { text() })
     }
 
     /// Prints a remark for people to standard error.
@@ -82,10 +92,26 @@ pub(crate) fn prose_columns() -> u16 {
     columns().min(MOST_COLS)
 }
 
-/// Writes to standard output. A reader that has closed the pipe (`| head`) is not an error.
-fn write_out(text: &str) {
+/// Writes to standard output.
+fn write_out(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
-    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    written(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
+}
+
+/// Returns whether standard output took what was written to it. A reader that has closed the pipe (`| head`) is not an
+/// error.
+///
+/// # Errors
+/// When it did not.
+pub(crate) fn written(result: io::Result<()>) -> Result<(), Failure> {
+    match result {
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
+            let remedy =
+                "send it somewhere that takes it; files that the command has written are whole";
+            Err(Failure::stopped(format!("cannot write to standard output: {e}"), remedy))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Returns a table as text in columns, numbers aligned to the right: in several blocks, each with the

@@ -122,10 +122,11 @@ pub(crate) fn find() -> Result<PathBuf, InputError> {
 /// When it is not there, cannot do it, or ends before it is done.
 pub(crate) fn run(job: &Job, mut take: impl FnMut(Told)) -> Result<(), Failure> {
     interrupt::listen()?;
+    let job = line(job)?;
     let mut child = start()?;
     let told = listen(&mut child);
     let mut stdin = child.stdin.take();
-    say(stdin.as_mut(), job);
+    say(stdin.as_mut(), &job);
     let mut failed = None;
     loop {
         match told.recv_timeout(LOOK) {
@@ -157,10 +158,21 @@ fn cannot_start(error: &std::io::Error) -> Failure {
     Failure::stopped(format!("cannot start {PROGRAM}: {error}"), remedy)
 }
 
+/// Returns the job as a line of text.
+///
+/// # Errors
+/// When a path in it is no text: the program could not find it.
+fn line(job: &Job) -> Result<String, InputError> {
+    let text = serde_json::to_string(job).map_err(|e| {
+        let remedy =
+            "name scenario, folder and certificates in UTF-8: the job is handed over as text";
+        InputError::new("the job of a fleet", e.to_string(), remedy)
+    })?;
+    Ok(text + "\n")
+}
+
 /// Hands over the job. A program that has ended at once says why by itself.
-fn say(stdin: Option<&mut ChildStdin>, job: &Job) {
-    let mut line = serde_json::to_string(job).expect("jobs are plain data");
-    line.push('\n');
+fn say(stdin: Option<&mut ChildStdin>, line: &str) {
     if let Some(stdin) = stdin {
         let _ = stdin.write_all(line.as_bytes()).and_then(|()| stdin.flush());
     }

@@ -3,6 +3,7 @@
 use crate::cells;
 use crate::study::{Progress, all_of, setting};
 use serde::Serialize;
+use sidestep::experiment::sweep::plan::check_seeds;
 use sidestep::experiment::sweep::seeds::remedy;
 use sidestep::kernel::{Digest, InputError, Interrupt, Simulation};
 use sidestep::scenario::{Seeds, Source};
@@ -72,6 +73,10 @@ pub fn compare_heeding(
     workers: usize,
     (progress, interrupt): (&mut Progress<'_>, &Interrupt),
 ) -> Result<Vec<MethodResult>, InputError> {
+    check_seeds(seed, runs as u64).map_err(|cause| {
+        let remedy = "begin with a smaller seed, or run less often";
+        InputError::new(source.file_place(), cause, remedy)
+    })?;
     let mut results = Vec::new();
     for method in methods {
         let source =
@@ -210,7 +215,7 @@ fn shielded(results: &[MethodResult]) -> Option<String> {
     (!names.is_empty()).then(|| {
         format!(
             "The shield changed commands of {}: there it is the shield that keeps airplanes apart, in part \
-             or in whole. Fly the methods bare with --set shield=off.",
+             or in whole. Fly the methods bare with --set airspace.shield=off.",
             names.join(", ")
         )
     })

@@ -79,7 +79,7 @@ impl RunFolder {
             .map_err(|e| disk::cannot_make(path, format!("{}: {}", e.place, e.cause)))?;
         // Nobody may be writing the run that is about to be deleted.
         let old_lock = if is_run(path) { Some(lock(path)?) } else { None };
-        staging.take_place_of(path)?;
+        staging.take_place()?;
         drop(old_lock);
         let lock = lock(path)?;
         let scenario = scenario.clone();

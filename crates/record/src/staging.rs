@@ -12,6 +12,8 @@ use crate::disk::cannot_make;
 /// A folder with a temporary name. If it is dropped, it and the parents created for it are deleted.
 pub(crate) struct Staging {
     path: PathBuf,
+    /// The place that it takes: of a link, the folder that it leads to.
+    target: PathBuf,
     /// Parents created for the folder, the outermost first.
     made: Vec<PathBuf>,
 }
@@ -19,15 +21,16 @@ pub(crate) struct Staging {
 impl Staging {
     /// Creates an empty folder in the parent of `target`, and that parent if it is missing.
     pub(crate) fn new(target: &Path) -> Result<Self, InputError> {
-        let path = beside(target, "new")?;
-        let mut made: Vec<_> = disk::parent(target)
+        let target = followed(target)?;
+        let path = beside(&target, "new")?;
+        let mut made: Vec<_> = disk::parent(&target)
             .ancestors()
             .take_while(|p| !p.as_os_str().is_empty() && !p.exists())
             .map(Path::to_path_buf)
             .collect();
         made.reverse();
-        let staging = Self { path, made };
-        staging.make().map_err(|e| cannot_make(target, e))?;
+        let staging = Self { path, target, made };
+        staging.make().map_err(|e| cannot_make(&staging.target, e))?;
         Ok(staging)
     }
 
@@ -42,8 +45,9 @@ impl Staging {
         &self.path
     }
 
-    /// Moves the folder to `target`, replacing what is there.
-    pub(crate) fn take_place_of(mut self, target: &Path) -> Result<(), InputError> {
+    /// Moves the folder to its place, replacing what is there.
+    pub(crate) fn take_place(mut self) -> Result<(), InputError> {
+        let target = &self.target;
         let failed = |e| cannot_make(target, e);
         let old = beside(target, "old")?;
         remove_if_there(&old).map_err(failed)?;
@@ -70,6 +74,16 @@ impl Drop for Staging {
             let _ = fs::remove_dir(parent);
         }
     }
+}
+
+/// Returns the folder that a link leads to; a path that is no link stays. A rename would replace the link itself, and
+/// write to another disk than the one that the user has chosen.
+fn followed(target: &Path) -> Result<PathBuf, InputError> {
+    if !target.is_symlink() {
+        return Ok(target.to_path_buf());
+    }
+    let to_nowhere = |e| cannot_make(target, format!("a link to what is not there ({e})"));
+    target.canonicalize().map_err(to_nowhere)
 }
 
 /// Returns a hidden name in the same folder that no other process uses.

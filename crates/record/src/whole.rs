@@ -311,9 +311,7 @@ pub fn read_blocks<R: DeserializeOwned + Clone>(
     path: &Path,
     mut each: impl FnMut(WholeTable<R>),
 ) -> Result<(), InputError> {
-    let bytes = File::open(path).map_err(|e| {
-        InputError::new(path.display(), e.to_string(), "name a table that a sweep wrote")
-    })?;
+    let bytes = File::open(path).map_err(|e| cannot_open(path, &e))?;
     let failed = |e| damaged(path, cause(e));
     let copy = bytes.try_clone().map_err(|e| failed(e.into()))?;
     let file = SerializedFileReader::new(copy).map_err(failed)?;
@@ -345,6 +343,25 @@ pub fn read_blocks<R: DeserializeOwned + Clone>(
         pass_on(values);
     }
     Ok(())
+}
+
+/// Returns the values of key-value pairs of the table in the file at `path`, as far as it has them.
+///
+/// # Errors
+/// A file that is missing, or no Parquet file.
+pub(crate) fn pairs<const N: usize>(
+    path: &Path,
+    keys: [&str; N],
+) -> Result<[Option<String>; N], InputError> {
+    let bytes = File::open(path).map_err(|e| cannot_open(path, &e))?;
+    let file = SerializedFileReader::new(bytes).map_err(|e| damaged(path, cause(e)))?;
+    let pairs = file.metadata().file_metadata().key_value_metadata();
+    let value = |key: &str| pairs?.iter().find(|pair| pair.key == key)?.value.clone();
+    Ok(keys.map(value))
+}
+
+fn cannot_open(path: &Path, e: &io::Error) -> InputError {
+    InputError::new(path.display(), e.to_string(), "name a table that a sweep wrote")
 }
 
 /// Returns columns without rows, of the file's types.

@@ -2,6 +2,7 @@
 
 use super::checked::told_by_a_value;
 use serde::de::DeserializeOwned;
+use std::collections::BTreeSet;
 
 /// Returns cause and remedy of an error of the TOML reader; `top` are the keys of the top level, some
 /// of which it did not see, and `otherwise` is the remedy of errors for which there is no better one.
@@ -78,13 +79,21 @@ pub fn nearest(found: &str, known: &[&str]) -> String {
         Some(best) if strsim::osa_distance(found, best) <= 1 + found.len() / 3 => {
             format!("did you mean `{best}`?")
         }
-        Some(_) => format!("known are: {}", known.join(", ")),
+        // A list may be made of several, which have keys in common.
+        Some(_) => format!("known are: {}", each_once(known).join(", ")),
         None => "nothing is known here".into(),
     }
 }
 
+/// Returns the words without those that were there before.
+fn each_once<'a>(words: &[&'a str]) -> Vec<&'a str> {
+    let mut seen = BTreeSet::new();
+    words.iter().copied().filter(|word| seen.insert(*word)).collect()
+}
+
 #[cfg(test)]
 mod tests {
+    use super::explain;
     use crate::Source;
     use serde::Deserialize;
 
@@ -104,5 +113,19 @@ mod tests {
             (error.cause(), error.remedy()),
             ("unknown key `cylces`", "did you mean `cycles`?")
         );
+    }
+
+    #[test]
+    fn known_keys_are_listed_once_though_the_top_level_has_them_too() {
+        #[derive(Debug, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        #[expect(dead_code, reason = "only the error is of interest")]
+        struct Small {
+            cycles: u32,
+            seed: u32,
+        }
+        let error = toml::from_str::<Small>("wheelbarrow = 1").expect_err("unknown");
+        let (_, remedy) = explain(&error, &["format", "seed", "cycles"], String::new());
+        assert_eq!(remedy, "known are: cycles, seed, format");
     }
 }

@@ -3,7 +3,24 @@
 use crate::Error;
 use std::fs::File;
 use std::io::{BufWriter, Result, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// Returns a path for programs and people to read. One that is no text is told with marks in place of what is none: JSON
+/// has no other words for it, and a result must not be lost for its name.
+pub fn shown(path: impl AsRef<Path>) -> String {
+    path.as_ref().display().to_string()
+}
+
+/// Returns where a path leads, links resolved as far as it is there: two ways to one place are equal.
+pub(crate) fn whereabouts_of(path: &Path) -> PathBuf {
+    let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let real = |above: &Path| {
+        let rest = whole.strip_prefix(above).ok()?;
+        // Part by part: joined to nothing, a path would end in `/`.
+        Some(above.canonicalize().ok()?.components().chain(rest.components()).collect())
+    };
+    whole.ancestors().find_map(real).unwrap_or_else(|| whole.clone())
+}
 
 /// Replaces the file at `path` by the output of `write`: an earlier file stays until the new one is
 /// complete.
@@ -50,6 +67,14 @@ mod tests {
         assert!(fails.is_err());
         assert_eq!(std::fs::read(&path).expect("read"), b"old");
         assert_eq!(std::fs::read_dir(folder.path()).expect("read").count(), 1);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_path_that_is_no_text_is_shown() {
+        use std::os::unix::ffi::OsStrExt;
+        let path = std::ffi::OsStr::from_bytes(b"ou\xfft");
+        assert_eq!(shown(path), "ou\u{fffd}t");
     }
 
     #[test]

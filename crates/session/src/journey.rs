@@ -1,6 +1,7 @@
 //! One run, from its present cycle to its end, with everything that it records.
 
 use crate::driver::{Effort, Sinks, drive};
+use crate::files::whereabouts_of;
 use crate::film::{Ending, Film, FrameRows, McapFilm};
 use crate::identity::Maker;
 use crate::live::{Steered, ViewersAt};
@@ -12,7 +13,7 @@ use crate::{Error, Watcher, picture};
 use sidestep::VERSION;
 use sidestep::kernel::ports::{RecordError, Recorder, TableSchema, Values};
 use sidestep::kernel::{Cycle, InputError, Simulation};
-use sidestep::scenario::{Compiled, Foreign, Source, Worlds};
+use sidestep::scenario::{Compiled, Foreign, Resolved, Source, Worlds};
 use sidestep_record::{Existing, McapRecorder, RunFolder};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -61,9 +62,48 @@ impl Keep<'_> {
     /// Refuses places that may not be used, before anything is created.
     ///
     /// # Errors
-    /// When the MCAP file exists already and may not be replaced.
+    /// When the MCAP file exists already and may not be replaced, or stands where the folder is to be.
     fn check(&self) -> Result<(), InputError> {
-        self.mcap.map_or(Ok(()), |(file, _)| McapRecorder::check_vacant(file, self.existing()))
+        let Some((file, _)) = self.mcap else { return Ok(()) };
+        if let Some(folder) = self.folder
+            && whereabouts_of(folder).starts_with(whereabouts_of(file))
+        {
+            let cause = "the run folder is to be there";
+            let remedy = "name a file beside the folder, or in it";
+            return Err(InputError::new(file.display(), cause, remedy));
+        }
+        McapRecorder::check_vacant(file, self.existing())
+    }
+
+    /// Makes the places. The file comes first: one that cannot be made must leave no folder of a run that never was.
+    ///
+    /// # Errors
+    /// When one cannot be made; then none is left, but for a folder that the file was to be in.
+    fn begin(
+        &self,
+        resolved: &Resolved,
+        run: &mut dyn Simulation,
+    ) -> Result<(Option<Recording>, Option<McapFilm>), Error> {
+        let film = |run: &mut dyn Simulation| -> Result<_, Error> {
+            let begin = |(file, every)| McapFilm::begin(file, every, resolved.clone(), run);
+            self.mcap.map(begin).transpose()
+        };
+        let recording = |run: &mut dyn Simulation| -> Result<_, Error> {
+            let create = |folder| Recording::create(folder, resolved, run, self.existing());
+            self.folder.map(create).transpose()
+        };
+        if self.is_film_in_folder() {
+            return Ok((recording(run)?, film(run)?));
+        }
+        let film = film(run)?;
+        Ok((recording(run)?, film))
+    }
+
+    /// Whether the MCAP file is to be in the folder.
+    fn is_film_in_folder(&self) -> bool {
+        self.mcap.zip(self.folder).is_some_and(|((file, _), folder)| {
+            whereabouts_of(file).starts_with(whereabouts_of(folder))
+        })
     }
 }
 
@@ -86,20 +126,14 @@ impl Journey {
             return Ok(Self::new(run, None, None, workers).told(told));
         }
         let resolved = compiled.resolve(source)?;
-        let (mut run, recording) = match keep.folder {
-            None => (compiled.start(source, workers), None),
+        let mut run = match keep.folder {
+            None => compiled.start(source, workers),
             Some(folder) => {
                 let itself = Source::new("scenario.toml", &*resolved.text, folder);
-                let mut run = compiled.start(&itself, workers);
-                let recording =
-                    Recording::create(folder, &resolved, run.as_mut(), keep.existing())?;
-                (run, Some(recording))
+                compiled.start(&itself, workers)
             }
         };
-        let film = match keep.mcap {
-            None => None,
-            Some((file, every)) => Some(McapFilm::begin(file, every, resolved, run.as_mut())?),
-        };
+        let (recording, film) = keep.begin(&resolved, run.as_mut())?;
         Ok(Self::new(run, recording, film, workers).told(told))
     }
 

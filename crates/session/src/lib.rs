@@ -51,7 +51,7 @@ pub use attend::attended;
 pub use beat::Beat;
 pub use driver::{Effort, Sinks, drive};
 pub use error::Error;
-pub use files::replace;
+pub use files::{replace, shown};
 pub use film::{Ending, Film, McapFilm, frame_rows};
 pub use identity::{adds_code, build};
 pub use journey::{Journey, Keep, RestoreError};

@@ -122,10 +122,22 @@ impl Recorded {
             format!("use sidestep {wrote}, or run its scenario again")
         })?;
         let mut run = compiled.start(&self.source, workers);
+        self.check_end(run.plan().cycles)?;
         if let Some(folder) = &self.folder {
             follow_recorded(run.as_mut(), folder)?;
         }
         Ok(run)
+    }
+
+    /// Refuses a recording that says to have more cycles than its scenario: it would be computed for as long.
+    fn check_end(&self, planned: Cycle) -> Result<(), InputError> {
+        let done = self.cycles_done;
+        if done <= planned {
+            return Ok(());
+        }
+        let cause = format!("{done} cycles are recorded, and its scenario has {planned}");
+        let remedy = "the recording was changed: restore it, or run its scenario again";
+        Err(InputError::new(self.path.display(), cause, remedy))
     }
 
     /// Returns the build that made the recording, if it is another one: then it is not computed again.
@@ -144,6 +156,7 @@ impl Recorded {
             return self.start(workers);
         }
         let start = self.worlds.compile(&self.source)?.start(&self.source, 1);
+        self.check_end(start.plan().cycles)?;
         let played = match &self.folder {
             Some(folder) => Played::of_tables(start, folder, self.cycles_done),
             None => Played::of_messages(start, &self.path, self.cycles_done),

@@ -1,7 +1,8 @@
 //! The summary of a run: the content of `summary.json`, and text for people.
 
 use crate::driver::Effort;
-use serde::Serialize;
+use crate::files::shown;
+use serde::{Serialize, Serializer};
 use serde_json::Value;
 use sidestep::VERSION;
 use sidestep::kernel::Cycle;
@@ -65,9 +66,10 @@ pub struct Summary {
     /// Metrics of the world.
     pub metrics: Value,
     /// The run folder, if there is one.
+    #[serde(serialize_with = "as_shown")]
     pub folder: Option<PathBuf>,
     /// The recording for viewers, if there is one.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(serialize_with = "as_shown", skip_serializing_if = "Option::is_none")]
     pub mcap: Option<PathBuf>,
     /// Report about a file of another program that the scenario was made from.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -78,6 +80,11 @@ pub struct Summary {
     /// The world's own results as text.
     #[serde(skip)]
     pub outcome: Lines,
+}
+
+/// Writes a path as [`shown`]: serde's own way fails at a name that is no text, at the end of a run.
+fn as_shown<S: Serializer>(path: &Option<PathBuf>, to: S) -> Result<S::Ok, S::Error> {
+    path.as_ref().map(shown).serialize(to)
 }
 
 /// Seconds spent in each phase, by the clock of worker 0.

@@ -40,7 +40,7 @@ pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Fail
         // The report says what was found in the file, and the error why it cannot be run.
         let mut json = json;
         json["no_scenario"] = error.to_string().into();
-        console.result(&json, || aligned(&lines));
+        console.result(&json, || aligned(&lines))?;
         return Err(error.into());
     }
     let (source, compiled) = match args.scenario.compile() {
@@ -58,7 +58,7 @@ pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Fail
     let remarks = compiled.remarks();
     found.json["remarks"] = serde_json::to_value(&remarks).expect("remarks are plain data");
     let heading = format!("{} is a valid scenario\n", args.scenario.file.display());
-    console.result(&found.json, || heading + &found.text + &in_words(&remarks));
+    console.result(&found.json, || heading + &found.text + &in_words(&remarks))?;
     Ok(ExitCode::Done)
 }
 

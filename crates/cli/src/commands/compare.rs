@@ -75,7 +75,7 @@ pub(crate) fn compare(args: &CompareArgs, console: Console) -> Result<ExitCode, 
     stages.clear();
     let results = results?;
     let json = json!({ "name": compiled.name, "seed": compiled.seed, "methods": results });
-    console.result(&json, || text(&table(&compiled.name, &results)));
+    console.result(&json, || text(&table(&compiled.name, &results)))?;
     Ok(ExitCode::Done)
 }
 

@@ -31,12 +31,12 @@ struct Printed {
 /// Runs the command.
 ///
 /// # Errors
-/// Never; all commands have one face.
+/// When they cannot be written.
 pub(crate) fn completions(args: &CompletionsArgs, console: Console) -> Result<ExitCode, Failure> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut args::command(), "sidestep", &mut script);
     let script = String::from_utf8(script).expect("scripts are text");
     let printed = Printed { shell: args.shell.to_string(), script };
-    console.result(&printed, || printed.script.clone());
+    console.result(&printed, || printed.script.clone())?;
     Ok(ExitCode::Done)
 }

@@ -24,7 +24,7 @@ Examples:
 The scenario has one robot; doors stay closed, and nobody else moves. The policy replaces the \
 robot's behavior: `uniform` takes each standard action with the same probability, `forward` goes \
 ahead, `bounce` goes ahead and turns after a contact. A simulator that disagrees ends with exit \
-code 1.";
+code 1, and so do runs that are too few to tell.";
 
 /// Compute the exact Markov chain of a scenario with one robot.
 #[derive(Debug, Args)]
@@ -116,10 +116,11 @@ pub(crate) fn exact(args: &ExactArgs, console: Console) -> Result<ExitCode, Fail
         summary.comparison = Some(compare(compiled, &source, &chosen, cycles, runs)?);
     }
     summary.pomdp = export(&model, &args.export)?;
-    console.result(&summary, || text(&summary, named(compiled, &source)));
+    console.result(&summary, || text(&summary, named(compiled, &source)))?;
     Ok(match summary.comparison {
-        Some(Comparison { agrees: false, .. }) => ExitCode::Failed,
-        _ => ExitCode::Done,
+        None | Some(Comparison { agrees: Some(true), .. }) => ExitCode::Done,
+        // Runs that are too few confirm nothing, and whoever asked for them wants to know.
+        Some(_) => ExitCode::Failed,
     })
 }
 
@@ -176,7 +177,13 @@ fn pomdp_words(size: PomdpSize) -> String {
 }
 
 fn comparison_words(c: &Comparison) -> String {
-    let verdict = if c.agrees { "agrees" } else { "DISAGREES" };
+    let verdict = match c.agrees {
+        Some(true) => "agrees".to_string(),
+        Some(false) => "DISAGREES".to_string(),
+        None => {
+            format!("too few runs to tell, --runs {} or more would do", c.runs_to_tell)
+        }
+    };
     format!(
         "{verdict}: total variation {:.4}, limit {:.4}, over {} runs of {} cycles",
         c.total_variation,

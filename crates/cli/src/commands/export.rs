@@ -9,8 +9,8 @@ use crate::worlds;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use sidestep::kernel::{Cycle, InputError};
-use sidestep_session::Recorded;
 use sidestep_session::export::{self, Export, Film, Written};
+use sidestep_session::{Recorded, shown};
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -140,7 +140,7 @@ pub(crate) fn export(args: &ExportArgs, console: Console) -> Result<ExitCode, Fa
     match export::export(&recorded, &wanted(args), &Watch::new(console)) {
         Err(Failure::Interrupted) => Ok(ExitCode::Interrupted),
         written => {
-            report(args.to, &written?, console);
+            report(args.to, &written?, console)?;
             Ok(ExitCode::Done)
         }
     }
@@ -189,9 +189,10 @@ fn check_options(args: &ExportArgs) -> Result<(), InputError> {
 }
 
 /// Prints which files were written.
-fn report(form: Form, written: &Written, console: Console) {
+fn report(form: Form, written: &Written, console: Console) -> Result<(), Failure> {
     let Written { paths, is_confirmed, film } = written;
-    let json = json!({ "written": paths, "digest_confirmed": is_confirmed });
+    let shown: Vec<String> = paths.iter().map(shown).collect();
+    let json = json!({ "written": shown, "digest_confirmed": is_confirmed });
     let names = paths.iter().map(|path| format!("{}\n", path.display())).collect::<String>();
     let short = || names.clone();
     console.result_or_short(&json, short, || {
@@ -202,7 +203,7 @@ fn report(form: Form, written: &Written, console: Console) {
         let size = if paths.iter().all(|path| path.is_file()) { size } else { String::new() };
         let film = film.map_or(String::new(), |film| film_words(form, film, &paths[0]));
         format!("{names}{size}{confirmed}{film}")
-    });
+    })
 }
 
 /// Returns how long a film is, or how to join its frames.

@@ -15,7 +15,7 @@ use std::path::Path;
 pub(super) fn travel(journey: Journey, console: Console) -> Result<ExitCode, Failure> {
     let summary = journey.travel(&Watch::new(console))?;
     let short = || format!("{}\n", summary.digest);
-    console.result_or_short(&summary, short, || text(&summary));
+    console.result_or_short(&summary, short, || text(&summary))?;
     Ok(ending(&summary, console))
 }
 

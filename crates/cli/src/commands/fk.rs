@@ -43,7 +43,7 @@ pub(crate) fn fk(args: &FkArgs, console: Console) -> Result<ExitCode, Failure> {
     if let Some(path) = &args.png {
         placed.picture(None, &[]).write(path)?;
     }
-    console.result(&placed, || placed.text());
+    console.result(&placed, || placed.text())?;
     if !placed.outside_limits.is_empty() {
         console.warn(format!("outside limits: {}", placed.outside_limits.join(", ")));
     }

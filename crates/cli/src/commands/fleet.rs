@@ -124,7 +124,7 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
     });
     shown.clear();
     if let Some((summary, outcome, fleet)) = ended {
-        args.tell(&summary, outcome, &fleet, console);
+        args.tell(&summary, outcome, &fleet, console)?;
     }
     match done {
         Ok(()) => Ok(ExitCode::Done),
@@ -162,7 +162,13 @@ impl FleetArgs {
     }
 
     /// Prints the results.
-    fn tell(&self, summary: &Value, outcome: Lines, fleet: &FleetNow, console: Console) {
+    fn tell(
+        &self,
+        summary: &Value,
+        outcome: Lines,
+        fleet: &FleetNow,
+        console: Console,
+    ) -> Result<(), Failure> {
         let text = |key: &str| summary[key].as_str().unwrap_or_default().to_string();
         let short = || format!("{}\n", text("digest"));
         let lines = || {
@@ -175,7 +181,7 @@ impl FleetArgs {
         };
         let mut all = summary.clone();
         all["fleet"] = json!(fleet);
-        console.result_or_short(&all, short, lines);
+        console.result_or_short(&all, short, lines)
     }
 
     fn network_lines(&self, fleet: &FleetNow) -> Lines {

@@ -266,7 +266,7 @@ pub(crate) fn learn(args: &LearnArgs, console: Console) -> Result<ExitCode, Fail
                 profile::with_sensor(place, text, name, &model)
             };
             let assumed = || [assumptions(&model.profile), smoothing(&args.estimate)].concat();
-            tell(&model.report, &args.target.add("sensors", add)?, assumed, console);
+            tell(&model.report, &args.target.add("sensors", add)?, assumed, console)?;
         }
         What::Effector(args) => {
             let model = learn_effector(args, console)?;
@@ -274,7 +274,7 @@ pub(crate) fn learn(args: &LearnArgs, console: Console) -> Result<ExitCode, Fail
                 profile::with_effector(place, text, name, &model)
             };
             let assumed = || smoothing(&args.estimate);
-            tell(&model.report, &args.target.add("effectors", add)?, assumed, console);
+            tell(&model.report, &args.target.add("effectors", add)?, assumed, console)?;
         }
     }
     Ok(ExitCode::Done)
@@ -287,7 +287,7 @@ fn tell(
     written: &str,
     assumed: impl FnOnce() -> String,
     console: Console,
-) {
+) -> Result<(), Failure> {
     console.result_or_short(
         report,
         || written.to_owned(),
@@ -295,7 +295,7 @@ fn tell(
             "" => report.to_string(),
             _ => format!("{report}\n{written}{}", assumed()),
         },
-    );
+    )
 }
 
 /// Returns what the log does not tell about a sensor, and the profile must say.

@@ -98,7 +98,7 @@ pub(crate) fn map(args: &MapArgs, console: Console) -> Result<ExitCode, Failure>
         draw_boxes(&map, &args.file, png)?;
     }
     let width = args.width.unwrap_or_else(columns);
-    console.result(&counts, || map.to_text_with_rulers(width.into()) + &words(&counts));
+    console.result(&counts, || map.to_text_with_rulers(width.into()) + &words(&counts))?;
     Ok(ExitCode::Done)
 }
 

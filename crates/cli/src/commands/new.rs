@@ -8,6 +8,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::json;
 use sidestep::kernel::InputError;
 use sidestep::scenario::Kind;
+use sidestep_session::shown;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -46,8 +47,8 @@ pub(crate) fn new(args: &NewArgs, console: Console) -> Result<ExitCode, Failure>
     let path = args.file.clone().unwrap_or_else(default);
     write_new(&path, kind.default_scenario())?;
     let next = format!("Try:\n  sidestep check {0}\n  sidestep run {0}\n", path.display());
-    let json = json!({ "file": path, "world": args.world });
-    console.result(&json, || format!("Wrote {}\n{next}", path.display()));
+    let json = json!({ "file": shown(&path), "world": args.world });
+    console.result(&json, || format!("Wrote {}\n{next}", path.display()))?;
     Ok(ExitCode::Done)
 }
 

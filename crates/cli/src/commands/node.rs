@@ -95,6 +95,6 @@ pub(crate) fn node(args: &NodeArgs, console: Console) -> Result<ExitCode, Failur
             json!({ "chain": chain, "connector": connector })
         }
     };
-    console.result_or_short(&result, String::new, words);
+    console.result_or_short(&result, String::new, words)?;
     Ok(ExitCode::Done)
 }

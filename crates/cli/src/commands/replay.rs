@@ -69,13 +69,13 @@ pub(crate) fn replay(args: &ReplayArgs, console: Console) -> Result<ExitCode, Fa
         replayed.draw(&recorded, png)?;
     }
     match args.cycle {
-        Some(_) => show_moment(&replayed, args.all, console),
-        None => show_end(&replayed, recorded.is_complete, console),
+        Some(_) => show_moment(&replayed, args.all, console)?,
+        None => show_end(&replayed, recorded.is_complete, console)?,
     }
     Ok(ExitCode::Done)
 }
 
-fn show_end(replayed: &Replayed, is_complete: bool, console: Console) {
+fn show_end(replayed: &Replayed, is_complete: bool, console: Console) -> Result<(), Failure> {
     let Replayed { run, effort, .. } = replayed;
     let digest = run.digest().to_string();
     let json = json!({
@@ -89,7 +89,7 @@ fn show_end(replayed: &Replayed, is_complete: bool, console: Console) {
     console.result_or_short(&json, short, || {
         let cycles = grouped(run.cycle());
         format!("Confirmed: {cycles} cycles come to the recorded digest\n  digest {digest}\n")
-    });
+    })
 }
 
 /// Lines of a state that are printed unless all are asked for: a heading, and some bodies.
@@ -109,7 +109,7 @@ fn beginning(text: &str) -> String {
     }
 }
 
-fn show_moment(replayed: &Replayed, shows_all: bool, console: Console) {
+fn show_moment(replayed: &Replayed, shows_all: bool, console: Console) -> Result<(), Failure> {
     let Replayed { run, compared_poses, .. } = replayed;
     let poses = run.poses();
     let digest = run.digest().to_string();
@@ -127,7 +127,7 @@ fn show_moment(replayed: &Replayed, shows_all: bool, console: Console) {
         };
         let state = if shows_all { poses.text } else { beginning(&poses.text) };
         format!("Cycle {}: {compared}\n{state}  digest {digest}\n", grouped(run.cycle()))
-    });
+    })
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use sidestep::kernel::InputError;
 use sidestep_document::Document;
 use sidestep_report::{Print, SvgFile};
 use sidestep_session::report::document;
-use sidestep_session::{replace, write_png};
+use sidestep_session::{replace, shown, write_png};
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -81,8 +81,9 @@ pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Fa
     let pages = pages(args)?;
     args.print.figures()?;
     let document = document(worlds(), &args.folder, &Watch::new(console))?;
-    pages.store(&document, Raster::None)?;
     let figures = args.print.figures()?;
+    figures.iter().try_for_each(|print| check_labels(print, &document))?;
+    pages.store(&document, Raster::None)?;
     let figures = figures.map(|print| args.print.store(&print, &document, &pages)).transpose()?;
     let (html, markdown) = (pages.html.display(), pages.markdown());
     let shown = figures.as_ref().map(|folder| folder.display().to_string());
@@ -92,7 +93,7 @@ pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Fa
         "figures": shown,
     });
     let more = shown.map_or(String::new(), |folder| format!("{folder}\n"));
-    console.result(&json, || format!("{html}\n{}\n{more}", markdown.display()));
+    console.result(&json, || format!("{html}\n{}\n{more}", markdown.display()))?;
     Ok(ExitCode::Done)
 }
 
@@ -121,13 +122,8 @@ impl PrintArgs {
     /// Writes the figures beside the page, and returns their folder.
     ///
     /// # Errors
-    /// When a label is in no figure, or something cannot be drawn or written.
+    /// When something cannot be drawn or written.
     fn store(&self, print: &Print, document: &Document, pages: &Pages) -> Result<PathBuf, Failure> {
-        if let Some(label) = print.unused(document).first() {
-            let cause = format!("no figure has the words `{label}`");
-            let remedy = "write them as the figure's axis or legend does";
-            return Err(InputError::new("--label", cause, remedy).into());
-        }
         let folder = pages.html.with_file_name(format!("{}-print", pages.stem()));
         std::fs::create_dir_all(&folder).map_err(|e| Failure::write(&folder, &e))?;
         for SvgFile { stem, svg } in print.figures(document)? {
@@ -143,11 +139,24 @@ impl PrintArgs {
     }
 }
 
+/// Checks that each label stands in some figure, before anything is written.
+///
+/// # Errors
+/// When one is in none; the error names the first.
+fn check_labels(print: &Print, document: &Document) -> Result<(), InputError> {
+    let Some(label) = print.unused(document).first().copied() else { return Ok(()) };
+    let cause = format!("no figure has the words `{label}`");
+    Err(InputError::new("--label", cause, "write them as the figure's axis or legend does"))
+}
+
 /// Reads width and height in mm.
 fn size_mm(text: &str) -> Result<[f64; 2], InputError> {
-    let sides: Vec<f64> = text.split('x').filter_map(|side| side.trim().parse().ok()).collect();
+    let side = |side: &str| side.trim().parse::<f64>().ok();
+    let sides: Vec<Option<f64>> = text.split('x').map(side).collect();
     match sides[..] {
-        [width, height] if [width, height].iter().all(|mm| (30.0..=500.0).contains(mm)) => {
+        [Some(width), Some(height)]
+            if [width, height].iter().all(|mm| (30.0..=500.0).contains(mm)) =>
+        {
             Ok([width, height])
         }
         _ => {
@@ -174,7 +183,7 @@ fn renamed(text: &str) -> Result<(String, String), InputError> {
 fn pages(args: &ReportArgs) -> Result<Pages, InputError> {
     let html = args.out.clone().unwrap_or_else(|| args.folder.join("report.html"));
     let ending = html.extension().and_then(|e| e.to_str());
-    let stem = html.file_stem().and_then(|stem| stem.to_str());
+    let stem = html.file_stem().map(shown);
     let (Some("html" | "htm"), Some(stem)) = (ending, stem) else {
         let cause = "the page is HTML, and Markdown is written beside it";
         return Err(InputError::new(html.display(), cause, "give a name that ends in .html"));

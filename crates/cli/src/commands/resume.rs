@@ -69,7 +69,7 @@ fn nothing_left(view: &RunView, console: Console) -> Result<ExitCode, Failure> {
          its page."
     ));
     let digest = view.manifest.digest.as_deref().unwrap_or_default();
-    console.result(&stored_summary(&view.path)?, || format!("{digest}\n"));
+    console.result(&stored_summary(&view.path)?, || format!("{digest}\n"))?;
     Ok(ExitCode::Done)
 }
 

@@ -8,6 +8,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::Value;
 use sidestep::kernel::InputError;
 use sidestep::scenario::Kind;
+use sidestep_session::shown;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -63,11 +64,11 @@ pub(crate) fn schema(args: &SchemaArgs, console: Console) -> Result<ExitCode, Fa
     let schema = schema.expect("the parser takes these names alone");
     let text = format!("{schema:#}\n");
     match &args.out {
-        None => console.result(&schema, || text),
+        None => console.result(&schema, || text)?,
         Some(file) => {
             write(file, &text)?;
-            let written = serde_json::json!({ "file": file, "of": args.of });
-            console.result(&written, || told(file, &schema));
+            let written = serde_json::json!({ "file": shown(file), "of": args.of });
+            console.result(&written, || told(file, &schema))?;
         }
     }
     Ok(ExitCode::Done)

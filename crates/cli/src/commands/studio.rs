@@ -93,14 +93,14 @@ pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Fa
     if let Some(at) = &foxglove {
         viewers::tell(at, console);
     }
-    invite(&studio, args.no_open, console);
+    invite(&studio, args.no_open, console)?;
     wait_for_end(&studio)?;
     drop(studio);
     Ok(ExitCode::Done)
 }
 
 /// Tells the address of the studio, who else can reach it, and opens it in a browser where that is safe.
-fn invite(studio: &Studio, no_open: bool, console: Console) {
+fn invite(studio: &Studio, no_open: bool, console: Console) -> Result<(), Failure> {
     let url = studio.url();
     if studio.is_open_to_others() {
         console.warn(
@@ -115,13 +115,14 @@ fn invite(studio: &Studio, no_open: bool, console: Console) {
         &json!({ "url": url }),
         || format!("{url}\n"),
         || format!("The studio is at {url}\nCtrl-C ends it.\n"),
-    );
+    )?;
     // The arguments of a process are there for all users of a machine to read, so no browser is given the token.
     match (no_open, studio.is_open_to_others()) {
         (true, _) => {}
         (false, true) => console.note("Open the address yourself: it has the token in it."),
         (false, false) => open(&url, console),
     }
+    Ok(())
 }
 
 /// Waits until the command is interrupted.

@@ -9,8 +9,9 @@ use crate::watch::Watch;
 use crate::worlds;
 use clap::{Args, Subcommand};
 use serde_json::json;
-use sidestep::experiment::sweep::Shard;
+use sidestep::experiment::sweep::{Plan, Shard};
 use sidestep::kernel::InputError;
+use sidestep_session::shown;
 use sidestep_session::sweep::{self, Folder};
 use std::path::{Path, PathBuf};
 
@@ -160,7 +161,7 @@ fn share(args: &ShareArgs, console: Console) -> Result<ExitCode, Failure> {
     interrupt::listen()?;
     let ended = sweep::share(worlds(), &folder, args.shard, workers, &Watch::new(console))?;
     let told = Told { plan: folder.plan(), folder: Some(&folder), console };
-    Ok(tell_share(told, args.shard, ended))
+    tell_share(told, args.shard, ended)
 }
 
 fn collect(args: &FolderArgs, console: Console) -> Result<ExitCode, Failure> {
@@ -172,7 +173,7 @@ fn collect(args: &FolderArgs, console: Console) -> Result<ExitCode, Failure> {
 
 fn status(args: &FolderArgs, console: Console) -> Result<ExitCode, Failure> {
     let folder = Folder::open(&args.folder)?;
-    tell_status(&folder, &sweep::status(&folder)?, console);
+    tell_status(&folder, &sweep::status(&folder)?, console)?;
     Ok(ExitCode::Done)
 }
 
@@ -183,21 +184,31 @@ fn plan(args: &PlanArgs, console: Console) -> Result<ExitCode, Failure> {
     let folder = sweep::planned(worlds(), &wanted, &args.out, workers, &watch)?;
     let plan = folder.plan();
     let json = json!({
-        "folder": args.out,
+        "folder": shown(&args.out),
         "variants": plan.variants.len(),
         "replicates": plan.replicates,
         "cells": plan.runs(),
         "agents": plan.agents,
     });
-    console.result_or_short(&json, String::new, || {
-        let dir = args.out.display();
-        let lines = [
-            ("variants", grouped(plan.variants.len() as u64)),
-            ("runs", format!("{} of each, {} in all", plan.replicates, grouped(plan.runs()))),
+    console.result_or_short(&json, String::new, || aligned(&planned(plan, &args.out)))?;
+    Ok(ExitCode::Done)
+}
+
+/// Returns what was planned, and the commands that run it. Where a precision ends the sweep it has no shares, because
+/// the rule takes all runs to be seen.
+fn planned(plan: &Plan, out: &Path) -> Vec<(String, String)> {
+    let (dir, all) = (out.display(), grouped(plan.runs()));
+    let most = if plan.until.is_some() { "at most " } else { "" };
+    let mut lines = vec![
+        ("variants", grouped(plan.variants.len() as u64)),
+        ("runs", format!("{most}{} of each, {most}{all} in all", plan.replicates)),
+    ];
+    lines.extend(match plan.until.is_some() {
+        true => vec![("run them", format!("sidestep resume {dir}"))],
+        false => vec![
             ("run them", format!("sidestep sweep run {dir} --shard 0/1")),
             ("join them", format!("sidestep sweep collect {dir}")),
-        ];
-        aligned(&lines.map(|(name, value)| (name.to_string(), value)))
+        ],
     });
-    Ok(ExitCode::Done)
+    lines.into_iter().map(|(name, words)| (name.to_string(), words)).collect()
 }

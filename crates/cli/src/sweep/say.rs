@@ -7,8 +7,8 @@ use serde_json::json;
 use sidestep::experiment::sweep::rounds::{Stopped, stopped};
 use sidestep::experiment::sweep::{LeftOut, Plan, RunTable, Shard, Summary};
 use sidestep_document::Table;
+use sidestep_session::shown;
 use sidestep_session::sweep::{self, Done, Effort, Ended, Folder};
-use std::path::Path;
 
 /// Largest number of failed runs that are listed.
 const NAMED: usize = 5;
@@ -37,12 +37,12 @@ pub(crate) struct Told<'a> {
 /// Failed runs are listed, and make the exit code 1.
 ///
 /// # Errors
-/// When a metric that is to be reported does not exist.
+/// When a metric that is to be reported does not exist, or the results cannot be written.
 pub(crate) fn tell(told: Told<'_>, ended: Ended, already: &str) -> Result<ExitCode, Failure> {
     let Told { plan, folder, console } = told;
     let done = match ended {
         Ended::Done(done) => done,
-        Ended::Interrupted(runs) => return Ok(interrupted(told, runs)),
+        Ended::Interrupted(runs) => return interrupted(told, runs),
     };
     if done.was_done {
         console.note(already);
@@ -60,15 +60,15 @@ pub(crate) fn tell(told: Told<'_>, ended: Ended, already: &str) -> Result<ExitCo
     };
     console.result_or_short(&json, short, || {
         text(told, table, &summary, &stopped(plan, table), done.effort)
-    });
+    })?;
     Ok(if failed == 0 { ExitCode::Done } else { ExitCode::Failed })
 }
 
 /// Prints how many runs of an interrupted sweep are finished.
-fn interrupted(told: Told<'_>, finished: usize) -> ExitCode {
+fn interrupted(told: Told<'_>, finished: usize) -> Result<ExitCode, Failure> {
     let Told { plan, folder, console } = told;
     let path = folder.map(Folder::path);
-    match path.map(Path::display) {
+    match path.map(shown) {
         None => console.note("Interrupted; nothing is kept without --out DIR."),
         Some(path) => {
             let all = plan.runs();
@@ -78,9 +78,9 @@ fn interrupted(told: Told<'_>, finished: usize) -> ExitCode {
             ));
         }
     }
-    let json = json!({ "status": "interrupted", "runs": finished, "folder": path });
-    console.result(&json, String::new);
-    ExitCode::Interrupted
+    let json = json!({ "status": "interrupted", "runs": finished, "folder": path.map(shown) });
+    console.result(&json, String::new)?;
+    Ok(ExitCode::Interrupted)
 }
 
 /// Returns the tables of all metrics.
@@ -181,7 +181,10 @@ fn failures(told: Told<'_>, table: &RunTable) -> usize {
 }
 
 /// Prints that a share is done, or how many of its runs are finished.
-pub(crate) fn tell_share(told: Told<'_>, shard: Shard, ended: Ended) -> ExitCode {
+///
+/// # Errors
+/// When that cannot be written.
+pub(crate) fn tell_share(told: Told<'_>, shard: Shard, ended: Ended) -> Result<ExitCode, Failure> {
     let console = told.console;
     let Done { table, effort, was_done } = match ended {
         Ended::Done(done) => done,
@@ -202,6 +205,6 @@ pub(crate) fn tell_share(told: Told<'_>, shard: Shard, ended: Ended) -> ExitCode
         let time: Vec<_> = time.into_iter().collect();
         let runs = grouped(table.runs() as u64);
         format!("Share {shard} is finished: {runs} runs\n{}", aligned(&time))
-    });
-    if failed == 0 { ExitCode::Done } else { ExitCode::Failed }
+    })?;
+    Ok(if failed == 0 { ExitCode::Done } else { ExitCode::Failed })
 }

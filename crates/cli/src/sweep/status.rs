@@ -2,16 +2,26 @@
 
 use super::say::counted;
 use crate::console::{Console, aligned, duration, grouped};
+use crate::exit::Failure;
 use serde_json::json;
+use sidestep_session::shown;
 use sidestep_session::sweep::{Folder, ShareStatus, Status};
 
 /// Largest number of failed runs that are listed.
 const NAMED: usize = 5;
 
 /// Prints how far a sweep is.
-pub(crate) fn tell_status(folder: &Folder, status: &Status, console: Console) {
+///
+/// # Errors
+/// When that cannot be written.
+pub(crate) fn tell_status(
+    folder: &Folder,
+    status: &Status,
+    console: Console,
+) -> Result<(), Failure> {
     let plan = folder.plan();
-    let mut json = json!({ "folder": folder.path(), "name": plan.name, "world": plan.world });
+    let mut json =
+        json!({ "folder": shown(folder.path()), "name": plan.name, "world": plan.world });
     if let (Some(all), Ok(serde_json::Value::Object(told))) =
         (json.as_object_mut(), serde_json::to_value(status))
     {
@@ -23,7 +33,7 @@ pub(crate) fn tell_status(folder: &Folder, status: &Status, console: Console) {
         let name = if plan.name.is_empty() { &plan.world } else { &plan.name };
         let (runs, all) = (grouped(status.runs), counted(status.of as usize, "run"));
         format!("# {name}: {runs} {of} {all}\n\n{}", aligned(&lines(folder, status)))
-    });
+    })
 }
 
 fn lines(folder: &Folder, status: &Status) -> Vec<(String, String)> {
@@ -43,15 +53,13 @@ fn lines(folder: &Folder, status: &Status) -> Vec<(String, String)> {
     for failure in status.failures.iter().take(NAMED) {
         line("", format!("{}, seed {}: {}", failure.variant, failure.seed, failure.why));
     }
-    let (is_all, nobody) = (status.runs == status.of, status.left_s.is_none());
+    let is_all = status.runs == status.of;
     let next = match status.is_complete {
         true => Some(("look at it", format!("sidestep report {path}"))),
+        // Two processes that do the same only stand in each other's way.
+        false if status.is_worked_on => None,
         false if is_all => Some(("join them", format!("sidestep sweep collect {path}"))),
-        // Where a precision ends the sweep nobody knows what is left, so that tells nothing.
-        false if nobody && !status.until_precise => {
-            Some(("go on", format!("sidestep resume {path}")))
-        }
-        false => None,
+        false => Some(("go on", format!("sidestep resume {path}"))),
     };
     lines.extend(next.map(|(name, words)| (name.to_string(), words)));
     lines

@@ -108,6 +108,35 @@ fn methods_are_compared_on_the_same_traffic() {
 }
 
 #[test]
+fn seeds_that_run_over_are_told_as_such() {
+    let place = Place::new();
+    place.write("six.toml", SIX);
+    let last = ["compare", "six.toml", "--methods", "none", "--seed", "9223372036854775807"];
+    let told = place.run(&[&last[..], &["--runs", "2"]].concat());
+    assert_eq!((told.code(), told.out().as_str()), (2, ""));
+    let cause = "2 seeds from 9223372036854775807 on run over";
+    assert!(told.err().contains(cause) && !told.err().contains("line"), "{}", told.err());
+    assert_eq!(place.run(&[&last[..], &["--runs", "1"]].concat()).code(), 0);
+}
+
+#[test]
+fn the_advice_to_fly_methods_without_the_shield_is_accepted() {
+    let place = Place::new();
+    place.write("six.toml", SIX);
+    let compare = ["compare", "six.toml", "--methods", "none", "--runs", "1"];
+    let words = |args: &[&str]| {
+        let told = place.run(args);
+        assert_eq!(told.code(), 0, "{}", told.err());
+        told.out().split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let told = words(&compare);
+    let advice = told.split_once("Fly the methods bare with --set ").expect("an advice").1;
+    let setting = advice.split(' ').next().and_then(|word| word.strip_suffix('.'));
+    let bare = words(&[&compare[..], &["--set", setting.expect("a sentence")]].concat());
+    assert!(!bare.contains("The shield changed"), "{bare}");
+}
+
+#[test]
 fn a_bluesky_file_is_a_scenario_and_check_counts_its_commands() {
     let place = Place::new();
     place.write(

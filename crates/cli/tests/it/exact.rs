@@ -15,6 +15,23 @@ fn the_chain_is_told_and_the_simulator_agrees_with_it() {
 }
 
 #[test]
+fn runs_that_are_too_few_to_disagree_confirm_nothing() {
+    let place = Place::new();
+    let compare = |runs: &str| place.run(&["exact", ONE, "--runs", runs, "--cycles", "50"]);
+    let few = compare("40");
+    let told = few.out();
+    assert_eq!(few.code(), 1, "{told}");
+    assert!(!told.contains("agrees") && told.contains("too few runs to tell"), "{told}");
+    let enough = told.split_once("--runs ").expect("a number of runs").1;
+    let enough = enough.split(' ').next().expect("a number");
+    let told = compare(enough);
+    assert_eq!(told.code(), 0, "{}", told.out());
+    assert!(told.out().contains("agrees"), "{}", told.out());
+    let less = (enough.parse::<u32>().expect("a number") - 1).to_string();
+    assert_eq!(compare(&less).code(), 1);
+}
+
+#[test]
 fn a_pomdp_is_exported_whole() {
     let place = Place::new();
     let args = ["exact", ONE, "--pomdp", "m.pomdp", "--goal", "14,6", "--beam", "sonar-8:0"];

@@ -20,6 +20,8 @@ mod ik;
 mod ik_poses;
 mod input;
 mod learn;
+mod names;
+mod output;
 mod own;
 mod pictures;
 mod readers;

@@ -207,6 +207,22 @@ fn a_sweep_that_is_not_done_is_marked() {
 }
 
 #[test]
+fn figures_for_print_that_cannot_be_made_leave_no_page() {
+    let place = reported(SIX);
+    std::fs::remove_file(place.path("r/report.html")).expect("it was there");
+    for (wrong, told) in [
+        (["--label", "nope=x"], "no figure has the words `nope`"),
+        (["--figure-size", "60xfoox60"], "`60xfoox60` is no size"),
+        (["--figure-size", "60x60x"], "`60x60x` is no size"),
+    ] {
+        let ended = place.run(&[&["report", "r", "--figure", "svg"][..], &wrong].concat());
+        assert_eq!(ended.code(), 2, "{wrong:?}");
+        assert!(ended.err().contains(told), "{}", ended.err());
+        assert!(!place.path("r/report.html").exists(), "{wrong:?}");
+    }
+}
+
+#[test]
 fn what_is_no_run_or_no_page_is_refused_and_nothing_is_written() {
     let place = Place::new();
     for args in [

@@ -1,7 +1,7 @@
 //! Many runs: the same table for any number of workers, in shares or in one go, and every row is
 //! what `run` gives for its scenario and seed.
 
-use crate::support::{Place, names};
+use crate::support::{Place, names, wait_for};
 use std::path::Path;
 
 /// Six variants with three seeds each.
@@ -268,6 +268,39 @@ fn a_variant_that_was_changed_or_is_gone_stops_the_sweep_until_it_is_back() {
     std::fs::write(&path, planned).expect("written");
     let done = place.json(&["resume", "d"]);
     assert_eq!((&done["runs"], &done["failed"]), (&18.into(), &0.into()), "none has failed for it");
+}
+
+#[test]
+fn a_plan_that_a_precision_ends_names_only_commands_that_run_it() {
+    let place = place();
+    let plan = ["sweep", "plan", "s.toml", "--cycles", "50", "--until", "ci=0.5", "--max", "12"];
+    let told = place.run(&[&plan[..], &["--out", "d"]].concat());
+    assert_eq!(told.code(), 0, "{}", told.err());
+    assert!(told.out().contains("at most 12 of each, at most 12 in all"), "{}", told.out());
+    let status = place.run(&["sweep", "status", "d"]).out();
+    assert!(status.contains("of at most 12") && status.contains("sidestep resume d"), "{status}");
+    let commands = told.out();
+    let commands: Vec<&str> =
+        commands.lines().filter_map(|l| l.split_once("sidestep ")).map(|p| p.1).collect();
+    assert_eq!(commands, ["resume d"]);
+    let ended = place.run(&["resume", "d"]);
+    assert_eq!(ended.code(), 0, "{}", ended.err());
+}
+
+#[test]
+fn the_status_of_a_sweep_that_somebody_works_on_names_no_second_command() {
+    let place = place();
+    place.json(&["sweep", "plan", "s.toml", "--cycles", "100000000", "--out", "d"]);
+    let next = || place.run(&["sweep", "status", "d"]).out();
+    assert!(next().contains("sidestep resume d"), "{}", next());
+    let mut child = place.start(&["resume", "d", "--workers", "1"]);
+    let journal = place.path("d/shares/0-of-1.journal");
+    wait_for("the journal", || journal.is_file());
+    let at_work = next();
+    child.kill().expect("killed");
+    child.wait().expect("gone");
+    assert!(!at_work.contains("sidestep"), "{at_work}");
+    assert!(next().contains("sidestep resume d"), "{}", next());
 }
 
 #[test]

@@ -1,17 +1,19 @@
 //! The tables of a sweep that is done: of its runs, and of the times that they took.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::{RecordError, RoleColumn};
 
-use super::folder::SweepFolder;
+use super::folder::{FINGERPRINT, SHARES, SweepFolder};
 use crate::whole::{self, GrowingTable, WholeTable};
 
 const RESULTS: &str = "results.parquet";
 const TIMINGS: &str = "timings.parquet";
+/// Key of the plan in the key-value pairs of a table.
+const PLAN: &str = "sidestep.plan";
 
 /// The table of runs, and that of the times that they took, while they are written.
 pub struct Completion {
@@ -55,7 +57,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     ) -> Result<Completion, RecordError> {
         let plan = serde_json::to_string(self.plan())
             .map_err(|e| RecordError::new(self.path().display(), e))?;
-        let extra = [("sidestep.plan", plan), ("sidestep.fingerprint", self.fingerprint())];
+        let extra = [(PLAN, plan), (FINGERPRINT, self.fingerprint())];
         let version = &self.manifest().program_version;
         let table = |name: &str, columns| {
             GrowingTable::create(&self.path().join(name), columns, version, &extra)
@@ -76,7 +78,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// Reads the table of all runs.
     ///
     /// # Errors
-    /// A sweep that is not done, or a damaged table.
+    /// A sweep that is not done; a table that is damaged, or of another sweep.
     pub fn results<R: DeserializeOwned + Clone>(&self) -> Result<WholeTable<R>, InputError> {
         if !self.is_complete() {
             let remedy = "go on with `sidestep resume DIR`, or run its shares and \
@@ -87,18 +89,38 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
                 remedy,
             ));
         }
-        whole::read(&self.results_file()).map_err(|e| {
-            let remedy =
-                "delete it; `sidestep resume DIR` makes it again from the runs in `shares`";
-            InputError::new(e.place(), e.cause(), remedy)
-        })
+        self.table(RESULTS)
     }
 
     /// Reads the table of the times that the runs took.
     ///
     /// # Errors
-    /// A sweep that is not done, or a damaged table.
+    /// A sweep that is not done; a table that is damaged, or of another sweep.
     pub fn timings<R: DeserializeOwned + Clone>(&self) -> Result<WholeTable<R>, InputError> {
-        whole::read(&self.path().join(TIMINGS))
+        self.table(TIMINGS)
+    }
+
+    fn table<R: DeserializeOwned + Clone>(&self, name: &str) -> Result<WholeTable<R>, InputError> {
+        let path = self.path().join(name);
+        self.check_own(&path).and_then(|()| whole::read(&path)).map_err(|e| {
+            // The results are what says that the sweep is done: without them all is joined again.
+            let remedy = format!(
+                "delete `{RESULTS}`; `sidestep resume DIR` makes it again from the runs in `{SHARES}`"
+            );
+            InputError::new(e.place(), e.cause(), remedy)
+        })
+    }
+
+    /// Checks that a table is of this plan and these scenarios.
+    fn check_own(&self, path: &Path) -> Result<(), InputError> {
+        let [plan, fingerprint] = whole::pairs(path, [PLAN, FINGERPRINT])?;
+        // Compared as it is read: another version may have written the same plan in other words.
+        let read = plan.and_then(|text| serde_json::from_str::<P>(&text).ok());
+        let value = |plan: &P| serde_json::to_value(plan).ok();
+        let is_same_plan = read.is_some_and(|read| value(&read) == value(self.plan()));
+        if is_same_plan && fingerprint == Some(self.fingerprint()) {
+            return Ok(());
+        }
+        Err(InputError::new(path.display(), "the table is of another sweep", String::new()))
     }
 }

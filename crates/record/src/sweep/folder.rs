@@ -20,6 +20,8 @@ pub(super) const SHARES: &str = "shares";
 const VARIANTS: &str = "variants";
 const RUNS: &str = "runs";
 const SCENARIO: &str = "scenario.toml";
+/// Key of the fingerprint of all scenarios in the key-value pairs of a table.
+pub(super) const FINGERPRINT: &str = "sidestep.fingerprint";
 const SCRATCH: &str = "joining.partial";
 
 /// The content of `sweep.json`.
@@ -96,7 +98,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         let file = staging.path().join(MANIFEST);
         disk::replace(&file, &json(&manifest, &file)?)?;
         disk::sync_below(staging.path())?;
-        staging.take_place_of(path)?;
+        staging.take_place()?;
         Ok(Self { path: path.to_path_buf(), manifest })
     }
 

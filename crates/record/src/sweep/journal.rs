@@ -21,11 +21,28 @@ use crate::format::{self, FormatVersion};
 /// none.
 const SYNC_EVERY: Duration = Duration::from_millis(200);
 
+/// Number of further tries to lock a journal that is locked,
+const LOCK_TRIES: usize = 5;
+/// and the time between two.
+const LOCK_AGAIN: Duration = Duration::from_millis(10);
+
+/// The sweep that a journal is of.
+#[derive(Debug, Clone, Copy)]
+pub struct Origin<'a> {
+    /// Version of the program that makes its runs.
+    pub program_version: &'a str,
+    /// Fingerprint of its scenarios.
+    pub fingerprint: &'a str,
+}
+
 /// The first line.
 #[derive(Debug, Serialize, Deserialize)]
 struct Head {
     format: FormatVersion,
     program_version: String,
+    /// Fingerprint of the scenarios; early journals do not have it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    fingerprint: Option<String>,
 }
 
 /// A journal that this process writes; no other can write it while this value lives.
@@ -46,7 +63,7 @@ impl Journal {
     /// A journal that another process writes, that is damaged, or that another version wrote.
     pub fn open<T: DeserializeOwned>(
         path: &Path,
-        program_version: &str,
+        of: Origin<'_>,
         each: impl FnMut(T),
     ) -> Result<Self, InputError> {
         let failed = |e: std::io::Error| {
@@ -56,12 +73,14 @@ impl Journal {
         let file = OpenOptions::new().read(true).append(true).create(true).open(path);
         let file = file.map_err(failed)?;
         lock(&file, path)?;
-        let length = whole_lines(path, program_version, each)?;
+        let length = whole_lines(path, of, each)?;
         file.set_len(length).map_err(failed)?;
         let mut journal = Self { path: path.to_path_buf(), file, length, synced: Instant::now() };
         journal.file.seek(SeekFrom::End(0)).map_err(failed)?;
         if length == 0 {
-            let head = Head { format: format::CURRENT, program_version: program_version.into() };
+            let (program_version, fingerprint) = (of.program_version.into(), of.fingerprint.into());
+            let fingerprint = Some(fingerprint);
+            let head = Head { format: format::CURRENT, program_version, fingerprint };
             journal
                 .append(&head)
                 .and_then(|()| journal.sync())
@@ -97,8 +116,31 @@ impl Journal {
     }
 }
 
+/// Whether a process writes the journal at `path`; none where the file system has no locks.
+pub(super) fn is_locked(path: &Path) -> Option<bool> {
+    match File::open(path) {
+        Err(_) => Some(false),
+        Ok(file) => match file.try_lock_shared() {
+            Ok(()) => Some(false),
+            Err(TryLockError::WouldBlock) => Some(true),
+            Err(TryLockError::Error(_)) => None,
+        },
+    }
+}
+
+/// Locks a file, against others who write it. Who asks whether it is locked has a lock for a moment, which is waited for.
+fn try_lock(file: &File) -> Result<(), TryLockError> {
+    for _ in 0..LOCK_TRIES {
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => std::thread::sleep(LOCK_AGAIN),
+            other => return other,
+        }
+    }
+    file.try_lock()
+}
+
 fn lock(file: &File, path: &Path) -> Result<(), InputError> {
-    let cause = match file.try_lock() {
+    let cause = match try_lock(file) {
         Ok(()) => return Ok(()),
         Err(TryLockError::WouldBlock) => "another process is running this share".to_string(),
         // Some network file systems have no locks: there, the user's scheduler must prevent two
@@ -121,16 +163,16 @@ fn line(entry: &impl Serialize) -> serde_json::Result<String> {
 /// A journal that cannot be read, is damaged, or was written by another version of the program.
 pub fn read_journal<T: DeserializeOwned>(
     path: &Path,
-    program_version: &str,
+    of: Origin<'_>,
     each: impl FnMut(T),
 ) -> Result<(), InputError> {
-    whole_lines(path, program_version, each).map(drop)
+    whole_lines(path, of, each).map(drop)
 }
 
 /// Passes on the entries, and returns the number of bytes of complete lines.
 fn whole_lines<T: DeserializeOwned>(
     path: &Path,
-    program_version: &str,
+    of: Origin<'_>,
     mut each: impl FnMut(T),
 ) -> Result<u64, InputError> {
     let damaged = |line: usize, cause: String| {
@@ -152,7 +194,7 @@ fn whole_lines<T: DeserializeOwned>(
             return Err(damaged(number, "the line does not match its checksum".into()));
         };
         if number == 1 {
-            check_head(path, json, program_version)?;
+            check_head(path, json, of)?;
         } else {
             each(serde_json::from_slice(json).map_err(|e| damaged(number, e.to_string()))?);
         }
@@ -169,16 +211,22 @@ fn json(line: &[u8]) -> Option<&[u8]> {
     (crc32fast::hash(json) == checksum).then_some(json)
 }
 
-fn check_head(path: &Path, json: &[u8], program_version: &str) -> Result<(), InputError> {
+fn check_head(path: &Path, json: &[u8], of: Origin<'_>) -> Result<(), InputError> {
     let head: Head = serde_json::from_slice(json).map_err(|e| {
         InputError::new(path.display(), format!("this is no journal: {e}"), "delete it")
     })?;
     head.format.check_readable(path.display())?;
-    if head.program_version == program_version {
+    if head.fingerprint.is_some_and(|fingerprint| fingerprint != of.fingerprint) {
+        let remedy = "delete it, and its runs are made";
+        return Err(InputError::new(path.display(), "its runs are of another sweep", remedy));
+    }
+    if head.program_version == of.program_version {
         return Ok(());
     }
-    let cause =
-        format!("its runs are of sidestep {}, this is {program_version}", head.program_version);
+    let cause = format!(
+        "its runs are of sidestep {}, this is {}",
+        head.program_version, of.program_version
+    );
     let remedy =
         format!("go on with sidestep {}, or sweep into a new folder", head.program_version);
     Err(InputError::new(path.display(), cause, remedy))
@@ -188,14 +236,16 @@ fn check_head(path: &Path, json: &[u8], program_version: &str) -> Result<(), Inp
 mod tests {
     use super::*;
 
+    const OF: Origin<'_> = Origin { program_version: "0.1.0", fingerprint: "f" };
+
     fn opened(path: &Path) -> (Journal, Vec<u32>) {
         let mut entries = Vec::new();
-        let journal = Journal::open(path, "0.1.0", |n| entries.push(n)).unwrap();
+        let journal = Journal::open(path, OF, |n| entries.push(n)).unwrap();
         (journal, entries)
     }
 
-    fn refused(path: &Path, program_version: &str) -> InputError {
-        Journal::open::<u32>(path, program_version, |_| ()).unwrap_err()
+    fn refused(path: &Path, of: Origin<'_>) -> InputError {
+        Journal::open::<u32>(path, of, |_| ()).unwrap_err()
     }
 
     #[test]
@@ -218,7 +268,7 @@ mod tests {
             journal.append(&77u32).unwrap();
             drop(journal);
             let mut all: Vec<u32> = Vec::new();
-            read_journal(&path, "0.1.0", |n| all.push(n)).unwrap();
+            read_journal(&path, OF, |n| all.push(n)).unwrap();
             assert_eq!(all, [kept, vec![77]].concat(), "cut at {cut}");
         }
     }
@@ -232,19 +282,23 @@ mod tests {
         drop(journal);
         let changed = std::fs::read_to_string(&path).unwrap().replace(" 1\n", " 7\n");
         std::fs::write(&path, changed).unwrap();
-        let error = refused(&path, "0.1.0");
+        let error = refused(&path, OF);
         assert_eq!(error.position(), Some((3, 1)), "{error}");
     }
 
     #[test]
-    fn one_process_writes_and_one_version() {
+    fn one_process_writes_and_one_version_of_one_sweep() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("j");
         let journal = opened(&path);
-        let error = refused(&path, "0.1.0");
+        let error = refused(&path, OF);
         assert!(error.cause().contains("another process"), "{error}");
+        assert_eq!(is_locked(&path), Some(true));
         drop(journal);
-        let error = refused(&path, "0.2.0");
+        assert_eq!(is_locked(&path), Some(false), "also after a kill: the system takes locks away");
+        let error = refused(&path, Origin { program_version: "0.2.0", ..OF });
         assert!(error.cause().contains("sidestep 0.1.0"), "{error}");
+        let error = refused(&path, Origin { fingerprint: "g", ..OF });
+        assert!(error.cause().contains("another sweep"), "{error}");
     }
 }

@@ -23,5 +23,5 @@ mod shares;
 
 pub use completion::Completion;
 pub use folder::{Scratch, SweepFolder, SweepManifest, fingerprint};
-pub use journal::{Journal, read_journal};
+pub use journal::{Journal, Origin, read_journal};
 pub use shares::Share;

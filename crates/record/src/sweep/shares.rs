@@ -8,8 +8,8 @@ use serde::de::DeserializeOwned;
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::{RecordError, RoleColumn};
 
-use super::folder::{SHARES, SweepFolder};
-use super::journal::{Journal, read_journal};
+use super::folder::{FINGERPRINT, SHARES, SweepFolder};
+use super::journal::{Journal, Origin, is_locked, read_journal};
 use crate::whole::{self, WholeTable};
 
 /// A share of the cells: number `index` of `count`.
@@ -36,7 +36,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
             return Ok(None);
         }
         let path = self.share_file(share, "journal");
-        Journal::open(&path, &self.manifest().program_version, each).map(Some)
+        Journal::open(&path, self.of(&self.fingerprint()), each).map(Some)
     }
 
     /// Writes the runs of a share as its part, and deletes the journal.
@@ -50,7 +50,8 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         runs: &[&RoleColumn<R>],
     ) -> Result<(), RecordError> {
         let version = &self.manifest().program_version;
-        whole::write(&self.share_file(share, "parquet"), runs, version, &[])?;
+        let extra = [(FINGERPRINT, self.fingerprint())];
+        whole::write(&self.share_file(share, "parquet"), runs, version, &extra)?;
         drop(journal);
         let path = self.share_file(share, "journal");
         fs::remove_file(&path).map_err(|e| RecordError::new(path.display(), e))
@@ -66,6 +67,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     ) -> Result<(), InputError> {
         for share in self.shares_with("parquet")? {
             let path = self.share_file(share, "parquet");
+            self.check_part(&path)?;
             let mut version = Ok(());
             whole::read_blocks(&path, |block| {
                 version = self.check_version(&path, &block);
@@ -88,11 +90,11 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         but: Option<Share>,
         mut each: impl FnMut(T),
     ) -> Result<(), InputError> {
-        let done = self.shares_with("parquet")?;
+        let (done, fingerprint) = (self.shares_with("parquet")?, self.fingerprint());
         for share in self.shares_with("journal")? {
             if !done.contains(&share) && Some(share) != but {
                 let path = self.share_file(share, "journal");
-                read_journal(&path, &self.manifest().program_version, &mut each)?;
+                read_journal(&path, self.of(&fingerprint), &mut each)?;
             }
         }
         Ok(())
@@ -112,6 +114,11 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         Ok(shares.into_iter().map(|share| (share, done.contains(&share))).collect())
     }
 
+    /// Whether a process writes the journal of a share now; none where the file system has no locks.
+    pub fn is_locked(&self, share: Share) -> Option<bool> {
+        is_locked(&self.share_file(share, "journal"))
+    }
+
     /// Passes on the finished runs of a share that is in progress or was stopped.
     ///
     /// # Errors
@@ -122,7 +129,22 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         each: impl FnMut(T),
     ) -> Result<(), InputError> {
         let path = self.share_file(share, "journal");
-        read_journal(&path, &self.manifest().program_version, each)
+        read_journal(&path, self.of(&self.fingerprint()), each)
+    }
+
+    fn of<'a>(&'a self, fingerprint: &'a str) -> Origin<'a> {
+        Origin { program_version: &self.manifest().program_version, fingerprint }
+    }
+
+    /// Checks that the scenarios of a part are those of this sweep.
+    fn check_part(&self, path: &Path) -> Result<(), InputError> {
+        let [fingerprint] = whole::pairs(path, [FINGERPRINT])?;
+        // Parts that are older than this check do not say it.
+        if fingerprint.is_none_or(|fingerprint| fingerprint == self.fingerprint()) {
+            return Ok(());
+        }
+        let remedy = "delete it, and run this share again";
+        Err(InputError::new(path.display(), "its runs are of another sweep", remedy))
     }
 
     fn check_version<R>(&self, path: &Path, table: &WholeTable<R>) -> Result<(), InputError> {

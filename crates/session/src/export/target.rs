@@ -2,6 +2,7 @@
 
 use super::Job;
 use crate::Error;
+use crate::files::whereabouts_of;
 use sidestep::kernel::InputError;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -14,9 +15,18 @@ pub(super) struct Target {
 
 impl Target {
     /// Returns the requested place, or one beside the recorded run, with its name and `ending`.
-    fn named(job: &Job<'_>, ending: &str) -> Self {
-        let beside = || beside(&job.recorded.path, ending);
-        Self { path: job.wanted.out.map_or_else(beside, Path::to_path_buf) }
+    ///
+    /// # Errors
+    /// When that is the recording itself, or a folder that it lies in: it would be lost.
+    fn named(job: &Job<'_>, ending: &str) -> Result<Self, InputError> {
+        let recorded = &job.recorded.path;
+        let path = job.wanted.out.map_or_else(|| beside(recorded, ending), Path::to_path_buf);
+        let target = Self { path };
+        if whereabouts_of(recorded).starts_with(whereabouts_of(&target.path)) {
+            let cause = "this is the recording that is exported, or holds it";
+            return Err(target.refuse(cause, "name another place with --out"));
+        }
+        Ok(target)
     }
 
     /// Returns the requested file, or the run's name with `ending`.
@@ -24,7 +34,7 @@ impl Target {
     /// # Errors
     /// When the file exists and may not be replaced.
     pub(super) fn file(job: &Job<'_>, ending: &str) -> Result<Self, InputError> {
-        let target = Self::named(job, ending);
+        let target = Self::named(job, ending)?;
         match std::fs::metadata(&target.path) {
             Ok(found) if found.is_dir() => Err(target.refuse("this is a folder", "name a file")),
             Ok(_) if !job.wanted.replace => Err(target.refuse(EXISTS, REPLACE)),
@@ -37,7 +47,7 @@ impl Target {
     /// # Errors
     /// When the folder exists and may not be replaced, or holds something else.
     pub(super) fn folder(job: &Job<'_>, ending: &str, holds: &[&str]) -> Result<Self, InputError> {
-        let target = Self::named(job, ending);
+        let target = Self::named(job, ending)?;
         let Ok(mut entries) = std::fs::read_dir(&target.path) else {
             return match target.path.exists() {
                 true => Err(target.refuse("this is no folder", "name a new folder")),
@@ -79,7 +89,12 @@ impl Target {
         &self,
         fill: impl FnOnce(&Path) -> Result<T, Error>,
     ) -> Result<T, Error> {
-        let mut growing = self.path.as_os_str().to_owned();
+        // Of a link, the folder that it leads to: the link stays.
+        let path = match self.path.is_symlink() {
+            true => self.path.canonicalize().map_err(|e| Error::write(&self.path, &e))?,
+            false => self.path.clone(),
+        };
+        let mut growing = path.as_os_str().to_owned();
         growing.push(".partial");
         let growing = PathBuf::from(growing);
         let failed = |e: std::io::Error| Error::write(&self.path, &e);
@@ -87,9 +102,7 @@ impl Target {
         remove(&growing).map_err(failed)?;
         std::fs::create_dir_all(&growing).map_err(failed)?;
         let filled = fill(&growing).and_then(|done| {
-            remove(&self.path)
-                .and_then(|()| std::fs::rename(&growing, &self.path))
-                .map_err(failed)?;
+            remove(&path).and_then(|()| std::fs::rename(&growing, &path)).map_err(failed)?;
             Ok(done)
         });
         filled.inspect_err(|_| drop(remove(&growing)))

@@ -5,7 +5,7 @@ use super::words::{count, duration};
 use crate::sweep::{Finished, Folder, finished, picture_of};
 use crate::{Error, Watcher};
 use sidestep::experiment::sweep::rounds::{Stopped, stopped};
-use sidestep::experiment::sweep::{Plan, RunTable, Summary};
+use sidestep::experiment::sweep::{Cell, Plan, Role, RunTable, Summary};
 use sidestep::kernel::ports::Values;
 use sidestep::scenario::Worlds;
 use sidestep_document::Table;
@@ -37,11 +37,7 @@ pub(super) fn document(
     tell_results(&mut document, &summary);
     tell_failures(&mut document, plan, &table);
     let pictures = pictures(worlds, folder, &table, watcher)?;
-    if !pictures.is_empty() {
-        document.section("Where everybody went");
-        let text = "The run of the first seed, of the first variants.";
-        document.paragraph(text).pictures(pictures);
-    }
+    tell_pictures(&mut document, pictures);
     tell_methods(&mut document, &summary);
     tell_plan(&mut document, folder, &table);
     Ok(document)
@@ -118,7 +114,8 @@ fn variants(plan: &Plan, table: &RunTable) -> Option<Table> {
     }
     let mut runs = vec![0u64; plan.variants.len()];
     if let Some(Values::I64(of)) = table.column("variant").map(|c| &c.values) {
-        of.options().flatten().filter_map(|v| usize::try_from(*v).ok()).for_each(|v| runs[v] += 1);
+        let numbers = of.options().flatten().filter_map(|v| usize::try_from(*v).ok());
+        numbers.for_each(|v| runs.get_mut(v).into_iter().for_each(|runs| *runs += 1));
     }
     let mut columns = vec!["variant", "runs"];
     columns.extend(plan.parameters.iter().map(String::as_str));
@@ -141,8 +138,8 @@ fn why_enough(plan: &Plan, table: &RunTable) -> Option<Table> {
     let names = plan.names();
     let mut rows = Table::new("Why so many runs", "", &["variant", "runs", "why"]);
     for Stopped { variant, runs, reason } in &stopped {
-        let name = names[*variant as usize].clone();
-        rows.row([name, runs.to_string(), reason.words().to_string()]);
+        let name = names.get(*variant as usize).cloned();
+        rows.row([name.unwrap_or_default(), runs.to_string(), reason.words().to_string()]);
     }
     (!stopped.is_empty()).then_some(rows)
 }
@@ -196,9 +193,21 @@ fn tell_plan(document: &mut Document, folder: &Folder, table: &RunTable) {
     document.tables(why_enough(plan, table).map(Table::folded));
     document.commands("How to run it again", again(folder));
     if let Ok(text) = std::fs::read_to_string(folder.scenario(0)) {
-        let title = format!("The scenario of the first variant: {}", plan.names()[0]);
+        let name = plan.names().into_iter().next().unwrap_or_default();
+        let title = format!("The scenario of the first variant: {name}");
         document.push(Block::Code(Code { title, language: "toml", text }));
     }
+}
+
+fn tell_pictures(document: &mut Document, Pictures { all, remarks }: Pictures) {
+    if all.is_empty() && remarks.is_empty() {
+        return;
+    }
+    document.section("Where everybody went");
+    document.paragraph("The run of the first seed, of the first variants.").pictures(all);
+    remarks.into_iter().for_each(|remark| {
+        document.warning(remark);
+    });
 }
 
 fn tell_failures(document: &mut Document, plan: &Plan, table: &RunTable) {
@@ -222,32 +231,61 @@ fn tell_failures(document: &mut Document, plan: &Plan, table: &RunTable) {
     document.tables([rows]);
 }
 
+/// Pictures of some runs, and why there is none of others.
+#[derive(Default)]
+struct Pictures {
+    all: Vec<Picture>,
+    remarks: Vec<String>,
+}
+
 /// Returns a picture of one run of each of the first variants, except of those that took long.
 fn pictures(
     worlds: Worlds,
     folder: &Folder,
     table: &RunTable,
     watcher: &dyn Watcher,
-) -> Result<Vec<Picture>, Error> {
+) -> Result<Pictures, Error> {
     let plan = folder.plan();
-    let cells = table.column("cell");
-    let took_s = |id: u64| {
-        let row = (0..table.runs())
-            .find(|&row| cells.and_then(|c| c.values.number(row)) == Some(id as f64))?;
-        table.column("run_wall_s")?.values.number(row)
-    };
-    let mut pictures = Vec::new();
-    for (variant, name) in (0u32..).zip(plan.names()).take(DRAWN) {
+    let digests = table.of_role(Role::Digest).next();
+    let mut pictures = Pictures::default();
+    for (variant, title) in (0u32..).zip(plan.names()).take(DRAWN) {
         let cell = plan.cell(variant, 0);
-        if took_s(cell.id).is_some_and(|took_s| took_s <= LONGEST_S)
-            && let Some(svg) = picture_of(worlds, folder, cell, watcher)?
-        {
-            let caption = format!(
-                "Seed {}; its digest and metrics are in row {} of results.parquet.",
-                cell.seed, cell.id
-            );
-            pictures.push(Picture { title: name, caption, svg });
+        let Some(row) = row_of(table, cell.id).filter(|row| is_short(table, *row)) else {
+            continue;
+        };
+        let digest = digests.map_or_else(String::new, |c| c.values.text(row));
+        match picture_of(worlds, folder, cell, &digest, watcher)? {
+            Ok(svg) => {
+                let caption = caption(folder, cell, row);
+                pictures.all.push(Picture { title, caption, svg });
+            }
+            Err(why) => {
+                let seed = cell.seed;
+                let remark = format!("There is no picture of {title}, seed {seed}: {why}.");
+                pictures.remarks.push(remark);
+            }
         }
     }
     Ok(pictures)
+}
+
+fn caption(folder: &Folder, cell: Cell, row: usize) -> String {
+    let (seed, id) = (cell.seed, cell.id);
+    match folder.is_complete() {
+        true => format!("Seed {seed}; its digest and metrics are in row {row} of results.parquet."),
+        false => format!("Seed {seed}; its cell has the number {id}."),
+    }
+}
+
+/// Returns the row of a cell, counted from 0.
+fn row_of(table: &RunTable, cell: u64) -> Option<usize> {
+    let cells = table.column("cell")?;
+    (0..table.runs()).find(|&row| cells.values.number(row) == Some(cell as f64))
+}
+
+/// Whether a run did not fail, and is quickly made again.
+fn is_short(table: &RunTable, row: usize) -> bool {
+    let number = |name: &str| table.column(name).and_then(|c| c.values.number(row));
+    let failed = table.column("failure").is_some_and(|c| !c.values.text(row).is_empty());
+    !failed && number("run_wall_s").is_some_and(|took_s| took_s <= LONGEST_S)
 }

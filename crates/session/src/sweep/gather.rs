@@ -1,5 +1,6 @@
 //! The folder of a sweep, and the finished runs in it.
 
+use crate::identity::Maker;
 use sidestep::experiment::sweep::{Outcome, Plan, Role, RunTable, Shard};
 use sidestep::kernel::InputError;
 use sidestep_record::WholeTable;
@@ -18,12 +19,34 @@ pub(super) fn share_of(shard: Shard) -> Share {
     Share { index: shard.index, count: shard.count }
 }
 
+/// Refuses another build: results may change between builds, so only one makes all runs.
+pub(super) fn check_build(folder: &Folder) -> Result<(), InputError> {
+    let manifest = folder.manifest();
+    let maker = Maker { version: manifest.program_version.clone(), build: manifest.build.clone() };
+    maker.check(folder.path(), "sweep", |wrote| {
+        format!("go on with sidestep {wrote}, or sweep into a new folder")
+    })
+}
+
+/// Refuses a folder that has more or fewer scenarios than its plan has variants: the runs of a variant would be taken for
+/// those of another.
+pub(super) fn check_variants(folder: &Folder) -> Result<(), InputError> {
+    let (planned, there) = (folder.plan().variants.len(), folder.manifest().fingerprints.len());
+    if planned == there {
+        return Ok(());
+    }
+    let cause = format!("its plan has {planned} variants, and there are {there} scenarios");
+    let remedy = "`sweep.json` was changed: put it back as it was, or sweep into a new folder";
+    Err(InputError::new(folder.path().display(), cause, remedy))
+}
+
 /// Passes on all finished runs, except those of the share `but`.
 pub(super) fn gather(
     folder: &Folder,
     but: Option<Shard>,
     mut each: impl FnMut(Outcome),
 ) -> Result<(), InputError> {
+    check_variants(folder)?;
     folder.parts(|part| table_of(part).outcomes(&mut each))?;
     folder.journals(but.map(share_of), &mut each)
 }

@@ -2,13 +2,12 @@
 
 use super::crew::Engine;
 use super::effort::Effort;
-use super::gather::{Folder, gather, share_of, table_of};
+use super::gather::{Folder, check_build, gather, share_of, table_of};
 use super::look::finished;
 use super::piles::{PILE, Piles};
 use super::prepare::{Make, prepare};
 use super::stamped::Stamped;
 use super::work::{Take, Work};
-use crate::identity::Maker;
 use crate::identity::build;
 use crate::watcher::{Progress, Watched};
 use crate::{Error, Watcher};
@@ -147,15 +146,6 @@ fn the_same(
     Err(InputError::new(there, "the folder holds another sweep", remedy).into())
 }
 
-/// Refuses another build: results may change between builds, so only one makes all runs.
-fn check_build(folder: &Folder) -> Result<(), InputError> {
-    let manifest = folder.manifest();
-    let maker = Maker { version: manifest.program_version.clone(), build: manifest.build.clone() };
-    maker.check(folder.path(), "sweep", |wrote| {
-        format!("go on with sidestep {wrote}, or sweep into a new folder")
-    })
-}
-
 /// Runs all cells that are not finished, and joins all runs into one table.
 ///
 /// # Errors
@@ -173,7 +163,9 @@ pub fn go_on<'a>(
     let mut log = Log::new(folder.plan());
     gather(folder, Some(Shard::ALL), |outcome| log.note(&outcome))?;
     let mut effort = Effort::default();
-    if let Some(mut journal) = folder.journal(share_of(Shard::ALL), |o: Outcome| log.note(&o))? {
+    // Locked until all is joined, so that nobody else begins to join.
+    let mut journal = folder.journal(share_of(Shard::ALL), |o: Outcome| log.note(&o))?;
+    if let Some(journal) = &mut journal {
         with_work(worlds, folder, engine.into(), watcher, |work| {
             let mut keep = |outcome: &Outcome| Ok(journal.append(&Stamped::now(outcome))?);
             effort = log.run_all(work, &mut keep).map_err(|e| saved(e, folder.path()))?;

@@ -1,12 +1,13 @@
 //! The parts of a sweep that a report needs: its finished runs, and pictures of some.
 
-use super::gather::{Folder, gather, table_of};
+use super::gather::{Folder, check_build, gather, table_of};
 use super::work::recorded;
 use crate::watcher::Within;
 use crate::{Error, Watcher};
 use sidestep::experiment::sweep::{Cell, Rows, RunTable};
 use sidestep::kernel::InputError;
 use sidestep::scenario::{Source, Worlds};
+use sidestep_record::RunView;
 use std::path::Path;
 
 /// The finished runs of a sweep.
@@ -39,26 +40,39 @@ pub fn finished(folder: &Folder) -> Result<Finished, InputError> {
     Ok(Finished { table: rows.table(folder.plan())?, is_complete: false })
 }
 
-/// Returns the picture of a cell's run, as SVG: from its run folder, or from a run made again for
-/// it.
+/// Returns the picture of the run of a cell that came to `digest`, as SVG: from its run folder, or from a run made again
+/// for it. If there is none of that very run, the reason.
 ///
 /// # Errors
-/// When the run cannot be made again.
+/// When nothing can be stored, or the watcher asks to stop.
 pub(crate) fn picture_of(
     worlds: Worlds,
     folder: &Folder,
     cell: Cell,
+    digest: &str,
     watcher: &dyn Watcher,
-) -> Result<Option<String>, Error> {
+) -> Result<Result<String, String>, Error> {
     let kept = folder.run_folder(cell.id);
     if let Some(svg) = picture_in(&kept) {
-        return Ok(Some(svg));
+        let made = RunView::open(&kept).ok().and_then(|view| view.manifest.digest);
+        let other = || format!("the run in {} is another one", kept.display());
+        return Ok(if made.as_deref() == Some(digest) { Ok(svg) } else { Err(other()) });
+    }
+    // Another build or another scenario makes another run.
+    if let Err(e) = check_build(folder).and_then(|()| folder.check_variant(cell.variant)) {
+        return Ok(Err(e.cause().to_string()));
     }
     let place = tempfile::tempdir().map_err(|e| Error::write(&std::env::temp_dir(), &e))?;
     let again = place.path().join("run");
     let source = Source::read(&folder.scenario(cell.variant), &[])?;
-    recorded(worlds, cell, source, 1, &again, &Within(watcher))?;
-    Ok(picture_in(&again))
+    let outcome = match recorded(worlds, cell, source, 1, &again, &Within(watcher)) {
+        Err(Error::Input(e)) => return Ok(Err(e.cause().to_string())),
+        made => made?.ok_or(Error::Interrupted)?,
+    };
+    if outcome.digest != digest {
+        return Ok(Err(format!("made again, it comes to the digest {}", outcome.digest)));
+    }
+    Ok(picture_in(&again).ok_or_else(|| "it could not be drawn".to_string()))
 }
 
 fn picture_in(run: &Path) -> Option<String> {

@@ -1,6 +1,6 @@
 //! The state of a sweep that others work on, as its folder tells it; looking changes nothing.
 
-use super::gather::{Folder, table_of};
+use super::gather::{Folder, check_variants, share_of, table_of};
 use super::stamped::{Read, now_unix_s};
 use serde::Serialize;
 use sidestep::experiment::sweep::{Outcome, Plan, Shard};
@@ -32,6 +32,9 @@ pub struct Status {
     pub failed: usize,
     /// The first of them.
     pub failures: Vec<Failure>,
+    /// Whether somebody works on it, by the locks of its journals; where there are no locks, by how long ago the last
+    /// runs came in.
+    pub is_worked_on: bool,
     /// The shares that somebody has begun, in order.
     pub shares: Vec<ShareStatus>,
     /// Finished runs per second of late; none before the second run, and none once it is complete.
@@ -96,6 +99,7 @@ impl Found {
 pub fn status(folder: &Folder) -> Result<Status, InputError> {
     let (plan, now_s) = (folder.plan(), now_unix_s());
     let (mut found, mut shares) = (Found::default(), Vec::new());
+    check_variants(folder)?;
     let is_complete = folder.is_complete();
     if is_complete {
         table_of(folder.results()?).outcomes(|outcome| found.note(outcome));
@@ -111,6 +115,7 @@ pub fn status(folder: &Folder) -> Result<Status, InputError> {
     let idle_s = newest_s.map(|newest_s| (now_s - newest_s).max(0.0));
     let runs_per_s = newest_s.and_then(|newest_s| rate(&found.stamps, newest_s));
     let left_s = left_s(of.saturating_sub(runs), runs_per_s, idle_s).filter(|_| !until_precise);
+    let is_worked_on = is_worked_on(folder, &shares, runs_per_s);
     let failures = failures(plan, &mut found.failed);
     let failed = found.failed.len();
     Ok(Status {
@@ -120,6 +125,7 @@ pub fn status(folder: &Folder) -> Result<Status, InputError> {
         until_precise,
         failed,
         failures,
+        is_worked_on,
         shares,
         runs_per_s,
         idle_s,
@@ -170,8 +176,23 @@ fn rate(stamps: &[f64], newest_s: f64) -> Option<f64> {
 
 fn left_s(left: u64, runs_per_s: Option<f64>, idle_s: Option<f64>) -> Option<f64> {
     let (runs_per_s, idle_s) = (runs_per_s?, idle_s?);
-    let is_worked_on = idle_s <= IDLE_S.max(IDLE_RUNS / runs_per_s);
-    is_worked_on.then(|| left as f64 / runs_per_s)
+    (!is_long(idle_s, Some(runs_per_s))).then(|| left as f64 / runs_per_s)
+}
+
+/// Whether nobody has finished a run for longer than whoever works on a sweep takes.
+fn is_long(idle_s: f64, runs_per_s: Option<f64>) -> bool {
+    idle_s > runs_per_s.map_or(IDLE_S, |runs_per_s| IDLE_S.max(IDLE_RUNS / runs_per_s))
+}
+
+/// Whether somebody works on one of the shares that are begun and not done.
+fn is_worked_on(folder: &Folder, shares: &[ShareStatus], runs_per_s: Option<f64>) -> bool {
+    shares.iter().filter(|share| !share.is_done).any(|share| {
+        let shard: Option<Shard> = share.share.parse().ok();
+        let locked = shard.and_then(|shard| folder.is_locked(share_of(shard)));
+        // A share without a run may be at its first one for as long as it likes.
+        let may_be = || share.idle_s.is_none_or(|idle_s| !is_long(idle_s, runs_per_s));
+        locked.unwrap_or_else(may_be)
+    })
 }
 
 /// Returns the first runs that failed, in order.

@@ -3,6 +3,7 @@
 use super::effort::Effort;
 use super::gather::Folder;
 use super::journey::Done;
+use crate::files::shown;
 use serde_json::{Value, json};
 use sidestep::experiment::sweep::rounds::stopped;
 use sidestep::experiment::sweep::{Plan, RunTable, Summary};
@@ -20,7 +21,7 @@ impl Done {
             "failed": failed(&self.table).count(),
             "stopped": stopped(plan, &self.table),
             "took": (self.effort.runs > 0).then(|| self.effort.told()),
-            "results": folder.map(Folder::results_file),
+            "results": folder.map(|folder| shown(folder.results_file())),
             "summary": summary,
         })
     }

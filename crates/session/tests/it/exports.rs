@@ -64,6 +64,27 @@ fn a_recording_for_viewers_is_replayed() {
 }
 
 #[test]
+fn a_recording_is_not_exported_onto_itself() {
+    let place = Place::new();
+    let file = place.path("live.mcap");
+    let keep = Keep { mcap: Some((&file, 100)), ..Keep::default() };
+    place.start(1, keep).expect("started").travel(&Unwatched).expect("no bug");
+    let before = std::fs::read(&file).expect("there");
+    let recorded = Recorded::open(WORLDS, &file).expect("recorded");
+    let part =
+        Export { replace: true, from: Some(10), until: Some(20), ..wanted(Form::Mcap, &file) };
+    let other_name = place.path("./live.mcap");
+    for out in [Some(&*file), Some(&*other_name), None] {
+        let refused = export(&recorded, &Export { out, ..part.clone() }, &Unwatched);
+        let told = refused.expect_err("itself").to_string();
+        assert!(told.contains("the recording that is exported"), "{told}");
+        assert!(std::fs::read(&file).expect("there") == before);
+    }
+    let out = place.path("part.mcap");
+    export(&recorded, &Export { out: Some(&out), ..part }, &Unwatched).expect("beside it");
+}
+
+#[test]
 fn an_export_that_is_stopped_leaves_nothing() {
     let place = Place::new();
     let (folder, _) = place.record("run");

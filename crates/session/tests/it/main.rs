@@ -1,9 +1,11 @@
 //! Tests of everything that a session does, with a world that only these tests know.
 
 mod builds;
+mod changed;
 mod controls;
 mod exports;
 mod orders;
+mod places;
 mod pond;
 mod runs;
 mod support;

@@ -41,6 +41,15 @@ impl Place {
     }
 }
 
+/// Returns the names in the folder, sorted.
+pub(crate) fn names(place: &Place) -> Vec<String> {
+    let entries = std::fs::read_dir(place.path("")).expect("a folder");
+    let name = |entry: std::io::Result<std::fs::DirEntry>| entry.expect("an entry").file_name();
+    let mut names: Vec<_> = entries.map(|e| name(e).to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
 /// A watcher that asks to stop once a run has reached a cycle.
 pub(crate) struct StopAt {
     cycle: Cycle,

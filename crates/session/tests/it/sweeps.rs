@@ -68,9 +68,12 @@ fn the_status_counts_each_run_once_and_tells_those_that_failed() {
     for cell in [own, other].map(|cell| cell.expect("a cell")) {
         writing.append(&outcome(cell)).expect("written");
     }
+    let found = status(&folder).expect("read");
+    assert!(found.is_worked_on && found.left_s.is_none(), "before the second run, too");
     drop(writing);
     let found = status(&folder).expect("read");
     assert_eq!((found.runs, found.of, found.failed, found.is_complete), (4, 6, 1, false));
+    assert!(!found.is_worked_on, "nobody has the lock of its journal");
     assert_eq!(found.failures[0].why, "no frogs");
     assert_eq!(found.failures[0].cell, other.expect("a cell"));
     // Lines of early journals have no times.

@@ -118,7 +118,7 @@ pub(crate) fn ik(args: &IkArgs, console: Console) -> Result<ExitCode, Failure> {
     if let Some(path) = &args.png {
         found.placed.picture(Some(goal.target.origin_m), &goal.spheres).write(path)?;
     }
-    console.result(&found, || found.text());
+    console.result(&found, || found.text())?;
     Ok(if found.reached { ExitCode::Done } else { ExitCode::Failed })
 }
 

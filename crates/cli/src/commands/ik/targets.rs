@@ -72,7 +72,7 @@ pub(super) fn answer(
         cpu_us_per_target: cpu_us / goals.len().max(1) as f64,
         answers: solved.into_iter().map(Row::new).collect(),
     };
-    console.result(&answers, || answers.table());
+    console.result(&answers, || answers.table())?;
     let Answers { targets, reached, cpu_us_per_target, remarks, .. } = &answers;
     remarks.iter().for_each(|remark| console.note(remark));
     console.note(format!("{reached} of {targets} reached, {cpu_us_per_target:.0} us each"));

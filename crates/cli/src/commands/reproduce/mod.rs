@@ -96,7 +96,7 @@ fn deliver(
         replace(&folder.join("report.json"), |file| file.write_all(&json))?;
         pages.store(&outcome.document, Raster::AlsoPng)?;
     }
-    console.result(report, || summary(outcome, out));
+    console.result(report, || summary(outcome, out))?;
     Ok(ExitCode::Done)
 }
 

@@ -2,6 +2,7 @@
 
 use super::super::shares::Share;
 use super::*;
+use crate::whole::WholeTable;
 use sidestep_kernel::ports::Values;
 
 type Folder = SweepFolder<Vec<u32>>;
@@ -69,6 +70,45 @@ fn a_sweep_goes_from_plan_over_shares_to_one_table() {
     assert_eq!((again.plan(), again.is_complete()), (&vec![4, 5], true));
     let twice = Values::I64(vec![0, 1, 0, 1].into());
     assert_eq!(again.results::<String>().unwrap().columns[0].values, twice);
+}
+
+#[test]
+fn tables_and_shares_of_another_sweep_are_refused() {
+    let place = tempfile::tempdir().unwrap();
+    let other = |name: &str, plan: Vec<u32>, print: &str| {
+        let fill = |_: &Path| Ok::<_, Failed>((plan, vec![print.to_string()], cells()));
+        Folder::create(&place.path().join(name), "0.1.0", "0.1.0+a", fill).unwrap()
+    };
+    let own = create(&place.path().join("own")).unwrap();
+    let columns = cells();
+    let refs: Vec<_> = columns.iter().collect();
+    let complete = |folder: &Folder| {
+        let mut completion = folder.completion(&refs, &refs).unwrap();
+        completion.append(&refs, &refs).unwrap();
+        completion.finish().unwrap();
+    };
+    complete(&own);
+    for other in [other("plan", vec![4], "f"), other("scenarios", vec![4, 5], "g")] {
+        complete(&other);
+        for table in ["results.parquet", "timings.parquet"] {
+            let file = own.path().join(table);
+            let before = fs::read(&file).unwrap();
+            fs::copy(other.path().join(table), &file).unwrap();
+            let refused = own.results::<String>().and_then(|_| own.timings::<String>());
+            let refused = refused.unwrap_err();
+            assert!(refused.cause().contains("another sweep"), "{refused}");
+            assert!(refused.remedy().contains("delete `results.parquet`"), "{refused}");
+            fs::write(&file, before).unwrap();
+        }
+    }
+    own.results::<String>().and_then(|_| own.timings::<String>()).unwrap();
+    let (other, share) = (other("share", vec![4, 5], "g"), Share { index: 0, count: 1 });
+    let journal = other.journal(share, |_: u32| ()).unwrap().unwrap();
+    other.end_share(share, journal, &refs).unwrap();
+    let part = "shares/0-of-1.parquet";
+    fs::copy(other.path().join(part), own.path().join(part)).unwrap();
+    let refused = own.parts(|_: WholeTable<String>| panic!("a foreign part")).unwrap_err();
+    assert!(refused.cause().contains("another sweep"), "{refused}");
 }
 
 #[test]

@@ -36,6 +36,19 @@ pub struct Baseline {
     pub alone: usize,
 }
 
+impl Baseline {
+    /// Checks that it compares so many variants with each other, and with no others.
+    pub(super) fn check(&self, variants: usize) -> Result<(), String> {
+        if self.of.len() != variants {
+            return Err(format!("a baseline of {} variants, of {variants}", self.of.len()));
+        }
+        match self.of.iter().flatten().find(|k| **k as usize >= variants) {
+            Some(k) => Err(format!("variant {k} is a baseline, and there are {variants} variants")),
+            None => Ok(()),
+        }
+    }
+}
+
 /// The variants, and what is asked of the baseline.
 pub(super) struct Search<'a> {
     pub(super) wanted: &'a Wanted,

@@ -34,10 +34,11 @@ impl Sweep {
     ///
     /// # Errors
     /// When a largest number of runs is given, and no precision ends the sweep; when something is varied that
-    /// no sweep can vary.
+    /// no sweep can vary; when a key is set that the sweep varies.
     pub fn changed(mut self, changes: Changes) -> Result<Self, InputError> {
-        self.fixed.extend(changes.fixed);
         self.design.factors.extend(changes.factors);
+        changes.fixed.iter().try_for_each(|setting| self.check_fixed(setting))?;
+        self.fixed.extend(changes.fixed);
         if let Some(until) = changes.until {
             // It replaces the precision alone; the other keys of the file's `until` stay.
             let metrics = self.until.take().map(|of_file| of_file.metrics);
@@ -62,6 +63,16 @@ impl Sweep {
         Ok(self)
     }
 
+    /// Refuses a setting for all variants of a key that variants set for themselves: it would have no effect on them.
+    fn check_fixed(&self, Setting { key, value }: &Setting) -> Result<(), InputError> {
+        let Some(varied) = self.design.keys().find(|varied| is_within(key, varied)) else {
+            return Ok(());
+        };
+        let remedy = "leave it out, or take the key out of the sweep: what a variant says counts";
+        let cause = format!("`{varied}` is varied by the sweep");
+        Err(InputError::new(format!("{key} = {value}"), cause, remedy))
+    }
+
     /// Sets the metrics to report, which the precision applies to as well if it names none.
     fn measure(&mut self, metrics: Vec<String>) {
         let is_asked = !metrics.is_empty();
@@ -72,5 +83,50 @@ impl Sweep {
         if let Some(until) = self.until.as_mut().filter(|until| applies_to(until)) {
             until.metrics.clone_from(&self.metrics);
         }
+    }
+}
+
+/// Whether a key is this one, or lies below it. A table that stands alone in an array needs no index: `robots.count` may
+/// be `robots.0.count`.
+fn is_within(key: &str, above: &str) -> bool {
+    let parts = |key: &str| key.split('.').filter(|part| *part != "0").map(String::from).collect();
+    let [key, above]: [Vec<String>; 2] = [key, above].map(parts);
+    key.starts_with(&above)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::Source;
+
+    #[test]
+    fn a_key_that_the_sweep_varies_is_not_set_for_all_variants() {
+        let text = "format = 1\nscenario = \"s.toml\"\n[set]\nregime = \"both\"\n\
+                    [vary]\na.b = [1, 2]\n[[variant]]\nc = 3\n[[variant]]\nname = \"plain\"\n\
+                    [latin_hypercube]\nsamples = 2\nrange.d.e = { low = 1, high = 2 }\n";
+        let sweep = Sweep::parse(&Source::new("sweep.toml", text, "dir")).expect("valid");
+        let fixed = |text: &str| Changes {
+            fixed: vec![Setting::parse(text).expect("a setting")],
+            ..Changes::default()
+        };
+        for (setting, varied) in [
+            ("a.b=3", "a.b"),
+            ("a.b.x=3", "a.b"),
+            ("a.0.b=3", "a.b"),
+            ("c=4", "c"),
+            ("d.e=1.5", "d.e"),
+        ] {
+            let error = sweep.clone().changed(fixed(setting)).expect_err(setting);
+            assert_eq!(error.cause(), format!("`{varied}` is varied by the sweep"));
+        }
+        for setting in ["a.bc=3", "a.c=3", "regime=\"sensors\"", "cycles=7"] {
+            sweep.clone().changed(fixed(setting)).expect(setting);
+        }
+        let both = Changes {
+            factors: vec![Factor::parse("cycles=1,2").expect("a factor")],
+            ..fixed("cycles=7")
+        };
+        let error = sweep.changed(both).expect_err("set and varied");
+        assert_eq!(error.cause(), "`cycles` is varied by the sweep");
     }
 }

@@ -194,6 +194,13 @@ impl Design {
 }
 
 impl Design {
+    /// Returns all keys that variants set, some of them more than once.
+    pub(super) fn keys(&self) -> impl Iterator<Item = &str> {
+        let listed = self.list.iter().flat_map(|v| &v.settings).map(|s| &s.key);
+        let ranges = self.hypercube.iter().flat_map(|h| &h.ranges).map(|r| &r.key);
+        listed.chain(ranges).chain(self.factors.iter().map(|f| &f.key)).map(String::as_str)
+    }
+
     /// Checks that nothing is requested twice. Samples of a hypercube may coincide, because whole
     /// numbers are few.
     fn check_different(&self) -> Result<(), String> {

@@ -60,6 +60,16 @@ pub struct Until {
     pub metrics: Vec<String>,
 }
 
+impl Until {
+    /// Checks that the half width is one that an interval can have.
+    pub(super) fn check(&self) -> Result<(), String> {
+        match self.half_width > 0.0 && self.half_width.is_finite() {
+            true => Ok(()),
+            false => Err(format!("a precision of {}", self.half_width)),
+        }
+    }
+}
+
 /// Parses `ci=0.05`, a share of the mean, or `abs=2.5`, in the metric's unit.
 impl FromStr for Until {
     type Err = String;
@@ -75,8 +85,9 @@ impl FromStr for Until {
             "abs" => false,
             _ => return Err(wrong()),
         };
-        let is_right = half_width > 0.0 && half_width.is_finite();
-        is_right.then_some(Self { half_width, is_relative, metrics: Vec::new() }).ok_or_else(wrong)
+        let until = Self { half_width, is_relative, metrics: Vec::new() };
+        until.check().map_err(|_| wrong())?;
+        Ok(until)
     }
 }
 
@@ -275,11 +286,7 @@ impl Sweep {
     /// # Errors
     /// When seeds are varied as if they were a parameter.
     pub fn check(&self) -> Result<(), InputError> {
-        let design = &self.design;
-        let listed =
-            design.list.iter().flat_map(|v| &v.settings).chain(&self.fixed).map(|s| &s.key);
-        let ranges = design.hypercube.iter().flat_map(|h| &h.ranges).map(|r| &r.key);
-        let mut keys = listed.chain(ranges).chain(design.factors.iter().map(|f| &f.key));
+        let mut keys = self.design.keys().chain(self.fixed.iter().map(|s| s.key.as_str()));
         if keys.any(|key| key == "seed") {
             let cause = "`seed` is set: each variant is run with the same seeds";
             let remedy = "give `replicates` and `first_seed` instead";
@@ -417,11 +424,10 @@ impl Reader<'_> {
                 return Err(self.source.error(Some(section.span()), "no single precision", remedy));
             }
         };
-        if !(half_width > 0.0 && half_width.is_finite()) {
-            let cause = format!("a precision of {half_width}");
-            return Err(self.source.error(Some(section.span()), cause, "give a number above 0"));
-        }
-        Ok(Until { half_width, is_relative, metrics: metrics.clone() })
+        let until = Until { half_width, is_relative, metrics: metrics.clone() };
+        let wrong = |cause| self.source.error(Some(section.span()), cause, "give a number above 0");
+        until.check().map_err(wrong)?;
+        Ok(until)
     }
 
     fn count(&self, n: u64, span: Range<usize>, key: &str) -> Result<u32, InputError> {

@@ -4,7 +4,8 @@ use super::baseline::{Baseline, Search};
 use super::file::{Sweep, Until};
 use super::variant::{Base, Setting, Variant};
 use crate::scenario::Seeds;
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use sidestep_kernel::InputError;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -15,7 +16,10 @@ use std::str::FromStr;
 /// A cell has the number `variant * replicates + replicate`, so rows sorted by cell are sorted by
 /// variant. Cells are run replicate by replicate, so that the first results are a small complete
 /// experiment.
+///
+/// A plan that is read back is checked ([`Plan::check`]): everybody else may believe it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(remote = "Self")]
 pub struct Plan {
     /// Name of the sweep; may be empty.
     pub name: String,
@@ -44,6 +48,20 @@ pub struct Plan {
 /// Largest number of runs of a sweep: joining a table of ten million takes some gigabytes.
 const MOST_RUNS: u64 = 10_000_000;
 
+impl Serialize for Plan {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        Self::serialize(self, to)
+    }
+}
+
+impl<'de> Deserialize<'de> for Plan {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let plan = Self::deserialize(from)?;
+        plan.check().map_err(D::Error::custom)?;
+        Ok(plan)
+    }
+}
+
 /// The unit of work: a variant with a seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Cell {
@@ -70,11 +88,8 @@ impl Plan {
             }
         }
         let first_seed = sweep.first_seed.unwrap_or(base.seed);
-        let last = first_seed.checked_add(u64::from(sweep.replicates));
-        if last.is_none_or(|last| last > i64::MAX as u64) {
-            let cause = format!("{} seeds from {first_seed} on run over", sweep.replicates);
-            return Err(InputError::new(&sweep.place, cause, "begin with a smaller seed"));
-        }
+        check_seeds(first_seed, sweep.replicates.into())
+            .map_err(|cause| InputError::new(&sweep.place, cause, "begin with a smaller seed"))?;
         let mut plan = Self {
             name: sweep.name.clone(),
             world: base.world.into(),
@@ -102,6 +117,24 @@ impl Plan {
             place: &sweep.place,
         };
         search.found(|k| self.names().swap_remove(k), |setting| self.word(setting))
+    }
+
+    /// Checks that the parts of the plan fit together, as they do in every plan that [`Plan::new`] makes.
+    ///
+    /// # Errors
+    /// What does not fit, in words.
+    pub fn check(&self) -> Result<(), String> {
+        let (variants, replicates) = (self.variants.len(), u64::from(self.replicates));
+        if variants == 0 || replicates == 0 {
+            return Err(format!("a plan of {variants} variants with {replicates} runs each"));
+        }
+        if (variants as u64).checked_mul(replicates).is_none_or(|runs| runs > MOST_RUNS) {
+            return Err(format!("{variants} variants with {replicates} runs each are too many"));
+        }
+        check_seeds(self.first_seed, replicates)?;
+        self.until.iter().try_for_each(Until::check)?;
+        self.variants.iter().try_for_each(|variant| variant.check(&self.parameters))?;
+        self.baseline.iter().try_for_each(|baseline| baseline.check(variants))
     }
 
     /// Returns the names of the variants in tables and figures: their parameters, in short
@@ -190,6 +223,17 @@ impl Plan {
             .flat_map(move |replicate| (0..variants).map(move |v| self.cell(v, replicate)));
         let cells = cells.filter(|c| c.replicate < self.runs_of(c.variant));
         cells.filter(move |c| (u64::from(c.variant) + u64::from(c.replicate)) % count == index)
+    }
+}
+
+/// Checks that runs with seeds from `first` on have seeds that scenarios can have, up to 2^63 - 1.
+///
+/// # Errors
+/// What is wrong, in words.
+pub fn check_seeds(first: u64, runs: u64) -> Result<(), String> {
+    match first.checked_add(runs.saturating_sub(1)).is_some_and(|last| last <= i64::MAX as u64) {
+        true => Ok(()),
+        false => Err(format!("{runs} seeds from {first} on run over")),
     }
 }
 

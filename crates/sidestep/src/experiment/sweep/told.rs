@@ -45,8 +45,8 @@ impl Plan {
 
 /// Returns the baseline by the names of variants.
 fn against(baseline: &Baseline, names: &[String]) -> Against {
-    let pair =
-        |(k, of): (usize, &Option<u32>)| Some((names[k].clone(), names[(*of)? as usize].clone()));
+    let name = |k: usize| names.get(k).cloned();
+    let pair = |(k, of): (usize, &Option<u32>)| Some((name(k)?, name((*of)? as usize)?));
     let of = baseline.of.iter().enumerate().filter_map(pair).collect();
     Against::Matched { name: baseline.name.clone(), of, alone: baseline.alone }
 }

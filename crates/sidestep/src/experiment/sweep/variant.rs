@@ -91,6 +91,18 @@ impl Variant {
         Self { name: Some(name.into()), named: settings.len(), ..settings.into() }
     }
 
+    /// Checks that it sets nothing but these parameters, and has the settings that its name stands for.
+    pub(super) fn check(&self, parameters: &[String]) -> Result<(), String> {
+        let Self { named, settings, .. } = self;
+        if let Some(Setting { key, .. }) = settings.iter().find(|s| !parameters.contains(&s.key)) {
+            return Err(format!("a variant sets `{key}`, which is no parameter of the plan"));
+        }
+        match *named <= settings.len() {
+            true => Ok(()),
+            false => Err(format!("a name stands for {named} of {} settings", settings.len())),
+        }
+    }
+
     /// Returns the value of a parameter, if this variant sets it.
     pub fn value(&self, key: &str) -> Option<&Value> {
         self.settings.iter().find(|s| s.key == key).map(|s| &s.value)

@@ -31,8 +31,11 @@ pub struct Comparison {
     pub limit: f64,
     /// See [`SIGNIFICANCE`].
     pub significance: f64,
-    /// Whether the total variation is within the limit.
-    pub agrees: bool,
+    /// Number of runs from which on a simulator could be found to disagree: the limit is below 1 then, which no total
+    /// variation exceeds.
+    pub runs_to_tell: u64,
+    /// Whether the total variation is within the limit; none where the runs are too few to tell.
+    pub agrees: Option<bool>,
 }
 
 /// Runs the scenario's robot `runs` times for `cycles` cycles from its start under `policy`
@@ -76,8 +79,11 @@ impl Comparison {
         let observed: Vec<f64> = poses.iter().map(share).collect();
         let total_variation = total_variation(&expected, &observed);
         let limit = sampling_limit(&expected, f64::from(runs), SIGNIFICANCE);
-        let agrees = total_variation <= limit;
-        Self { cycles, runs, total_variation, limit, significance: SIGNIFICANCE, agrees }
+        // The limit falls with the square root of the number of runs.
+        let runs_to_tell = (limit * limit * f64::from(runs)).floor() as u64 + 1;
+        let agrees = (limit < 1.0).then_some(total_variation <= limit);
+        let significance = SIGNIFICANCE;
+        Self { cycles, runs, total_variation, limit, significance, runs_to_tell, agrees }
     }
 }
 

@@ -28,6 +28,9 @@ use serde::Serialize;
 
 use sidestep_kernel::InputError;
 
+/// Greatest number that is added to a count: beside a larger one no count counts, and sums of rows run over.
+pub const MOST_ALPHA: f64 = 1e9;
+
 /// The rule by which counts become probabilities.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EstimateOptions {
@@ -51,11 +54,12 @@ impl EstimateOptions {
     /// Checks that the options are valid.
     ///
     /// # Errors
-    /// When `alpha` is negative or not finite, or `hold_out_every` is below 2.
+    /// When `alpha` is negative or above [`MOST_ALPHA`], or `hold_out_every` is below 2.
     pub fn check(&self) -> Result<(), InputError> {
-        if !(self.alpha.is_finite() && self.alpha >= 0.0) {
-            let cause = format!("{} cannot be added to a count", self.alpha);
-            return Err(InputError::new("alpha", cause, "give a number from 0, such as 0.5"));
+        if !(0.0..=MOST_ALPHA).contains(&self.alpha) {
+            let cause = format!("{:?} cannot be added to a count", self.alpha);
+            let remedy = format!("give a number from 0 to {MOST_ALPHA}, such as 0.5");
+            return Err(InputError::new("alpha", cause, remedy));
         }
         if self.hold_out_every < 2 {
             let cause = format!("holding out every {}th event leaves none", self.hold_out_every);
@@ -74,6 +78,7 @@ mod tests {
         let refused = [
             EstimateOptions { alpha: -0.1, ..Default::default() },
             EstimateOptions { alpha: f64::NAN, ..Default::default() },
+            EstimateOptions { alpha: 1e308, ..Default::default() },
             EstimateOptions { hold_out_every: 1, ..Default::default() },
         ];
         assert!(refused.iter().all(|options| options.check().is_err()));
