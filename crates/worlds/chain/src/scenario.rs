@@ -12,6 +12,8 @@ mod obstacles;
 mod recipe;
 mod starts;
 mod tasks;
+#[cfg(test)]
+mod tests;
 
 use super::deploy::kind::Deployment;
 use super::ground::{Movers, Site};

@@ -1,0 +1,40 @@
+//! Scenarios that are refused, and those that look much like them and are valid.
+
+use super::*;
+
+/// Two links that a fixed joint holds together, and a third that turns.
+const WRIST: &str = "<robot name='wrist'><link name='base'/><link name='post'/><link name='hand'/><link name='tool'/>\
+    <joint name='mount' type='fixed'><parent link='base'/><child link='post'/><origin xyz='0.5 0 0'/></joint>\
+    <joint name='turn' type='continuous'><parent link='post'/><child link='hand'/><axis xyz='0 0 1'/></joint>\
+    <joint name='grip' type='fixed'><parent link='hand'/><child link='tool'/><origin xyz='0.5 0 0'/></joint></robot>";
+
+/// Returns the error of a scenario, in one line; none if it is valid.
+fn error_of(text: &str) -> Option<String> {
+    let text = format!("format = 1\nworld = \"chain\"\n{text}");
+    let error = AnyCompiled::new(&Source::new("s.toml", text, "")).err()?;
+    Some(format!("{} | {}", error.cause(), error.remedy()))
+}
+
+fn assert_refused(text: &str, words: &[&str]) {
+    let error = error_of(text).unwrap_or_else(|| panic!("is taken for valid:\n{text}"));
+    assert!(words.iter().all(|word| error.contains(word)), "{error}, not {words:?}:\n{text}");
+}
+
+fn assert_valid(text: &str) {
+    assert_eq!(error_of(text), None, "{text}");
+}
+
+fn arm(keys: &str) -> String {
+    format!(
+        "[chain]\ndimensions = 3\n[[chains]]\narm = {{ urdf_text = \"{WRIST}\", {keys} }}\nradius_m = 0.02\n\
+         [[chains.tasks]]\nkind = \"wander\"\nconnector = 1\n"
+    )
+}
+
+#[test]
+fn an_arm_without_a_joint_that_moves_is_refused() {
+    let words = ["nothing moves between", "name another base or another tip"];
+    assert_refused(&arm("base = \"base\", tip = \"post\""), &words);
+    assert_refused(&arm("base = \"hand\""), &words);
+    assert_valid(&arm("base = \"base\""));
+}
