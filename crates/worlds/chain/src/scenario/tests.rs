@@ -38,3 +38,21 @@ fn an_arm_without_a_joint_that_moves_is_refused() {
     assert_refused(&arm("base = \"hand\""), &words);
     assert_valid(&arm("base = \"base\""));
 }
+
+#[test]
+fn numbers_of_a_navigator_are_numbers_and_in_order() {
+    let navigator = |keys: &str| {
+        format!(
+            "[[chains]]\nconnectors = 3\nrod_m = 0.8\n[[chains.tasks]]\nkind = \"navigate\"\n\
+             navigator = {{ target_m = [9.0, 0.0], {keys} }}\n"
+        )
+    };
+    for keys in ["sector_deg = [nan, nan]", "sector_deg = [nan, 90]", "sector_deg = [-inf, 90]"] {
+        assert_refused(&navigator(keys), &["-360 to 360"]);
+    }
+    assert_refused(&navigator("sector_deg = [90, 10]"), &["the right end of the sector first"]);
+    for keys in ["detects_from_m = nan", "detects_from_m = -3.0", "detects_from_m = 0.0"] {
+        assert_refused(&navigator(keys), &["a number above 0, or inf"]);
+    }
+    assert_valid(&navigator("sector_deg = [0, 90], detects_from_m = inf"));
+}
