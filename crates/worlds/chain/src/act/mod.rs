@@ -21,6 +21,8 @@ mod measure;
 mod obey;
 mod plan;
 mod talk;
+#[cfg(test)]
+mod tests;
 mod wheels;
 
 use super::driver::Task;
