@@ -270,6 +270,7 @@ fn told(event: &Event) -> (Level, &'static str, String) {
         EventKind::Target => (Level::Info, "", format!("has reached target {value}")),
         EventKind::Done => (Level::Info, "", format!("has done task {value}")),
         EventKind::GivenUp => (Level::Warning, "", format!("has given up task {value}")),
+        EventKind::TargetGivenUp => (Level::Warning, "", format!("has given up target {value}")),
         EventKind::Planned => (Level::Info, "", format!("follows a plan of {value} pieces")),
         EventKind::NotPlanned => (Level::Warning, "", format!("has no plan to target {value}")),
         EventKind::Unheard => {

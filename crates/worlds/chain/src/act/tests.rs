@@ -19,6 +19,25 @@ fn run(text: &str) -> ChainRun<2> {
     Compiled::new(&source).unwrap_or_else(|error| panic!("{error}")).start(&source, 1)
 }
 
+/// Advances a run; returns the names and values of its events.
+fn told(run: &mut ChainRun<2>, cycles: u64) -> Vec<(String, f64)> {
+    run.begin_recording();
+    let mut rows = MemoryRecorder::new(&run.schemas());
+    while run.cycle() < cycles && !run.is_over() {
+        run.advance(1);
+        run.record(&mut rows).expect("memory has room");
+    }
+    rows.finish().expect("memory has room");
+    let Some(Values::Label(kinds)) = rows.column("events", "event") else { panic!("kinds") };
+    let Some(Values::F64(values)) = rows.column("events", "value") else { panic!("values") };
+    let name = |kind: &u32| EventKind::ALL[*kind as usize].name().to_owned();
+    kinds.iter().map(name).zip(values.iter().copied()).collect()
+}
+
+fn count(told: &[(String, f64)], kind: &str) -> usize {
+    told.iter().filter(|(of, _)| of == kind).count()
+}
+
 /// Two swarms, one of which cannot keep up with its connectors, cross at some angle.
 fn crossing(heading_deg: u32) -> String {
     format!(
@@ -43,4 +62,33 @@ fn robots_of_different_chains_never_overlap_however_far_they_lag() {
             assert!(least_m > -1e-9, "{heading_deg} deg, cycle {}: {least_m} m", run.cycle());
         }
     }
+}
+
+/// A chain whose last connector is held, on its way to places that are too far for it, and maybe to one that is not.
+fn held(targets_m: &str) -> String {
+    format!(
+        "seed = 1\ncycles = 2000\n[[chains]]\nconnectors = 3\nrod_m = 0.5\n\
+         limits = [{{ connector = 2, mobility = \"fixed\" }}]\n\
+         tasks = [{{ kind = \"targets\", targets_m = {targets_m}, planner = \"none\", patience_s = 1.0 }}]\n"
+    )
+}
+
+#[test]
+fn a_task_none_of_whose_targets_was_reached_is_given_up_and_not_done() {
+    let mut none = run(&held("[[10.0, 0.0], [0.0, 10.0]]"));
+    let events = told(&mut none, 2000);
+    let given_up: Vec<_> = events.iter().filter(|(kind, _)| kind.ends_with("given-up")).collect();
+    let expected = [("target-given-up", 0.0), ("target-given-up", 1.0), ("given-up", 0.0)];
+    assert_eq!(given_up.len(), 3, "{events:?}");
+    for (told, (kind, value)) in given_up.into_iter().zip(expected) {
+        assert_eq!((told.0.as_str(), told.1), (kind, value), "{events:?}");
+    }
+    let tally = none.world().metrics_of(none.state(), 0).tally;
+    assert!(none.is_over() && tally.done == 0 && count(&events, "done") == 0, "{events:?}");
+
+    let mut some = run(&held("[[10.0, 0.0], [-0.5, 0.5]]"));
+    let events = told(&mut some, 2000);
+    let tally = some.world().metrics_of(some.state(), 0).tally;
+    // The target and its task.
+    assert!(some.is_over() && tally.done == 2 && count(&events, "done") == 1, "{events:?}");
 }
