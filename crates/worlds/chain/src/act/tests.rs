@@ -92,3 +92,23 @@ fn a_task_none_of_whose_targets_was_reached_is_given_up_and_not_done() {
     // The target and its task.
     assert!(some.is_over() && tally.done == 2 && count(&events, "done") == 1, "{events:?}");
 }
+
+/// A chain that breaks, and is to be joined again, with more in the way.
+fn broken(joins_s: &str, by_m: f64, more: &str) -> String {
+    format!(
+        "seed = 3\ncycles = 1500\n{more}\n[[chains]]\nconnectors = 6\nrod_m = [0.4, 0.5]\n\
+         tasks = [{{ kind = \"rest\", lasts_s = 8.0 }}]\n\
+         changes = [{{ at_s = {joins_s}, reform = true }}, {{ at_s = 1.0, scatter = [1, 4], by_m = {by_m} }}]\n"
+    )
+}
+
+#[test]
+fn a_chain_that_breaks_in_a_cycle_can_be_joined_in_it_wherever_the_file_says_so() {
+    // Both are in cycle 50.
+    let mut run = run(&broken("1.005", 0.5, ""));
+    let events = told(&mut run, 1500);
+    let kinds: Vec<_> = events.iter().map(|(kind, _)| kind.as_str()).collect();
+    assert_eq!(&kinds[..2], ["broken", "reforming"], "{events:?}");
+    assert_eq!(count(&events, "reformed"), 1, "{events:?}");
+    assert!(run.is_over() && run.state().body(0).scattered.is_none());
+}

@@ -241,23 +241,28 @@ impl<const D: usize> Compiler<'_, D> {
     ) -> Result<Vec<Change<D>>, InputError> {
         let changes = s.changes.0.iter().map(|change| self.change(change, start, dt_s));
         let mut changes = changes.collect::<Result<Vec<_>, _>>()?;
-        changes.sort_by_key(|change| change.cycle);
+        // What breaks in a cycle can be joined in it, wherever the file says so.
+        let joins = |change: &Change<D>| matches!(change.what, What::Reform { .. });
+        changes.sort_by_key(|change| (change.cycle, joins(change)));
         let breaks = changes.iter().filter(|change| matches!(change.what, What::Scatter { .. }));
         if breaks.count() > 1 {
             let remedy = "let it break once";
             return Err(self.source.error(at, "a chain that breaks more than once", remedy));
         }
-        self.breaks_before_it_is_whole_again(s)?;
+        self.breaks_before_it_is_whole_again(s, dt_s)?;
         Ok(changes)
     }
 
-    /// Refuses to join what has not been broken by then.
-    fn breaks_before_it_is_whole_again(&self, s: &ChainSection<D>) -> Result<(), InputError> {
-        let broken_s =
-            s.changes.0.iter().filter_map(|change| change.get_ref().breaks_at_s()).next();
-        let is_early = |joins_s: f64| broken_s.is_none_or(|broken_s| joins_s < broken_s);
-        let joins_at_s = |change: &Spanned<ChangeSection<D>>| change.get_ref().joins_at_s();
-        match s.changes.0.iter().find(|change| joins_at_s(change).is_some_and(is_early)) {
+    /// Refuses to join what has not been broken by then, by the cycles in which both take effect.
+    fn breaks_before_it_is_whole_again(
+        &self,
+        s: &ChainSection<D>,
+        dt_s: f64,
+    ) -> Result<(), InputError> {
+        let broken = s.changes.0.iter().find_map(|change| change.get_ref().breaks_at(dt_s));
+        let is_early = |joins: u64| broken.is_none_or(|broken| joins < broken);
+        let joins_at = |change: &Spanned<ChangeSection<D>>| change.get_ref().joins_at(dt_s);
+        match s.changes.0.iter().find(|change| joins_at(change).is_some_and(is_early)) {
             None => Ok(()),
             Some(change) => {
                 let at = self.source.within(change.span(), &["reform"]);

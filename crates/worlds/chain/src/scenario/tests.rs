@@ -56,3 +56,17 @@ fn numbers_of_a_navigator_are_numbers_and_in_order() {
     }
     assert_valid(&navigator("sector_deg = [0, 90], detects_from_m = inf"));
 }
+
+#[test]
+fn a_chain_that_is_whole_is_not_joined() {
+    let chain = |breaks_s: f64, joins_s: f64| {
+        format!(
+            "[[chains]]\nconnectors = 6\nrod_m = 0.5\ntasks = [{{ kind = \"rest\" }}]\n\
+             changes = [{{ at_s = {joins_s}, reform = true }}, {{ at_s = {breaks_s}, scatter = [2, 3] }}]\n"
+        )
+    };
+    // Cycles are rounded, of 0.02 s.
+    assert_refused(&chain(1.0, 0.985), &["reform of a chain that is whole"]);
+    assert_valid(&chain(1.0, 1.0));
+    assert_valid(&chain(1.005, 1.0));
+}
