@@ -46,6 +46,16 @@ const MAX_STEPS: f64 = 1e5;
 /// Most connectors of all chains together: some 3 GB.
 const MAX_CONNECTORS: usize = 10_000_000;
 
+/// Everything that is there when the chains of a section are placed.
+#[derive(Clone, Copy)]
+struct Around<'a, const D: usize> {
+    site: Option<&'a Site>,
+    /// The number of the section.
+    number: u32,
+    /// The chains of the sections before.
+    placed: &'a [ChainSpec<D>],
+}
+
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "ChainSection")]
@@ -109,8 +119,8 @@ impl<const D: usize> Compiler<'_, D> {
     ) -> Result<Vec<ChainSpec<D>>, InputError> {
         self.check_total()?;
         let mut all = Vec::new();
-        for section in &self.file.chains.0 {
-            let spec = self.chain(section, dt_s, site)?;
+        for (number, section) in (0..).zip(&self.file.chains.0) {
+            let spec = self.chain(section, dt_s, Around { site, number, placed: &all })?;
             for copy in 0..section.get_ref().count {
                 all.push(self.copied(&spec, section, copy)?);
             }
@@ -172,10 +182,12 @@ impl<const D: usize> Compiler<'_, D> {
         &self,
         section: &Spanned<ChainSection<D>>,
         dt_s: f64,
-        site: Option<&Site>,
+        around: Around<D>,
     ) -> Result<ChainSpec<D>, InputError> {
         let (s, at) = (section.get_ref(), section.span());
-        let (start, arm) = self.shape(s, site, at.clone())?;
+        let apart = [("apart_m", s.apart_m.is_some(), s.count != 1)];
+        self.has_no_idle_key(&apart, "without count = 2 or more", at.clone())?;
+        let (start, arm) = self.shape(s, around, at.clone())?;
         let tasks = self.tasks(s, &start, at.clone())?;
         if let Some(arm) = &arm {
             let sections = s.tasks.0.iter().zip(&tasks);
@@ -314,7 +326,7 @@ impl<const D: usize> Compiler<'_, D> {
     fn shape(
         &self,
         s: &ChainSection<D>,
-        site: Option<&Site>,
+        around: Around<D>,
         at: Range<usize>,
     ) -> Result<(Chain<D>, Option<Arc<Arm>>), InputError> {
         let radius_m = self.radius_m(s, at.clone())?;
@@ -331,7 +343,7 @@ impl<const D: usize> Compiler<'_, D> {
             ));
         }
         let points = match s.anywhere {
-            true => self.anywhere(s, &rod, radius_m, site, at.clone())?,
+            true => self.anywhere(s, &rod, radius_m, around, at.clone())?,
             false => self.points(s, rod.max_m, at.clone())?,
         };
         let mut connectors = vec![Connector::free(radius_m); points.len()];
@@ -456,7 +468,7 @@ impl<const D: usize> Compiler<'_, D> {
         s: &ChainSection<D>,
         rod: &Rod,
         radius_m: f64,
-        site: Option<&Site>,
+        Around { site, number, placed }: Around<D>,
         at: Range<usize>,
     ) -> Result<Vec<Point<D>>, InputError> {
         let (Some(site), Some(connectors)) = (site, s.connectors) else {
@@ -471,8 +483,9 @@ impl<const D: usize> Compiler<'_, D> {
             let at = self.source.within(at, &keys);
             return Err(self.source.error(at, "a chain placed in two ways", remedy));
         }
-        let obstacles = Obstacles::new(site.obstacles(0), rod.max_m.max(1e-3))
+        let obstacles = Obstacles::new(self.in_the_way(Some(site), placed)?, rod.max_m.max(1e-3))
             .map_err(|error| self.source.error_of(at.clone(), &error))?;
+        let obstacles = obstacles.in_plane().expect("only worlds in the plane have a ground");
         let wanted = Wanted {
             connectors,
             spacing_m: rod.max_m,
@@ -481,7 +494,7 @@ impl<const D: usize> Compiler<'_, D> {
             ahead_m: rod.max_m,
             within: s.within_m.as_ref().map(|within| within.get_ref().in_the_plane()),
         };
-        let start = find(site, &obstacles, &wanted, Seed(self.head.seed))
+        let start = find(site, obstacles, &wanted, (Seed(self.head.seed), number))
             .map_err(|error| self.source.error_of(at, &error))?;
         Ok(start.points.iter().map(|p| std::array::from_fn(|i| p[i])).collect())
     }

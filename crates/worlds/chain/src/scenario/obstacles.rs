@@ -5,7 +5,7 @@ use super::super::ground::{Corridor, Course, Leg, Mover, Movers, Site};
 use super::super::rods::chain::Chain;
 use super::super::rods::geometry::{Bounds, Core, Cuboid, Point};
 use super::super::rods::obstacle::{Obstacle, Obstacles, outline};
-use super::super::world::ChainSpec;
+use super::super::world::{ChainSpec, push_parts};
 use super::{Compiler, MOST, Measure, Place};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -137,14 +137,7 @@ impl<const D: usize> Compiler<'_, D> {
         site: Option<&Site>,
         chains: &[ChainSpec<D>],
     ) -> Result<Ground<D>, InputError> {
-        let mut all = Gathered { still: Vec::new(), movers: Vec::new(), next_id: 0 };
-        self.add_corridor(&mut all)?;
-        if let Some(site) = site {
-            all.add_still(site.obstacles(0).iter().map(lifted));
-        }
-        for section in &self.file.obstacles.0 {
-            self.add_obstacle(section, &mut all)?;
-        }
+        let mut all = self.given(site)?;
         for (k, section) in (0..).zip(&self.file.fields.0) {
             self.add_field(section, k, chains, &mut all)?;
         }
@@ -162,6 +155,32 @@ impl<const D: usize> Compiler<'_, D> {
             obstacles: Obstacles::new(all.still, reach_m).map_err(told)?,
             movers: Movers::new(all.movers).map_err(told)?,
         })
+    }
+
+    /// Returns all obstacles but those at random places, which keep away from chains.
+    fn given(&self, site: Option<&Site>) -> Result<Gathered<D>, InputError> {
+        let mut all = Gathered { still: Vec::new(), movers: Vec::new(), next_id: 0 };
+        self.add_corridor(&mut all)?;
+        if let Some(site) = site {
+            all.add_still(site.obstacles(0).iter().map(lifted));
+        }
+        for section in &self.file.obstacles.0 {
+            self.add_obstacle(section, &mut all)?;
+        }
+        Ok(all)
+    }
+
+    /// Returns what a chain has to be placed between: all obstacles but those at random places, where they are at the
+    /// start, and the parts of the chains that are placed already.
+    pub(super) fn in_the_way(
+        &self,
+        site: Option<&Site>,
+        placed: &[ChainSpec<D>],
+    ) -> Result<Vec<Obstacle<D>>, InputError> {
+        let Gathered { still: mut all, movers, .. } = self.given(site)?;
+        all.extend(movers.iter().map(|mover| mover.at(0.0)));
+        (0..).zip(placed).for_each(|(slot, spec)| push_parts(&mut all, slot, &spec.start));
+        Ok(all)
     }
 
     /// Returns the floors of a map or of a Stage world, if the scenario names one.

@@ -57,6 +57,41 @@ fn numbers_of_a_navigator_are_numbers_and_in_order() {
     assert_valid(&navigator("sector_deg = [0, 90], detects_from_m = inf"));
 }
 
+/// Two chains anywhere on a map.
+fn anywhere(second: &str) -> String {
+    let chain = "[[chains]]\nconnectors = 3\nrod_m = 0.4\nradius_m = 0.1\nanywhere = true\n";
+    let task = "[[chains.tasks]]\nkind = \"wander\"\n";
+    format!(
+        "format = 1\nworld = \"chain\"\nseed = 1\n[ground]\nmap = \"examples/building.yaml\"\n\
+         {chain}{task}{chain}{second}{task}"
+    )
+}
+
+fn starts(text: &str, seed: u64) -> Vec<Vec<[f64; 2]>> {
+    let text = text.replace("seed = 1", &format!("seed = {seed}"));
+    let source = Source::new("s.toml", text, sidestep_testing::root());
+    let compiled = Compiled::<2>::new(&source).unwrap_or_else(|error| panic!("{seed}: {error}"));
+    compiled.world.chains.iter().map(|spec| spec.start.points().to_vec()).collect()
+}
+
+#[test]
+fn chains_anywhere_have_places_of_their_own_beside_each_other_and_beside_obstacles() {
+    let alone = anywhere("");
+    for seed in 1..=10 {
+        let [a, b] = &starts(&alone, seed)[..] else { panic!("two chains") };
+        assert_ne!(a, b, "{seed}");
+    }
+    // A room that only just holds both, and a pillar in it.
+    let within = "within_m = [[0.3, 0.3], [2.5, 2.5]]\n";
+    let pillar = "[[obstacles]]\nat_m = [1.2, 1.2]\nradius_m = 0.2\n[[chains]]";
+    let cramped =
+        anywhere(within).replacen("anywhere = true\n", &format!("anywhere = true\n{within}"), 1);
+    let cramped = cramped.replacen("[[chains]]", pillar, 1);
+    for seed in 1..=10 {
+        assert_eq!(starts(&cramped, seed).len(), 2);
+    }
+}
+
 #[test]
 fn a_chain_that_is_whole_is_not_joined() {
     let chain = |breaks_s: f64, joins_s: f64| {
