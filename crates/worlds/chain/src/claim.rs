@@ -46,8 +46,11 @@ fn reach<const D: usize>(
         }
     };
     let thrown_m = spec.changes.iter().map(|change| change.throws_m(now)).fold(0.0, f64::max);
-    let back_m = body.scattered.as_ref().map_or(0.0, |s| s.speed_m_s * world.dt_s);
-    let of_chain = Bounds::of(chain.points()).grown(radius_m + way_m + thrown_m + back_m);
+    let back_m_s = body.scattered.as_ref().map_or(0.0, |s| s.speed_m_s);
+    let back_m_s =
+        spec.changes.iter().map(|change| change.gathers_m_s(now)).fold(back_m_s, f64::max);
+    let of_chain =
+        Bounds::of(chain.points()).grown(radius_m + way_m + thrown_m + back_m_s * world.dt_s);
     of_chain.joined(&reach_of_robots(spec, body, world.dt_s))
 }
 

@@ -39,8 +39,8 @@ pub enum EventKind {
     /// The gap between the whole ends is longer than the parts; the value is the missing length in
     /// meters.
     GapTooLong,
-    /// No places were found where the scattered parts are joined; the value is the error of the
-    /// worst rod, in meters.
+    /// No places were found where the scattered parts are joined, or something was in their way for too long; the value
+    /// is the error of the worst rod, in meters.
     NotReformed,
     /// A target has been reached; the value is its number.
     Target,

@@ -265,7 +265,7 @@ fn told(event: &Event) -> (Level, &'static str, String) {
         EventKind::Reformed => (Level::Info, NO_VALUE, "is joined again".into()),
         EventKind::GapTooLong => (Level::Warning, "m", gap_in_words(value, event.missing)),
         EventKind::NotReformed => {
-            (Level::Warning, "m", format!("cannot be joined, off by {value:.3} m"))
+            (Level::Warning, "m", format!("cannot be joined, off by {value:.3} m{because}"))
         }
         EventKind::Target => (Level::Info, "", format!("has reached target {value}")),
         EventKind::Done => (Level::Info, "", format!("has done task {value}")),
