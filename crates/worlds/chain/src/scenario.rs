@@ -214,7 +214,7 @@ struct RulesSection {
     backtracks: Option<usize>,
     look_m: Option<Measure>,
     escape: EscapeWord,
-    escape_by: Method,
+    escape_by: Option<Method>,
     escape_speed_m_s: Option<Measure>,
     escape_ahead_s: Option<Measure>,
     may_start_inside: bool,
@@ -423,7 +423,7 @@ impl<const D: usize> Compiler<'_, D> {
         let ahead_s = section.escape_ahead_s.map_or(usual.ticks_ahead * dt_s, f64::from);
         let looks_ahead = section.escape == EscapeWord::LookAhead;
         let ticks_ahead = if looks_ahead { ahead_s / dt_s } else { 0.0 };
-        Some(Escape { ticks_ahead, method: section.escape_by, ..usual })
+        Some(Escape { ticks_ahead, method: section.escape_by.unwrap_or_default(), ..usual })
     }
 
     /// Refuses keys of escapes that the kind of escape leaves without effect.

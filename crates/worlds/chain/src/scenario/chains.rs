@@ -396,11 +396,12 @@ impl<const D: usize> Compiler<'_, D> {
         at: Range<usize>,
     ) -> Result<(Chain<D>, Option<Arc<Arm>>), InputError> {
         let is_shaped = s.connectors.is_some() || s.points_m.is_some() || s.rod_m.is_some();
+        let is_shaped = is_shaped || s.folded_m.is_some();
         let is_turned = s.along.is_some() || s.heading_deg.is_some() || s.max_bend_deg.is_some();
         let is_turned = is_turned || s.anywhere || s.within_m.is_some() || s.robots.is_some();
         if D != 3 || is_shaped || is_turned || s.count != 1 {
             let remedy = "set chain.dimensions = 3, and leave out connectors, points_m, rod_m, \
-                          along, heading_deg, max_bend_deg, anywhere, robots and count";
+                          along, heading_deg, folded_m, max_bend_deg, anywhere, robots and count";
             let at = self.source.within(at, &BESIDE_ARMS);
             return Err(self.source.error(at, "an arm has its shape from its URDF file", remedy));
         }
@@ -512,6 +513,11 @@ impl<const D: usize> Compiler<'_, D> {
                 let at = self.source.within(at, &["points_m"]);
                 return Err(self.source.error(at, "a chain placed in two ways", remedy));
             }
+            let keys = [
+                ("along", s.along.is_some(), false),
+                ("heading_deg", s.heading_deg.is_some(), false),
+            ];
+            self.has_no_idle_key(&keys, "beside points_m", at.clone())?;
             if given.is_empty() {
                 let at = self.source.within(at, &["points_m"]);
                 return Err(self.source.error(at, "points_m = []", "give one point or more"));

@@ -24,8 +24,7 @@ pub(super) struct GroundSection {
     corridor: Option<Spanned<CorridorSection>>,
     /// A map of ROS (`.yaml`).
     map: Option<String>,
-    #[serde(default)]
-    unknown: UnknownWord,
+    unknown: Option<UnknownWord>,
     /// A world of Stage (`.world`).
     stage: Option<String>,
 }
@@ -199,7 +198,9 @@ impl<const D: usize> Compiler<'_, D> {
             let remedy = "set chain.dimensions = 2, or leave [ground] out";
             return Err(self.source.error(at, "a ground lies in the plane", remedy));
         }
-        let unknown = match s.unknown {
+        let unknown = [("unknown", s.unknown.is_some(), s.map.is_some())];
+        self.has_no_idle_key(&unknown, "without ground.map", at.clone())?;
+        let unknown = match s.unknown.unwrap_or_default() {
             UnknownWord::Solid => UnknownPolicy::Wall,
             UnknownWord::Free => UnknownPolicy::Free,
         };

@@ -105,3 +105,26 @@ fn a_chain_that_is_whole_is_not_joined() {
     assert_valid(&chain(1.0, 1.0));
     assert_valid(&chain(1.005, 1.0));
 }
+
+#[test]
+fn keys_that_have_no_effect_are_refused() {
+    let task = "tasks = [{ kind = \"rest\" }]\n";
+    let points = |key: &str| {
+        format!("[[chains]]\npoints_m = [[0.0, 0.0], [0.5, 0.0]]\nrod_m = 0.5\n{key}\n{task}")
+    };
+    assert_refused(&points("heading_deg = 90"), &["`heading_deg` does nothing", "points_m"]);
+    assert_refused(&points("along = [1.0, 0.0]"), &["`along` does nothing", "points_m"]);
+    assert_valid(&points(""));
+    let apart = |count: &str| {
+        format!("[[chains]]\nconnectors = 2\nrod_m = 0.5\napart_m = [0.0, 2.0]\n{count}\n{task}")
+    };
+    assert_refused(&apart(""), &["`apart_m` does nothing", "count"]);
+    assert_refused(&apart("count = 1"), &["`apart_m` does nothing", "count"]);
+    assert_valid(&apart("count = 2"));
+    let folded =
+        arm("base = \"base\"").replace("radius_m = 0.02", "radius_m = 0.02\nfolded_m = [1.0, 0.5]");
+    assert_refused(&folded, &["an arm has its shape from its URDF file", "folded_m"]);
+    let corridor = "[ground]\ncorridor = { width_m = 1.5 }\nunknown = \"free\"\n";
+    let chain = format!("[[chains]]\nconnectors = 2\nrod_m = 0.5\n{task}");
+    assert_refused(&format!("{corridor}{chain}"), &["`unknown` does nothing", "ground.map"]);
+}
