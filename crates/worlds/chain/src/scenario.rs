@@ -376,6 +376,7 @@ impl<const D: usize> Compiler<'_, D> {
         let radius_m = chains.iter().flat_map(|spec| spec.start.connectors()).map(|c| c.radius_m);
         let look_m = 4.0 * radius_m.fold(0.05, f64::max);
         let escape = self.escape(&chains, &ground.movers, dt_s);
+        self.check_escapes(&chains, escape.as_ref())?;
         let joint_speed_m_s = self.joint_speed_m_s(&chains);
         let slave_step_max_m = self.slave_step_max_m(&chains, &ground, escape.as_ref(), dt_s);
         let rules = Rules { slave_step_max_m, ..self.rules(joint_speed_m_s * dt_s) };

@@ -186,3 +186,79 @@ fn parts_that_come_back_stay_in_the_claim_of_their_chain_from_the_first_cycle_on
     assert!(claim.lo[1] <= -way_m && claim.hi[1] >= way_m, "{claim:?}: {way_m} m a cycle");
     assert!(body.chain.points().iter().all(|p| claim.lo[1] <= p[1] && p[1] <= claim.hi[1]));
 }
+
+/// A lift whose joint can bring its ends together, and a hinge on it.
+const LIFT: &str = "<robot name='lift'><link name='base'/><link name='c'/><link name='a'/><link name='b'/>\
+    <link name='tool'/>\
+    <joint name='lift' type='prismatic'><parent link='base'/><child link='c'/><axis xyz='0 0 1'/>\
+    <limit lower='0' upper='0.6' velocity='0.5'/></joint>\
+    <joint name='j1' type='revolute'><parent link='c'/><child link='a'/><axis xyz='0 0 1'/>\
+    <limit lower='-2.5' upper='2.5' velocity='3'/></joint>\
+    <joint name='j2' type='revolute'><parent link='a'/><child link='b'/><origin xyz='0.4 0 0'/><axis xyz='0 0 1'/>\
+    <limit lower='-2.5' upper='2.5' velocity='3'/></joint>\
+    <joint name='tip' type='fixed'><parent link='b'/><child link='tool'/><origin xyz='0.3 0 0'/></joint></robot>";
+
+fn lift(target_m: &str, more: &str) -> Compiled<3> {
+    let text = format!(
+        "format = 1\nworld = \"chain\"\nseed = 1\ncycles = 250\n[chain]\ndimensions = 3\n{more}\n[[chains]]\n\
+         arm = {{ urdf_text = \"{LIFT}\", joints = [0.3, 0.5, 0.5] }}\nradius_m = 0.03\n[[chains.tasks]]\n\
+         kind = \"targets\"\nconnector = 3\ntargets_m = [{target_m}]\nspeed_m_s = 0.3\n"
+    );
+    Compiled::new(&Text::new("s.toml", text, "")).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn a_joint_that_can_close_its_rod_does_not_shorten_the_steps_of_an_arm() {
+    let step_m = lift("[0.4, 0.3, 0.45]", "").world.chains[0].start.step_m();
+    assert!(step_m >= 0.005, "{step_m}");
+}
+
+/// A pole is in the way, so the arm has to plan.
+#[test]
+fn an_arm_whose_rod_can_close_plans_like_any_other() {
+    let pole = "[[obstacles]]\nends_m = [[0.5, -0.1, -1.0], [0.5, -0.1, 2.0]]\nradius_m = 0.08";
+    let compiled = lift("[0.35, -0.45, 0.3]", pole);
+    let mut run = compiled.start(&Text::new("s.toml", "", ""), 1);
+    run.advance(250);
+    let tally = run.world().metrics_of(run.state(), 0).tally;
+    assert!(tally.rungs.planned + tally.rungs.not_planned > 0, "{tally:?}");
+}
+
+/// A ball from which a chain flees at a speed of very many sub-steps.
+#[test]
+fn a_literal_escape_of_very_many_steps_is_refused() {
+    let text = |speed: &str, by: &str| {
+        format!(
+            "format = 1\nworld = \"chain\"\n[chain]\nstep_m = 0.001\nescape_speed_m_s = {speed}\nescape_by = \"{by}\"\n\
+             [[obstacles]]\nat_m = [9.0, 0.0]\nradius_m = 0.5\nvelocity_m_s = [-1.0, 0.0]\n\
+             [[chains]]\nconnectors = 3\nrod_m = 0.5\ntasks = [{{ kind = \"rest\" }}]\n"
+        )
+    };
+    let compiled = |text: String| Compiled::<2>::new(&Text::new("s.toml", text, ""));
+    let error = compiled(text("1e5", "literal")).expect_err("too many steps");
+    assert!(error.cause().contains("flee 2e3 m in a cycle"), "{error}");
+    assert!(
+        error.position().is_some() && error.remedy().contains("chain.escape_speed_m_s"),
+        "{error}"
+    );
+    compiled(text("1e5", "simultaneous")).expect("solved at once");
+    compiled(text("10.0", "literal")).expect("few steps");
+}
+
+#[test]
+fn a_motion_of_many_sub_steps_heeds_an_interrupt() {
+    let rod = Rod::fixed(0.5, 0.01);
+    let mut chain =
+        Chain::straight([0.0; 2], [-1.0, 0.0], 3, rod, Connector::free(0.05)).expect("a chain");
+    let ball = Obstacles::new(vec![Obstacle::ball(0, [0.0, 99.0], 0.1)], 1.0).expect("a ball");
+    let motion = Motion::Connector { k: 0, to: [2.0, 0.0] };
+    let request = Request { motion, source: Source::Autonomous, mode: Mode::Exact };
+    let interrupt = Interrupt::default();
+    interrupt.raise();
+    let moved = || {
+        let _heeded = interrupt.heeded_here();
+        Propagator::default().propagate(&mut chain, &ball, &request)
+    };
+    let payload = catch_unwind(AssertUnwindSafe(moved)).expect_err("it unwinds");
+    assert!(interrupt.explains(payload.as_ref()));
+}

@@ -5,6 +5,7 @@ use super::super::driver::{Driver, Task};
 use super::super::formation::Robots;
 use super::super::ground::Site;
 use super::super::ground::route::{Wanted, find};
+use super::super::motion::escape::{Escape, Method};
 use super::super::rods::chain::{Chain, Connector, Mobility, Rod};
 use super::super::rods::geometry::{Point, along, first_axis, perpendicular, unit};
 use super::super::rods::obstacle::Obstacles;
@@ -299,6 +300,29 @@ impl<const D: usize> Compiler<'_, D> {
         let remedy = "give a shorter chain.dt_s, a lower speed_m_s, larger connectors and rods, \
                       or a longer chain.step_m";
         Err(self.source.error(at, cause, remedy))
+    }
+
+    /// Refuses a speed of escapes that would take too many sub-steps: the literal way out goes step by step.
+    pub(super) fn check_escapes(
+        &self,
+        chains: &[ChainSpec<D>],
+        escape: Option<&Escape>,
+    ) -> Result<(), InputError> {
+        let Some(escape) = escape.filter(|escape| escape.method == Method::Literal) else {
+            return Ok(());
+        };
+        let way_m = escape.speed_max_m_s * escape.dt_s;
+        let given_m = self.file.chain.step_m.map(f64::from);
+        let step_m = |spec: &ChainSpec<D>| given_m.unwrap_or(spec.start.step_m());
+        let is_long = |spec: &ChainSpec<D>| way_m > MAX_STEPS * step_m(spec);
+        let Some(slot) = chains.iter().position(is_long) else { return Ok(()) };
+        let cause = format!(
+            "it may have to flee {way_m:e} m in a cycle, in steps of {:e} m",
+            step_m(&chains[slot])
+        );
+        let remedy = "give a shorter chain.dt_s, a lower chain.escape_speed_m_s, slower obstacles, \
+                      chain.escape_by = \"simultaneous\", or a longer chain.step_m";
+        Err(self.source.error(self.section_of(slot), cause, remedy))
     }
 
     /// Refuses robots that overlap when their rods are shortest, and a margin below 0.
