@@ -262,3 +262,21 @@ fn a_motion_of_many_sub_steps_heeds_an_interrupt() {
     let payload = catch_unwind(AssertUnwindSafe(moved)).expect_err("it unwinds");
     assert!(interrupt.explains(payload.as_ref()));
 }
+
+/// Chains side by side, so many that they are sorted, which wander into each other.
+const MANY: &str = "seed = 1\ncycles = 200\n[[chains]]\nconnectors = 3\ncount = 50\napart_m = [0.0, 0.35]\nrod_m = 0.3\n\
+    tasks = [{ kind = \"wander\", turn_deg = 60 }]\n";
+
+#[test]
+fn many_chains_join_the_same_groups_on_any_number_of_workers_and_never_overlap() {
+    let digest = |workers: usize| {
+        let source = Text::new("s.toml", format!("format = 1\nworld = \"chain\"\n{MANY}"), "");
+        let compiled = Compiled::<2>::new(&source).expect("valid");
+        let mut run = compiled.start(&source, workers);
+        run.share_always();
+        run.advance(200);
+        assert_eq!(run.metrics().penetrations, 0, "{workers} workers");
+        run.digest()
+    };
+    assert_eq!(digest(1), digest(3));
+}
