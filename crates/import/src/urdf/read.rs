@@ -19,7 +19,8 @@ const KINDS: [(&str, JointKind); 6] = [
     ("planar", JointKind::Planar),
 ];
 
-/// The maximum of a coordinate in meters: no robot has a larger one, and squares must stay finite.
+/// The maximum of a coordinate, and of all other numbers of a joint: no robot has a larger one, and squares must stay
+/// finite.
 const MAX_COORDINATE: f64 = 1e6;
 
 /// The maximum number of links, far above that of any known robot.
@@ -188,13 +189,24 @@ fn origin(joint: Element) -> Result<Origin, InputError> {
 
 fn bounded(value: Value) -> Result<[f64; 3], InputError> {
     let triple = value.triple()?;
-    match triple.into_iter().find(|x| x.abs() > MAX_COORDINATE) {
-        None => Ok(triple),
-        Some(x) => {
-            let cause = format!("{x} is beyond {MAX_COORDINATE:e}");
-            Err(value.error(cause, "give lengths in meters and angles in radians"))
-        }
+    triple.into_iter().try_for_each(|x| is_bounded(&value, x))?;
+    Ok(triple)
+}
+
+/// Reads one number of a robot's size.
+fn bounded_number(value: Value) -> Result<f64, InputError> {
+    let number = value.number()?;
+    is_bounded(&value, number)?;
+    Ok(number)
+}
+
+/// Refuses a number that no robot has, at which lengths would be lost to rounding.
+fn is_bounded(value: &Value, x: f64) -> Result<(), InputError> {
+    if x.abs() <= MAX_COORDINATE {
+        return Ok(());
     }
+    let cause = format!("{x:e} is beyond {MAX_COORDINATE:e}");
+    Err(value.error(cause, "give lengths in meters and angles in radians"))
 }
 
 /// Reads the axis of a joint. Files give fixed joints a zero axis, which means nothing and is not
@@ -220,7 +232,7 @@ fn limits(joint: Element, kind: JointKind) -> Result<Option<Limits>, InputError>
         return Ok(None);
     }
     let element = joint.required_child("limit")?;
-    let bound = |name| element.attribute(name).map_or(Ok(0.0), |value| value.number());
+    let bound = |name| element.attribute(name).map_or(Ok(0.0), bounded_number);
     let limits = Limits { lower: bound("lower")?, upper: bound("upper")? };
     if limits.lower > limits.upper {
         let cause = format!("lower {} is above upper {}", limits.lower, limits.upper);
@@ -236,7 +248,7 @@ fn max_speed(joint: Element, kind: JointKind) -> Result<Option<f64>, InputError>
     }
     let Some(element) = joint.child("limit")? else { return Ok(None) };
     let Some(value) = element.attribute("velocity") else { return Ok(None) };
-    let speed = value.number()?;
+    let speed = bounded_number(value)?;
     if speed < 0.0 {
         let cause = format!("a velocity of {speed}");
         return Err(value.error(cause, "give the highest speed, in rad/s or m/s, above 0"));
@@ -261,7 +273,7 @@ fn read_mimics(
             let cause = "a joint that cannot move takes part in a mimicry";
             return Err(value.error(cause, "name joints with one value each"));
         }
-        let number = |name, default| element.attribute(name).map_or(Ok(default), |v| v.number());
+        let number = |name, default| element.attribute(name).map_or(Ok(default), bounded_number);
         joints[i].mimic = Some(Mimic {
             joint: driver,
             multiplier: number("multiplier", 1.0)?,

@@ -2,7 +2,7 @@
 //! enter during the cycle.
 
 use super::perceive::Looking;
-use super::rods::geometry::Bounds;
+use super::rods::geometry::{Bounds, in_dimensions};
 use super::state::Body;
 use super::world::{ChainSpec, ChainWorld};
 use sidestep_kernel::{Cycle, Slot, Turn};
@@ -46,6 +46,18 @@ fn reach<const D: usize>(
         }
     };
     let thrown_m = spec.changes.iter().map(|change| change.throws_m(now)).fold(0.0, f64::max);
-    let back_m = body.scattered.as_ref().map_or(0.0, |s| s.speed_m_s * world.dt_s);
-    Bounds::of(chain.points()).grown(radius_m + way_m + thrown_m + back_m)
+    let back_m_s = body.scattered.as_ref().map_or(0.0, |s| s.speed_m_s);
+    let back_m_s =
+        spec.changes.iter().map(|change| change.gathers_m_s(now)).fold(back_m_s, f64::max);
+    let of_chain =
+        Bounds::of(chain.points()).grown(radius_m + way_m + thrown_m + back_m_s * world.dt_s);
+    of_chain.joined(&reach_of_robots(spec, body, world.dt_s))
+}
+
+/// Returns the box that the robots of a chain may enter during one cycle. A robot that lags is far from its connector.
+fn reach_of_robots<const D: usize>(spec: &ChainSpec<D>, body: &Body<D>, dt_s: f64) -> Bounds<D> {
+    let Some(robots) = &spec.robots else { return Bounds::nothing() };
+    let way_m = robots.follower.reach_m(dt_s);
+    let places = body.robots.iter().map(|robot| in_dimensions(robot.pose.at));
+    places.fold(Bounds::nothing(), |all, at| all.joined(&Bounds::of(&[at]).grown(way_m)))
 }

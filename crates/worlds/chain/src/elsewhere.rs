@@ -33,7 +33,7 @@ impl<const D: usize> ChainWorld<D> {
         let turn = &mut Turn { world: self, state, now, clock, scratch: &mut scratch };
         let groups = Groups::new(state.len());
         (0..state.len()).for_each(|slot| claim::claim_box(turn, slot));
-        (0..state.len()).for_each(|slot| join::join(turn, slot, &groups));
+        join::join(turn, 0..state.len(), &groups);
         for slot in 0..state.len() {
             let mut looking = Looking { world: self, state, now, scratch: turn.scratch };
             let decision = looking.decide(slot as Slot);

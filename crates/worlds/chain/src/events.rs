@@ -39,14 +39,14 @@ pub enum EventKind {
     /// The gap between the whole ends is longer than the parts; the value is the missing length in
     /// meters.
     GapTooLong,
-    /// No places were found where the scattered parts are joined; the value is the error of the
-    /// worst rod, in meters.
+    /// No places were found where the scattered parts are joined, or something was in their way for too long; the value
+    /// is the error of the worst rod, in meters.
     NotReformed,
     /// A target has been reached; the value is its number.
     Target,
     /// A task is done; the value is its number.
     Done,
-    /// A task was given up; the value is its number.
+    /// A task was given up, or all of its targets were; the value is its number.
     GivenUp,
     /// A planner has found a way to a target; the value is the number of its straight pieces.
     Planned,
@@ -58,11 +58,13 @@ pub enum EventKind {
     Heard,
     /// Time was up before the leader had finished its talk.
     Deadline,
+    /// A target was given up; the value is its number.
+    TargetGivenUp,
 }
 
 impl EventKind {
     /// All kinds.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::Veto,
         Self::Penetration,
         Self::Clear,
@@ -85,6 +87,7 @@ impl EventKind {
         Self::Unheard,
         Self::Heard,
         Self::Deadline,
+        Self::TargetGivenUp,
     ];
 
     /// Returns the kind that it is for viewers, which know no world.
@@ -106,7 +109,7 @@ impl EventKind {
             Self::NotReformed => Happening::NotReformed,
             Self::Target => Happening::Target,
             Self::Done => Happening::Done,
-            Self::GivenUp => Happening::GivenUp,
+            Self::GivenUp | Self::TargetGivenUp => Happening::GivenUp,
             Self::Planned => Happening::Planned,
             Self::NotPlanned => Happening::NotPlanned,
             Self::Unheard => Happening::Unheard,
@@ -140,6 +143,7 @@ impl EventKind {
             Self::Unheard => "unheard",
             Self::Heard => "heard",
             Self::Deadline => "deadline",
+            Self::TargetGivenUp => "target-given-up",
         }
     }
 }

@@ -73,7 +73,7 @@ impl<const D: usize> ChainWorld<D> {
         let turn = &mut Turn { world: self, state, now, clock, scratch };
         let groups = Groups::new(state.len());
         (0..state.len()).for_each(|slot| claim::claim_box(turn, slot));
-        (0..state.len()).for_each(|slot| join::join(turn, slot, &groups));
+        join::join(turn, 0..state.len(), &groups);
         let mut group = Vec::new();
         groups.members(groups.leader(slot), &mut group);
         group.sort_unstable();

@@ -3,13 +3,29 @@
 use super::world::ChainWorld;
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::{Slot, Turn};
+use std::ops::Range;
 
-/// Joins one chain with those before it whose claims meet its own.
+/// Number of chains up to which comparing each with each is faster than sorting.
+const FEW: usize = 32;
+
+/// Joins chains with those whose claims meet theirs.
 pub(crate) fn join<const D: usize>(
     turn: &mut Turn<'_, ChainWorld<D>>,
-    slot: usize,
+    bodies: Range<usize>,
     groups: &Groups,
 ) {
+    let state = turn.state;
+    if state.len() <= FEW {
+        return bodies.for_each(|slot| join_each(turn, slot, groups));
+    }
+    let neighbors = state.neighbors();
+    for slot in bodies {
+        neighbors.visit(slot, |other| groups.join(slot as Slot, other));
+    }
+}
+
+/// Joins one chain with those before it whose claims meet its own.
+fn join_each<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, slot: usize, groups: &Groups) {
     let state = turn.state;
     let claim = state.claim(slot);
     for other in (0..slot).filter(|&other| state.claim(other).meets(&claim)) {

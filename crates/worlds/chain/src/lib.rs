@@ -37,6 +37,7 @@ mod meanings;
 pub mod metrics;
 mod motion;
 mod navigate;
+mod neighbors;
 mod notes;
 mod outside;
 mod perceive;
@@ -96,7 +97,7 @@ impl<const D: usize> Phases for ChainWorld<D> {
     }
 
     fn join(turn: &mut Turn<'_, Self>, bodies: Range<usize>, groups: &Groups) {
-        bodies.for_each(|slot| join::join(turn, slot, groups));
+        join::join(turn, bodies, groups);
     }
 
     fn act(turn: &mut Turn<'_, Self>, group: &mut [Slot]) {

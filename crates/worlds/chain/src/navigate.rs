@@ -3,9 +3,13 @@
 use super::rods::geometry::{Point, distance};
 use super::swarm::drive::Drive;
 use super::swarm::leader::{Leader, Turning};
+use std::ops::Range;
 
 /// Distance before the end of a line at which the end counts as reached, meters.
 const BEFORE_THE_END_M: f64 = 0.5;
+
+/// Points of a line ahead among which a navigator looks for the one that it has reached.
+const AHEAD: usize = 10;
 
 /// An initiator that navigates.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,11 +52,25 @@ impl Goal {
         }
     }
 
-    /// Returns the point of the line that a navigator at `at` has reached, if it was at `index`.
-    pub(crate) fn passed(&self, at: Point<2>, index: usize) -> usize {
+    /// Returns the point of the line at which a navigator begins that stands at `at`: the nearest one.
+    pub(crate) fn begins(&self, at: Point<2>) -> usize {
+        let Self::EndOf(line) = self else { return 0 };
+        nearest(line, 0..line.len(), at).unwrap_or(0)
+    }
+
+    /// Returns the point of the line that a navigator at `at` has reached, if it was at `index`: it goes on while points
+    /// come nearer, also beyond some that do not.
+    pub(crate) fn passed(&self, at: Point<2>, mut index: usize) -> usize {
         let Self::EndOf(line) = self else { return index };
         let nearer = |i: usize| distance(line[i + 1], at) <= distance(line[i], at);
-        (index..line.len() - 1).find(|&i| !nearer(i)).unwrap_or(line.len() - 1)
+        loop {
+            let here = (index..line.len() - 1).find(|&i| !nearer(i)).unwrap_or(line.len() - 1);
+            let ahead = here..(here + 1 + AHEAD).min(line.len());
+            match nearest(line, ahead, at).filter(|&i| i > here) {
+                Some(further) => index = further,
+                None => return here,
+            }
+        }
     }
 
     pub(crate) fn is_reached(&self, at: Point<2>, index: usize) -> bool {
@@ -72,5 +90,43 @@ impl Goal {
             Self::Target { .. } => 0.0,
             Self::EndOf(line) => index as f64 / (line.len() - 1).max(1) as f64,
         }
+    }
+}
+
+/// Returns the nearest of some points of a line; of equals the first.
+fn nearest(line: &[Point<2>], among: Range<usize>, at: Point<2>) -> Option<usize> {
+    among.min_by(|&a, &b| distance(line[a], at).total_cmp(&distance(line[b], at)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two legs of 5 m, 4 m apart, and the way from one to the other.
+    fn hairpin() -> Goal {
+        let leg = |y: f64, x: &dyn Fn(f64) -> f64| {
+            (0..50).map(|k| [x(0.1 * f64::from(k)), y]).collect::<Vec<_>>()
+        };
+        let turn = (0..40).map(|k| [5.0, 0.1 * f64::from(k)]);
+        let there = leg(0.0, &|x| x);
+        Goal::EndOf(there.into_iter().chain(turn).chain(leg(4.0, &|x| 5.0 - x)).collect())
+    }
+
+    #[test]
+    fn a_navigator_begins_at_the_nearest_point_of_its_line_and_goes_on_from_there() {
+        let line = hairpin();
+        let begins = line.begins([3.0, 3.8]);
+        assert_eq!(begins, 50 + 40 + 20);
+        let passed = line.passed([0.2, 4.0], begins);
+        assert!(line.is_reached([0.2, 4.0], passed), "{passed}");
+        assert_eq!(line.begins([-1.0, 0.1]), 0);
+        // From the first leg the second one is not taken for passed.
+        assert_eq!(line.passed([3.0, 1.9], 25), 30);
+    }
+
+    #[test]
+    fn a_navigator_is_not_held_up_by_a_point_beside_its_line() {
+        let bumpy = Goal::EndOf(vec![[0.0, 0.0], [0.1, 0.0], [0.15, 0.3], [0.2, 0.0], [0.9, 0.0]]);
+        assert_eq!(bumpy.passed([0.2, 0.0], 0), 3);
     }
 }

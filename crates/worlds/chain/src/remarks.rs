@@ -1,15 +1,43 @@
 //! Remarks on a valid scenario: what will surprise its author. `sidestep check` shows them.
 
 use super::arms::kinematics::{Motion, Variable};
+use super::rods::chain::{Connector, Mobility};
 use super::scenario::Compiled;
-use super::world::{ChainSpec, ChainWorld};
+use super::world::{ChainSpec, ChainWorld, Change, What};
 use sidestep_scenario::Remark;
 
 /// Returns the remarks, in the order of the chains.
 pub(super) fn remarks<const D: usize>(compiled: &Compiled<D>) -> Vec<Remark> {
     let chains = || compiled.world.chains.iter().enumerate();
     let slow = chains().find_map(|chain| slow(&compiled.world, chain));
-    chains().filter_map(unlimited).chain(slow).collect()
+    chains().filter_map(unlimited).chain(slow).chain(idle(compiled)).collect()
+}
+
+/// Returns notes on rules that are given and have no effect.
+fn idle<const D: usize>(compiled: &Compiled<D>) -> impl Iterator<Item = Remark> {
+    let world = &compiled.world;
+    let moves = !world.movers.is_empty();
+    let holds = world.chains.iter().any(is_held);
+    let given = compiled.recipe.iter().flat_map(|recipe| recipe.given_rules());
+    let idle = given.filter(move |(_, of_movers)| if *of_movers { !moves } else { !holds });
+    idle.map(|(key, of_movers)| {
+        let why = match of_movers {
+            true => "no obstacle moves: give one velocity_m_s or patrol_m",
+            false => "no connector is held: give one a mobility",
+        };
+        Remark::note(
+            format!("chain.{key}"),
+            format!("it does nothing where {why}, or leave it out"),
+        )
+    })
+}
+
+/// Whether some connector of a chain is, or comes to be, unable to go anywhere.
+fn is_held<const D: usize>(spec: &ChainSpec<D>) -> bool {
+    let is_free = |c: &Connector<D>| c.mobility == Mobility::Free && !c.failed;
+    let holds =
+        |change: &Change<D>| matches!(change.what, What::Mobility { .. } | What::Failed { .. });
+    !spec.start.connectors().iter().all(is_free) || spec.changes.iter().any(holds)
 }
 
 /// Returns a warning on a chain whose agents talk too slowly to move all of it in a cycle.
@@ -94,6 +122,26 @@ mod tests {
         };
         assert_eq!(told.key, "chain.network.latency_s");
         assert!(told.words.contains("0.019 s of talk (1 sub-steps"), "{}", told.words);
+    }
+
+    #[test]
+    fn rules_of_what_is_not_there_are_told_to_do_nothing() {
+        let chain = "[[chains]]\nconnectors = 3\nrod_m = 0.5\ntasks = [{ kind = \"rest\" }]\n";
+        let keys_of = |rules: &str, more: &str| {
+            let text = format!("format = 1\nworld = \"chain\"\n[chain]\n{rules}\n{chain}{more}");
+            let compiled = Compiled::<2>::new(&Source::new("s.toml", text, "")).expect("valid");
+            remarks(&compiled).into_iter().map(|told| told.key).collect::<Vec<_>>()
+        };
+        let rules = "joint_speed_m_s = 1.0\nescape_by = \"literal\"\nescape_speed_m_s = 1.0\nescape_ahead_s = 0.5";
+        let [joints, by, speed, ahead] =
+            ["joint_speed_m_s", "escape_by", "escape_speed_m_s", "escape_ahead_s"]
+                .map(|key| format!("chain.{key}"));
+        assert_eq!(keys_of(rules, ""), [&joints, &by, &speed, &ahead].map(String::clone));
+        let ball = "[[obstacles]]\nat_m = [9.0, 9.0]\nradius_m = 0.1\nvelocity_m_s = [0.1, 0.0]\n";
+        assert_eq!(keys_of(rules, ball), [joints]);
+        let held = "[[chains.limits]]\nconnector = 2\nmobility = \"fixed\"\n";
+        assert_eq!(keys_of(rules, held), [by, speed, ahead]);
+        assert!(keys_of("", "").is_empty());
     }
 
     #[test]

@@ -12,6 +12,8 @@ mod obstacles;
 mod recipe;
 mod starts;
 mod tasks;
+#[cfg(test)]
+mod tests;
 
 use super::deploy::kind::Deployment;
 use super::ground::{Movers, Site};
@@ -212,7 +214,7 @@ struct RulesSection {
     backtracks: Option<usize>,
     look_m: Option<Measure>,
     escape: EscapeWord,
-    escape_by: Method,
+    escape_by: Option<Method>,
     escape_speed_m_s: Option<Measure>,
     escape_ahead_s: Option<Measure>,
     may_start_inside: bool,
@@ -374,6 +376,7 @@ impl<const D: usize> Compiler<'_, D> {
         let radius_m = chains.iter().flat_map(|spec| spec.start.connectors()).map(|c| c.radius_m);
         let look_m = 4.0 * radius_m.fold(0.05, f64::max);
         let escape = self.escape(&chains, &ground.movers, dt_s);
+        self.check_escapes(&chains, escape.as_ref())?;
         let joint_speed_m_s = self.joint_speed_m_s(&chains);
         let slave_step_max_m = self.slave_step_max_m(&chains, &ground, escape.as_ref(), dt_s);
         let rules = Rules { slave_step_max_m, ..self.rules(joint_speed_m_s * dt_s) };
@@ -421,7 +424,7 @@ impl<const D: usize> Compiler<'_, D> {
         let ahead_s = section.escape_ahead_s.map_or(usual.ticks_ahead * dt_s, f64::from);
         let looks_ahead = section.escape == EscapeWord::LookAhead;
         let ticks_ahead = if looks_ahead { ahead_s / dt_s } else { 0.0 };
-        Some(Escape { ticks_ahead, method: section.escape_by, ..usual })
+        Some(Escape { ticks_ahead, method: section.escape_by.unwrap_or_default(), ..usual })
     }
 
     /// Refuses keys of escapes that the kind of escape leaves without effect.

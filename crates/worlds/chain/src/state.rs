@@ -6,6 +6,7 @@ use super::driver::{Driving, Task};
 use super::formation::{Robot, Solid};
 use super::metrics::Tally;
 use super::motion::escape::WayOut;
+use super::neighbors::Neighbors;
 use super::put_off::PutOff;
 use super::rods::chain::Chain;
 use super::rods::geometry::{Bounds, Point, in_dimensions, unit};
@@ -19,15 +20,20 @@ use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::math::atan2;
 use sidestep_kernel::{Cycle, Digest, EntityId, InputError};
 use std::collections::VecDeque;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 /// The state of a world of chains; slots are ids.
 #[derive(Debug)]
 pub struct ChainState<const D: usize> {
     cells: Box<[Cell<D>]>,
+    /// Number of claims ever made.
+    claims: AtomicU64,
+    /// The claims of this cycle, sorted by the first worker that needs them.
+    neighbors: RwLock<Neighbors<D>>,
 }
 
-/// One chain's share of the state. No lock is ever waited for: in the first phase all workers only
+/// One chain's share of the state. None of its locks is ever waited for: in the first phase all workers only
 /// read the bodies, and in the last phase only the one worker that has a group writes its bodies.
 #[derive(Debug)]
 struct Cell<const D: usize> {
@@ -257,7 +263,11 @@ impl<const D: usize> ChainState<D> {
             claim: Mutex::new(Bounds::nothing()),
             decision: Mutex::new(None),
         };
-        Self { cells: bodies.map(cell).collect() }
+        Self {
+            cells: bodies.map(cell).collect(),
+            claims: AtomicU64::new(0),
+            neighbors: RwLock::default(),
+        }
     }
 
     /// Returns the state at the start.
@@ -373,7 +383,25 @@ impl<const D: usize> ChainState<D> {
         *self.cells[slot].claim.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Returns the claims by where they begin; valid while nobody claims anything.
+    pub(crate) fn neighbors(&self) -> RwLockReadGuard<'_, Neighbors<D>> {
+        let made = self.claims.load(Relaxed);
+        let read = || self.neighbors.read().unwrap_or_else(PoisonError::into_inner);
+        let known = read();
+        if known.is_of(made) {
+            return known;
+        }
+        drop(known);
+        let mut neighbors = self.neighbors.write().unwrap_or_else(PoisonError::into_inner);
+        if !neighbors.is_of(made) {
+            neighbors.sort(made, (0..self.len()).map(|slot| self.claim(slot)));
+        }
+        drop(neighbors);
+        read()
+    }
+
     pub(crate) fn set_claim(&self, slot: usize, claim: Bounds<D>) {
+        self.claims.fetch_add(1, Relaxed);
         *self.cells[slot].claim.lock().unwrap_or_else(PoisonError::into_inner) = claim;
     }
 

@@ -265,11 +265,12 @@ fn told(event: &Event) -> (Level, &'static str, String) {
         EventKind::Reformed => (Level::Info, NO_VALUE, "is joined again".into()),
         EventKind::GapTooLong => (Level::Warning, "m", gap_in_words(value, event.missing)),
         EventKind::NotReformed => {
-            (Level::Warning, "m", format!("cannot be joined, off by {value:.3} m"))
+            (Level::Warning, "m", format!("cannot be joined, off by {value:.3} m{because}"))
         }
         EventKind::Target => (Level::Info, "", format!("has reached target {value}")),
         EventKind::Done => (Level::Info, "", format!("has done task {value}")),
         EventKind::GivenUp => (Level::Warning, "", format!("has given up task {value}")),
+        EventKind::TargetGivenUp => (Level::Warning, "", format!("has given up target {value}")),
         EventKind::Planned => (Level::Info, "", format!("follows a plan of {value} pieces")),
         EventKind::NotPlanned => (Level::Warning, "", format!("has no plan to target {value}")),
         EventKind::Unheard => {

@@ -161,6 +161,14 @@ impl<const D: usize> Change<D> {
         }
     }
 
+    /// Returns the speed at which scattered parts set out in a cycle because of the change, m/s.
+    pub(crate) fn gathers_m_s(&self, now: Cycle) -> f64 {
+        match &self.what {
+            What::Reform { speed_m_s, .. } if self.cycle == now => *speed_m_s,
+            _ => 0.0,
+        }
+    }
+
     /// Applies a change of constraints.
     pub(crate) fn constrain(&self, chain: &mut Chain<D>) {
         let done = match &self.what {

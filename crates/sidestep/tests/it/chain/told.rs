@@ -129,7 +129,7 @@ fn a_target_that_is_given_up_is_told_with_how_near_it_was_and_why() {
     assert!(given_up.what.reason.is_some() && given_up.what.by.is_some(), "{given_up:?}");
     assert!((metrics.progress - 2.0 / 3.0).abs() < 1e-12, "{}", metrics.progress);
     let names: Vec<_> = events(&run, &rows).into_iter().map(|e| (e.1, e.4)).collect();
-    for told in [("target", 0.0), ("given-up", 0.0), ("target", 2.0), ("done", 0.0)] {
+    for told in [("target", 0.0), ("target-given-up", 1.0), ("target", 2.0), ("done", 0.0)] {
         assert!(names.contains(&(told.0.into(), told.1)), "{told:?} in {names:?}");
     }
     assert_eq!(metrics.penetrations, 0);

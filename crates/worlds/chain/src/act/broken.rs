@@ -3,7 +3,7 @@
 
 use super::Acting;
 use crate::events::{Event, EventKind};
-use crate::rods::geometry::{Point, add, distance, towards};
+use crate::rods::geometry::{Point, add, distance};
 use crate::rods::rebuild::{MayCome, Reformed, reform};
 use crate::state::{Scattered, flat};
 use crate::world::{Change, FARTHEST_THROW, What, purpose};
@@ -67,7 +67,7 @@ impl<const D: usize> Acting<'_, D> {
         });
     }
 
-    /// Finds the places where the scattered parts have to be.
+    /// Finds the places where the scattered parts have to be. A chain that an earlier change has joined stays as it is.
     fn begin_reform(&mut self, may_come: MayCome, speed_m_s: f64) {
         let Some(scattered) = &self.body.scattered else { return };
         let (first, last) = (scattered.first as usize, scattered.last as usize);
@@ -76,6 +76,7 @@ impl<const D: usize> Acting<'_, D> {
             Reformed::Whole { double_passes } => {
                 if let Some(scattered) = &mut self.body.scattered {
                     (scattered.goals_m, scattered.speed_m_s) = (flat(&whole), speed_m_s);
+                    self.body.tally.reform_waits = 0;
                 }
                 (EventKind::Reforming, double_passes as f64)
             }
@@ -119,28 +120,5 @@ impl<const D: usize> Acting<'_, D> {
             }
         };
         (whole.points().to_vec(), came)
-    }
-
-    /// Moves scattered parts straight to the places where they are joined again; the chain is whole
-    /// when all are there.
-    pub(super) fn come_together(&mut self) {
-        let body = &mut *self.body;
-        let Some(scattered) = body.scattered.as_ref().filter(|s| !s.goals_m.is_empty()) else {
-            return;
-        };
-        let first = scattered.first as usize;
-        let step_m = scattered.speed_m_s * self.world.dt_s;
-        let goals = scattered.goals_m.chunks_exact(D);
-        let mut all_there = true;
-        for (point, goal) in body.chain.points_mut().iter_mut().zip(goals) {
-            let goal = std::array::from_fn(|i| goal[i]);
-            *point = towards(*point, goal, step_m);
-            all_there &= *point == goal;
-        }
-        if all_there {
-            body.scattered = None;
-            body.tally.reformed += 1;
-            self.tell(EventKind::Reformed, first, 0.0);
-        }
     }
 }

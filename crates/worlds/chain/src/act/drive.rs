@@ -60,11 +60,19 @@ impl<const D: usize> Acting<'_, D> {
             Wish::Follow => self.follow_plan(task),
             Wish::Steer(pose) => self.go_on_wheels(task, pose),
             Wish::Obey(errand) => self.obey(task, errand),
-            Wish::Done => return self.next_task(EventKind::Done),
+            Wish::Done => return self.next_task(self.ending(task)),
         }
         if is_late {
-            self.next_task(EventKind::Done);
+            self.next_task(self.ending(task));
         }
+    }
+
+    /// Returns how a task ends that has come to its end: a list of targets none of which was reached is not done.
+    fn ending(&self, task: &Task<D>) -> EventKind {
+        let Driver::Targets(targets) = &task.driver else { return EventKind::Done };
+        let now = self.body.driving.task;
+        let given_up = self.body.tally.given_up.iter().filter(|what| what.task == now).count();
+        if given_up == targets.places.len() { EventKind::GivenUp } else { EventKind::Done }
     }
 
     /// Returns a wish in words.

@@ -209,8 +209,8 @@ impl<const D: usize> Acting<'_, D> {
         match task.driver {
             Driver::Targets(_) => {
                 let by = objection.map_or(task.agent, |objection| objection.by as usize);
-                let given_up = f64::from(self.body.driving.task);
-                let event = self.event(EventKind::GivenUp, by, given_up);
+                let target = f64::from(self.body.driving.next);
+                let event = self.event(EventKind::TargetGivenUp, by, target);
                 self.scratch.events.push(Event { reason, ..event });
                 self.body.plan = None;
                 self.body.driving.next_part();

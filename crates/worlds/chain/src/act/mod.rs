@@ -1,7 +1,7 @@
 //! Phase *act*: the actions of one chain in a cycle.
 //!
 //! ```text
-//! broken.rs -> bounds.rs (out of the way) -> drive.rs -> foresee.rs -> go.rs, wheels.rs, obey.rs
+//! broken.rs, gather.rs -> bounds.rs (out of the way) -> drive.rs -> foresee.rs -> go.rs, wheels.rs, obey.rs
 //!           -> bounds.rs (back into the claim) -> follow.rs -> measure.rs
 //! broken.rs -> drive.rs -> go.rs, later.rs         where nothing can object
 //!              drive.rs -> plan.rs                 where local rules come no nearer
@@ -14,6 +14,7 @@ mod broken;
 mod drive;
 mod follow;
 mod foresee;
+mod gather;
 mod go;
 mod joints;
 mod later;
@@ -21,6 +22,8 @@ mod measure;
 mod obey;
 mod plan;
 mod talk;
+#[cfg(test)]
+mod tests;
 mod wheels;
 
 use super::driver::Task;

@@ -32,6 +32,7 @@ impl<const D: usize> Acting<'_, D> {
     /// Returns the pose that a navigator's wheels would take it to.
     pub(super) fn steered(&mut self, task: &Task<D>, navigator: &Navigator) -> Option<Pose> {
         let decision = self.decision?;
+        self.find_itself(task, navigator);
         let pace = self.pace();
         let driving = &mut self.body.driving;
         driving.rested = if pace == 0.0 { driving.rested.saturating_add(1) } else { 0 };
@@ -49,6 +50,14 @@ impl<const D: usize> Acting<'_, D> {
         let pace = if waited_s > WAITS_S { GOES_ON } else { pace };
         let wheels = decision.wheels.slowed(pace);
         Some(navigator.drive.step(leader.pose, wheels, self.world.dt_s))
+    }
+
+    /// Finds the place of a navigator whose task begins on the line to its goal.
+    fn find_itself(&mut self, task: &Task<D>, navigator: &Navigator) {
+        if let (None, Some(goal)) = (&self.body.driving.leader, &navigator.goal) {
+            let at = in_dimensions(self.body.chain.points()[task.agent]);
+            self.body.driving.next = goal.begins(at) as u32;
+        }
     }
 
     /// Returns where the connector of a navigator has to go to be at its robot again, from which escapes or

@@ -3,7 +3,7 @@
 use super::courses::{Course, Mover};
 use super::purposes;
 use crate::rods::geometry::{Bounds, Core, Point, along, is_finite, unit};
-use crate::rods::obstacle::Obstacle;
+use crate::rods::obstacle::{Obstacle, Obstacles};
 use sidestep_kernel::stream::{Draws, Streams};
 use sidestep_kernel::{InputError, Seed};
 use std::f64::consts::PI;
@@ -41,10 +41,12 @@ impl<const D: usize> Field<D> {
     pub(crate) fn fill(&self, seed: Seed, first_id: u32) -> Result<Vec<Obstacle<D>>, InputError> {
         let n = self.count()?;
         let streams = Streams::new(seed);
+        let clear = Clear::new(&self.keep_clear, self.keep_m, self.length_m)?;
         let one = |k: u32| {
             let ends = self.ends(&mut streams.draws(k, 0, purposes::STILL));
             let core = if ends[0] == ends[1] { Core::Point(ends[0]) } else { Core::Segment(ends) };
-            is_away(ends, self.radius_m, &self.keep_clear, self.keep_m)
+            clear
+                .is_away(ends, self.radius_m)
                 .then(|| Obstacle::still(first_id + k, core, self.radius_m))
         };
         Ok((0..n).filter_map(one).collect())
@@ -114,10 +116,17 @@ impl<const D: usize> Crowd<D> {
             return Err(InputError::new("crowd", cause, "give at most 1e7"));
         }
         let streams = Streams::new(seed);
-        (0..self.n).map(|k| self.one(&streams, k, first_id + k)).collect()
+        let clear = Clear::new(&self.keep_clear, self.keep_m, *self.radius_m.end())?;
+        (0..self.n).map(|k| self.one(&streams, &clear, k, first_id + k)).collect()
     }
 
-    fn one(&self, streams: &Streams, k: u32, id: u32) -> Result<Mover<D>, InputError> {
+    fn one(
+        &self,
+        streams: &Streams,
+        clear: &Clear<D>,
+        k: u32,
+        id: u32,
+    ) -> Result<Mover<D>, InputError> {
         for attempt in 0..ATTEMPTS {
             let mut draws = streams.draws(k, attempt, purposes::MOVING);
             let radius_m = within(&mut draws, &self.radius_m);
@@ -129,7 +138,7 @@ impl<const D: usize> Crowd<D> {
                 return Err(InputError::new("crowd", cause, "make the room larger"));
             }
             let at = point_in(&mut draws, &places);
-            if is_away([at; 2], radius_m, &self.keep_clear, self.keep_m) {
+            if clear.is_away([at; 2], radius_m) {
                 let ball = Obstacle::ball(id, at, radius_m);
                 return Mover::new(ball, Course::Bouncing { velocity_m_s, room: self.room });
             }
@@ -142,15 +151,35 @@ impl<const D: usize> Crowd<D> {
     }
 }
 
-/// Whether a capsule between `ends` stays away from all of `keep_clear`.
-fn is_away<const D: usize>(
-    ends: [Point<D>; 2],
-    radius_m: f64,
-    keep_clear: &[Core<D>],
+/// Bodies that are kept clear, by place.
+struct Clear<const D: usize> {
+    bodies: Obstacles<D>,
     keep_m: f64,
-) -> bool {
-    let reach_m = radius_m + keep_m;
-    keep_clear.iter().all(|core| core.nearest_to_segment(ends).distance_m > reach_m)
+}
+
+/// Room around a query, meters, so that no rounding leaves out what is just as far as it may be.
+const ROUNDING_M: f64 = 1e-6;
+
+impl<const D: usize> Clear<D> {
+    /// Returns bodies from which things of about `size_m` keep a distance.
+    fn new(bodies: &[Core<D>], keep_m: f64, size_m: f64) -> Result<Self, InputError> {
+        let body = |(k, core): (u32, &Core<D>)| Obstacle::still(k, *core, 0.0);
+        let bodies = (0..).zip(bodies).map(body).collect();
+        // Sets the cells of a grid, never the result.
+        let reach_m = size_m + 2.0 * keep_m;
+        let reach_m = if reach_m.is_finite() { reach_m.max(1e-3) } else { 1.0 };
+        Ok(Self { bodies: Obstacles::new(bodies, reach_m)?, keep_m })
+    }
+
+    /// Whether a capsule between `ends` stays away from all of them.
+    fn is_away(&self, ends: [Point<D>; 2], radius_m: f64) -> bool {
+        let reach_m = radius_m + self.keep_m;
+        let mut is_away = reach_m.is_finite();
+        self.bodies.visit(&Bounds::of(&ends).grown(reach_m + ROUNDING_M), |body| {
+            is_away &= body.core.nearest_to_segment(ends).distance_m > reach_m;
+        });
+        is_away
+    }
 }
 
 fn within(draws: &mut Draws, range: &RangeInclusive<f64>) -> f64 {

@@ -50,7 +50,8 @@ struct Wanting {
     laid: u32,
 }
 
-/// Returns a start for a chain on a site, from the seed alone; `obstacles` are all obstacles there.
+/// Returns a start for a chain on a site, from the seed and the chain's `number` alone; `obstacles` are all obstacles
+/// there.
 /// Random places are tried. From a free one, a breadth-first search finds the places that are the
 /// most steps away within the chain's reach; the way to one of them, pulled straight, is where the
 /// chain lies.
@@ -61,14 +62,14 @@ pub(crate) fn find(
     site: &Site,
     obstacles: &Obstacles<2>,
     wanted: &Wanted,
-    seed: Seed,
+    (seed, number): (Seed, u32),
 ) -> Result<Start, InputError> {
     wanted.check()?;
     let search = Search { site, obstacles, wanted };
     let (streams, mut wanting) = (Streams::new(seed), Wanting::default());
     let bounds = wanted.within.unwrap_or_else(|| site.bounds());
     for place in 0..PLACES {
-        let mut draws = streams.draws(0, place, purposes::ROUTE);
+        let mut draws = streams.draws(number, place, purposes::ROUTE);
         let leader =
             std::array::from_fn(|i| bounds.lo[i] + (bounds.hi[i] - bounds.lo[i]) * draws.uniform());
         if !search.is_free(leader) {
@@ -294,8 +295,8 @@ mod tests {
     fn check(name: &str, site: &Site, wanted: &Wanted, seeds: u64) {
         let obstacles = Obstacles::new(site.obstacles(0), 1.0).unwrap();
         for seed in 0..seeds {
-            let start = find(site, &obstacles, wanted, Seed(seed)).expect(name);
-            assert_eq!(start, find(site, &obstacles, wanted, Seed(seed)).unwrap());
+            let start = find(site, &obstacles, wanted, (Seed(seed), 0)).expect(name);
+            assert_eq!(start, find(site, &obstacles, wanted, (Seed(seed), 0)).unwrap());
             assert_eq!((start.points.len(), start.points[0]), (wanted.connectors, start.leader.at));
             let within = wanted.within.unwrap_or_else(|| site.bounds());
             assert!(within.meets(&Bounds::of(&[start.leader.at])));
@@ -322,12 +323,14 @@ mod tests {
     }
 
     #[test]
-    fn starts_differ_by_seed() {
+    fn starts_differ_by_seed_and_number() {
         let site = bent();
         let obstacles = Obstacles::new(site.obstacles(0), 1.0).unwrap();
         let wanted = Wanted { connectors: 5, ..WANTED };
-        let start = |seed| find(&site, &obstacles, &wanted, Seed(seed)).unwrap();
+        let start = |seed| find(&site, &obstacles, &wanted, (Seed(seed), 0)).unwrap();
         assert_ne!(start(1), start(2));
+        let of_number = |number| find(&site, &obstacles, &wanted, (Seed(1), number)).unwrap();
+        assert_ne!(of_number(0), of_number(1));
     }
 
     #[test]
@@ -335,7 +338,7 @@ mod tests {
         let site = bent();
         let obstacles = Obstacles::new(site.obstacles(0), 1.0).unwrap();
         let cause = |wanted: Wanted| {
-            find(&site, &obstacles, &wanted, Seed(1)).unwrap_err().cause().to_owned()
+            find(&site, &obstacles, &wanted, (Seed(1), 0)).unwrap_err().cause().to_owned()
         };
         assert!(cause(Wanted { clearance_m: 2.0, ..WANTED }).contains("no place with 2 m"));
         let too_long = cause(Wanted { connectors: 40, ..WANTED });
@@ -348,7 +351,7 @@ mod tests {
             Wanted { clearance_m: f64::NAN, ..WANTED },
             Wanted { spacing_m: f64::INFINITY, ..WANTED },
         ] {
-            assert!(find(&site, &obstacles, &wrong, Seed(1)).is_err());
+            assert!(find(&site, &obstacles, &wrong, (Seed(1), 0)).is_err());
         }
     }
 

@@ -133,6 +133,19 @@ pub struct Chain<const D: usize> {
     still: StillMeasures,
 }
 
+/// Part of its greatest length below which the least length of a rod means that its ends can come together.
+const CLOSED: f64 = 1e-3;
+
+/// Returns the least of radii and rods. Rods that can close say nothing about how long a step may be; they count only
+/// where there is nothing else.
+fn least_m(rods: &[Rod], radii: impl Iterator<Item = f64>) -> f64 {
+    let least = |all: &mut dyn Iterator<Item = f64>| all.fold(f64::INFINITY, f64::min);
+    let stays_open = |rod: &&Rod| rod.min_m >= CLOSED * rod.max_m;
+    let open = rods.iter().filter(stays_open).map(|rod| rod.min_m);
+    let least_m = least(&mut open.chain(radii));
+    if least_m.is_finite() { least_m } else { least(&mut rods.iter().map(|rod| rod.min_m)) }
+}
+
 /// Measures that only new rods or radii change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct StillMeasures {
@@ -195,7 +208,7 @@ impl<const D: usize> Chain<D> {
         let special = connectors.iter().filter(|c| !c.is_plain()).count();
         let longest_m = rods.iter().map(|r| r.max_m).fold(0.0, f64::max);
         let radii = connectors.iter().map(|c| c.radius_m).filter(|&r| r > 0.0);
-        let least_m = rods.iter().map(|r| r.min_m).chain(radii).fold(f64::INFINITY, f64::min);
+        let least_m = least_m(&rods, radii);
         let thickest_m = connectors.iter().map(|c| c.radius_m).fold(0.0, f64::max);
         let still = StillMeasures { longest_m, least_m, thickest_m };
         Ok(Self { points, connectors, rods, special, still })
@@ -297,7 +310,7 @@ impl<const D: usize> Chain<D> {
     }
 
     /// Returns how far an initiator goes at once if something may be in the way, meters: a quarter
-    /// of the least rod or radius.
+    /// of the least rod or radius; rods that can close do not count.
     pub fn step_m(&self) -> f64 {
         0.25 * self.still.least_m
     }

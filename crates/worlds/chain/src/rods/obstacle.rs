@@ -191,6 +191,18 @@ impl<const D: usize> Obstacles<D> {
         }
     }
 
+    /// Returns the obstacle with the lowest id of those that a capsule is in.
+    pub(crate) fn first_at(&self, [p, q]: [Point<D>; 2], radius_m: f64) -> Option<u32> {
+        let mut first: Option<u32> = None;
+        self.visit(&Bounds::of(&[p, q]).grown(radius_m.max(0.0)), |o| {
+            let apart_m = o.core.nearest_to_segment([p, q]).distance_m - o.radius_m - radius_m;
+            if apart_m < 0.0 && first.is_none_or(|id| o.id < id) {
+                first = Some(o.id);
+            }
+        });
+        first
+    }
+
     /// Returns the least distance of a capsule's surface from the obstacles within `look_m`;
     /// `look_m` if nothing is as near.
     pub fn clearance_m(&self, [p, q]: [Point<D>; 2], radius_m: f64, look_m: f64) -> f64 {

@@ -56,6 +56,34 @@ pub(crate) fn passed<const D: usize>(
     })
 }
 
+/// Part of a gap that rounding may take, meters.
+const ROUNDING_M: f64 = 1e-12;
+
+/// Returns the obstacle that a capsule would pass through, or come deeper into than it was, on its way from one place
+/// to another with both ends going straight; of several that with the lowest id. A ball is a capsule of no length.
+pub(crate) fn in_the_way<const D: usize>(
+    Sweep { from, to }: Sweep<D>,
+    radius_m: f64,
+    obstacles: &Obstacles<D>,
+) -> Option<u32> {
+    let is_ball = from[0] == from[1] && to[0] == to[1];
+    let near = Bounds::of(&[from[0], from[1], to[0], to[1]]).grown(radius_m);
+    let mut hit: Option<u32> = None;
+    obstacles.visit(&near, |o| {
+        let keep_m = o.radius_m + radius_m;
+        let gap_m = |ends| o.core.nearest_to_segment(ends).distance_m - keep_m;
+        let least_m = gap_m(from).min(0.0) - ROUNDING_M;
+        let passes = match is_ball {
+            true => gap_m([from[0], to[0]]) < least_m,
+            false => gap_m(to) < least_m || !Sweep { from, to }.is_clear(&o.core, keep_m),
+        };
+        if passes && hit.is_none_or(|id| o.id < id) {
+            hit = Some(o.id);
+        }
+    });
+    hit
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::chain::{Connector, Rod};

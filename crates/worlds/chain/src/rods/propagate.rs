@@ -16,11 +16,13 @@ use super::rules::{Rotation, Rules};
 use super::scene::{Name, Overlay, Refusal, Scene, Step, TOLERANCE_M, fits, needed_m};
 use super::veto::{Mode, Motion, Moved, Outcome, Reason, Request, Veto};
 use apart::Proofs;
-use sidestep_kernel::InputError;
+use sidestep_kernel::{InputError, interrupt};
 use std::ops::Range;
 
 /// Most sub-steps of a request; one that would take more is refused.
 const MAX_SUB_STEPS: f64 = 1e6;
+/// Number of sub-steps from one look at whether to go on to the next.
+const LOOKS_EVERY: usize = 16;
 
 /// Moves chains by the rules. It owns the buffers of a motion, so that no motion allocates, and
 /// remembers nothing from one motion to the next that a result depends on.
@@ -115,6 +117,9 @@ impl<const D: usize> Propagator<D> {
             return Ok(Outcome::Moved(self.moved(None)));
         }
         for k in 1..=n {
+            if k.is_multiple_of(LOOKS_EVERY) {
+                interrupt::look();
+            }
             let heads = Heads { to: heads.part_of(from, [k, n]), ..heads };
             if let Err((by, refusal)) = self.sub_step(chain, obstacles, heads, k < n) {
                 let veto = veto(chain, heads.first, by, refusal);

@@ -12,7 +12,7 @@ use super::obstacle::Obstacles;
 use super::passage::passed;
 use super::propagate::Propagator;
 use super::veto::{Mode, Motion, Outcome, Reason, Request, Source, Veto};
-use sidestep_kernel::InputError;
+use sidestep_kernel::{InputError, interrupt};
 
 /// Most double passes before the search is given up.
 const MAX_DOUBLE_PASSES: usize = 40;
@@ -147,6 +147,7 @@ fn passes<const D: usize>(
     let mut nearest = chain.points()[order.k];
     let mut off_m = distance(nearest, order.target);
     for double_passes in 0..=most {
+        interrupt::look();
         if off_m <= order.tolerance_m && settle(chain, held) {
             return Ok(Reached::There { off_m, double_passes });
         }

@@ -50,6 +50,11 @@ impl<const D: usize> Compiler<'_, D> {
         let tip = link(&s.tip, "tip", model.default_tip())?;
         let serial = SerialChain::new(&model, base, tip, s.urdf.as_deref().unwrap_or("urdf_text"))
             .map_err(|error| self.source.error_of(at.clone(), &error))?;
+        if serial.variables.is_empty() {
+            let at = self.source.within(at, &["tip", "base", "urdf", "urdf_text"]);
+            let cause = format!("nothing moves between {} and {}", serial.base, serial.tip);
+            return Err(self.source.error(at, cause, "name another base or another tip"));
+        }
         let values = self.values(s, &model, &serial, at.clone())?;
         let at = || self.source.within(at, &["joints", "posture"]);
         serial

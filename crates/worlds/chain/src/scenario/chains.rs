@@ -5,6 +5,7 @@ use super::super::driver::{Driver, Task};
 use super::super::formation::Robots;
 use super::super::ground::Site;
 use super::super::ground::route::{Wanted, find};
+use super::super::motion::escape::{Escape, Method};
 use super::super::rods::chain::{Chain, Connector, Mobility, Rod};
 use super::super::rods::geometry::{Point, along, first_axis, perpendicular, unit};
 use super::super::rods::obstacle::Obstacles;
@@ -45,6 +46,16 @@ const BESIDE_ARMS: [&str; 11] = [
 const MAX_STEPS: f64 = 1e5;
 /// Most connectors of all chains together: some 3 GB.
 const MAX_CONNECTORS: usize = 10_000_000;
+
+/// Everything that is there when the chains of a section are placed.
+#[derive(Clone, Copy)]
+struct Around<'a, const D: usize> {
+    site: Option<&'a Site>,
+    /// The number of the section.
+    number: u32,
+    /// The chains of the sections before.
+    placed: &'a [ChainSpec<D>],
+}
 
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -109,8 +120,8 @@ impl<const D: usize> Compiler<'_, D> {
     ) -> Result<Vec<ChainSpec<D>>, InputError> {
         self.check_total()?;
         let mut all = Vec::new();
-        for section in &self.file.chains.0 {
-            let spec = self.chain(section, dt_s, site)?;
+        for (number, section) in (0..).zip(&self.file.chains.0) {
+            let spec = self.chain(section, dt_s, Around { site, number, placed: &all })?;
             for copy in 0..section.get_ref().count {
                 all.push(self.copied(&spec, section, copy)?);
             }
@@ -172,10 +183,12 @@ impl<const D: usize> Compiler<'_, D> {
         &self,
         section: &Spanned<ChainSection<D>>,
         dt_s: f64,
-        site: Option<&Site>,
+        around: Around<D>,
     ) -> Result<ChainSpec<D>, InputError> {
         let (s, at) = (section.get_ref(), section.span());
-        let (start, arm) = self.shape(s, site, at.clone())?;
+        let apart = [("apart_m", s.apart_m.is_some(), s.count != 1)];
+        self.has_no_idle_key(&apart, "without count = 2 or more", at.clone())?;
+        let (start, arm) = self.shape(s, around, at.clone())?;
         let tasks = self.tasks(s, &start, at.clone())?;
         if let Some(arm) = &arm {
             let sections = s.tasks.0.iter().zip(&tasks);
@@ -241,23 +254,28 @@ impl<const D: usize> Compiler<'_, D> {
     ) -> Result<Vec<Change<D>>, InputError> {
         let changes = s.changes.0.iter().map(|change| self.change(change, start, dt_s));
         let mut changes = changes.collect::<Result<Vec<_>, _>>()?;
-        changes.sort_by_key(|change| change.cycle);
+        // What breaks in a cycle can be joined in it, wherever the file says so.
+        let joins = |change: &Change<D>| matches!(change.what, What::Reform { .. });
+        changes.sort_by_key(|change| (change.cycle, joins(change)));
         let breaks = changes.iter().filter(|change| matches!(change.what, What::Scatter { .. }));
         if breaks.count() > 1 {
             let remedy = "let it break once";
             return Err(self.source.error(at, "a chain that breaks more than once", remedy));
         }
-        self.breaks_before_it_is_whole_again(s)?;
+        self.breaks_before_it_is_whole_again(s, dt_s)?;
         Ok(changes)
     }
 
-    /// Refuses to join what has not been broken by then.
-    fn breaks_before_it_is_whole_again(&self, s: &ChainSection<D>) -> Result<(), InputError> {
-        let broken_s =
-            s.changes.0.iter().filter_map(|change| change.get_ref().breaks_at_s()).next();
-        let is_early = |joins_s: f64| broken_s.is_none_or(|broken_s| joins_s < broken_s);
-        let joins_at_s = |change: &Spanned<ChangeSection<D>>| change.get_ref().joins_at_s();
-        match s.changes.0.iter().find(|change| joins_at_s(change).is_some_and(is_early)) {
+    /// Refuses to join what has not been broken by then, by the cycles in which both take effect.
+    fn breaks_before_it_is_whole_again(
+        &self,
+        s: &ChainSection<D>,
+        dt_s: f64,
+    ) -> Result<(), InputError> {
+        let broken = s.changes.0.iter().find_map(|change| change.get_ref().breaks_at(dt_s));
+        let is_early = |joins: u64| broken.is_none_or(|broken| joins < broken);
+        let joins_at = |change: &Spanned<ChangeSection<D>>| change.get_ref().joins_at(dt_s);
+        match s.changes.0.iter().find(|change| joins_at(change).is_some_and(is_early)) {
             None => Ok(()),
             Some(change) => {
                 let at = self.source.within(change.span(), &["reform"]);
@@ -282,6 +300,29 @@ impl<const D: usize> Compiler<'_, D> {
         let remedy = "give a shorter chain.dt_s, a lower speed_m_s, larger connectors and rods, \
                       or a longer chain.step_m";
         Err(self.source.error(at, cause, remedy))
+    }
+
+    /// Refuses a speed of escapes that would take too many sub-steps: the literal way out goes step by step.
+    pub(super) fn check_escapes(
+        &self,
+        chains: &[ChainSpec<D>],
+        escape: Option<&Escape>,
+    ) -> Result<(), InputError> {
+        let Some(escape) = escape.filter(|escape| escape.method == Method::Literal) else {
+            return Ok(());
+        };
+        let way_m = escape.speed_max_m_s * escape.dt_s;
+        let given_m = self.file.chain.step_m.map(f64::from);
+        let step_m = |spec: &ChainSpec<D>| given_m.unwrap_or(spec.start.step_m());
+        let is_long = |spec: &ChainSpec<D>| way_m > MAX_STEPS * step_m(spec);
+        let Some(slot) = chains.iter().position(is_long) else { return Ok(()) };
+        let cause = format!(
+            "it may have to flee {way_m:e} m in a cycle, in steps of {:e} m",
+            step_m(&chains[slot])
+        );
+        let remedy = "give a shorter chain.dt_s, a lower chain.escape_speed_m_s, slower obstacles, \
+                      chain.escape_by = \"simultaneous\", or a longer chain.step_m";
+        Err(self.source.error(self.section_of(slot), cause, remedy))
     }
 
     /// Refuses robots that overlap when their rods are shortest, and a margin below 0.
@@ -309,7 +350,7 @@ impl<const D: usize> Compiler<'_, D> {
     fn shape(
         &self,
         s: &ChainSection<D>,
-        site: Option<&Site>,
+        around: Around<D>,
         at: Range<usize>,
     ) -> Result<(Chain<D>, Option<Arc<Arm>>), InputError> {
         let radius_m = self.radius_m(s, at.clone())?;
@@ -326,7 +367,7 @@ impl<const D: usize> Compiler<'_, D> {
             ));
         }
         let points = match s.anywhere {
-            true => self.anywhere(s, &rod, radius_m, site, at.clone())?,
+            true => self.anywhere(s, &rod, radius_m, around, at.clone())?,
             false => self.points(s, rod.max_m, at.clone())?,
         };
         let mut connectors = vec![Connector::free(radius_m); points.len()];
@@ -379,11 +420,12 @@ impl<const D: usize> Compiler<'_, D> {
         at: Range<usize>,
     ) -> Result<(Chain<D>, Option<Arc<Arm>>), InputError> {
         let is_shaped = s.connectors.is_some() || s.points_m.is_some() || s.rod_m.is_some();
+        let is_shaped = is_shaped || s.folded_m.is_some();
         let is_turned = s.along.is_some() || s.heading_deg.is_some() || s.max_bend_deg.is_some();
         let is_turned = is_turned || s.anywhere || s.within_m.is_some() || s.robots.is_some();
         if D != 3 || is_shaped || is_turned || s.count != 1 {
             let remedy = "set chain.dimensions = 3, and leave out connectors, points_m, rod_m, \
-                          along, heading_deg, max_bend_deg, anywhere, robots and count";
+                          along, heading_deg, folded_m, max_bend_deg, anywhere, robots and count";
             let at = self.source.within(at, &BESIDE_ARMS);
             return Err(self.source.error(at, "an arm has its shape from its URDF file", remedy));
         }
@@ -451,7 +493,7 @@ impl<const D: usize> Compiler<'_, D> {
         s: &ChainSection<D>,
         rod: &Rod,
         radius_m: f64,
-        site: Option<&Site>,
+        Around { site, number, placed }: Around<D>,
         at: Range<usize>,
     ) -> Result<Vec<Point<D>>, InputError> {
         let (Some(site), Some(connectors)) = (site, s.connectors) else {
@@ -466,8 +508,9 @@ impl<const D: usize> Compiler<'_, D> {
             let at = self.source.within(at, &keys);
             return Err(self.source.error(at, "a chain placed in two ways", remedy));
         }
-        let obstacles = Obstacles::new(site.obstacles(0), rod.max_m.max(1e-3))
+        let obstacles = Obstacles::new(self.in_the_way(Some(site), placed)?, rod.max_m.max(1e-3))
             .map_err(|error| self.source.error_of(at.clone(), &error))?;
+        let obstacles = obstacles.in_plane().expect("only worlds in the plane have a ground");
         let wanted = Wanted {
             connectors,
             spacing_m: rod.max_m,
@@ -476,7 +519,7 @@ impl<const D: usize> Compiler<'_, D> {
             ahead_m: rod.max_m,
             within: s.within_m.as_ref().map(|within| within.get_ref().in_the_plane()),
         };
-        let start = find(site, &obstacles, &wanted, Seed(self.head.seed))
+        let start = find(site, obstacles, &wanted, (Seed(self.head.seed), number))
             .map_err(|error| self.source.error_of(at, &error))?;
         Ok(start.points.iter().map(|p| std::array::from_fn(|i| p[i])).collect())
     }
@@ -494,6 +537,11 @@ impl<const D: usize> Compiler<'_, D> {
                 let at = self.source.within(at, &["points_m"]);
                 return Err(self.source.error(at, "a chain placed in two ways", remedy));
             }
+            let keys = [
+                ("along", s.along.is_some(), false),
+                ("heading_deg", s.heading_deg.is_some(), false),
+            ];
+            self.has_no_idle_key(&keys, "beside points_m", at.clone())?;
             if given.is_empty() {
                 let at = self.source.within(at, &["points_m"]);
                 return Err(self.source.error(at, "points_m = []", "give one point or more"));

@@ -44,9 +44,14 @@ pub(super) struct ChangeSection<const D: usize> {
 }
 
 impl<const D: usize> ChangeSection<D> {
-    /// Returns the time at which it breaks the chain, if it does.
-    pub(super) fn breaks_at_s(&self) -> Option<f64> {
-        self.scatter.is_some().then(|| self.at_s.get())
+    /// Returns the cycle at whose start it takes effect.
+    fn cycle(&self, dt_s: f64) -> u64 {
+        (self.at_s.get() / dt_s).round() as u64
+    }
+
+    /// Returns the cycle in which it breaks the chain, if it does.
+    pub(super) fn breaks_at(&self, dt_s: f64) -> Option<u64> {
+        self.scatter.is_some().then(|| self.cycle(dt_s))
     }
 
     /// Whether it may let a connector go that is held or has failed.
@@ -59,9 +64,9 @@ impl<const D: usize> ChangeSection<D> {
         self.scatter.is_some() || (self.connector == Some(0) && self.mobility.is_some())
     }
 
-    /// Returns the time at which it joins the chain again, if it does.
-    pub(super) fn joins_at_s(&self) -> Option<f64> {
-        (self.reform == Some(true)).then(|| self.at_s.get())
+    /// Returns the cycle in which it joins the chain again, if it does.
+    pub(super) fn joins_at(&self, dt_s: f64) -> Option<u64> {
+        (self.reform == Some(true)).then(|| self.cycle(dt_s))
     }
 }
 
@@ -74,8 +79,7 @@ impl<const D: usize> Compiler<'_, D> {
         dt_s: f64,
     ) -> Result<Change<D>, InputError> {
         let (s, at) = (section.get_ref(), section.span());
-        let cycle = (s.at_s.get() / dt_s).round() as u64;
-        Ok(Change { cycle, what: self.what(s, chain, at)? })
+        Ok(Change { cycle: s.cycle(dt_s), what: self.what(s, chain, at)? })
     }
 
     fn what(

@@ -41,6 +41,24 @@ impl Rule for OfARobot {
     }
 }
 
+/// Angles up to a whole turn to either side, degrees.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct OfATurn;
+
+impl Rule for OfATurn {
+    fn allows(number: f64) -> bool {
+        number.abs() <= 360.0
+    }
+
+    fn words() -> String {
+        "a number from -360 to 360".into()
+    }
+
+    fn limits() -> Value {
+        json!({ "minimum": -360, "maximum": 360 })
+    }
+}
+
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum LeavingWord {
@@ -78,7 +96,7 @@ pub(super) struct NavigatorSection {
     /// Distance at which a wall is lost.
     lost_m: Option<f64>,
     /// Sector of the laser that looks at the wall.
-    sector_deg: Option<[f64; 2]>,
+    sector_deg: Option<[Number<OfATurn>; 2]>,
     /// Rule by which a wall is left.
     leaving: LeavingWord,
     /// Whether walls are left at all.
@@ -102,7 +120,7 @@ pub(super) struct NavigatorSection {
     /// Distance at which the target counts as reached.
     tolerance_m: Option<Number<Unbounded>>,
     /// Distance from which the target is seen.
-    detects_from_m: Option<f64>,
+    detects_from_m: Option<Number<Unbounded>>,
     /// Whether walls hide the target.
     needs_line_of_sight: bool,
 }
@@ -188,7 +206,9 @@ impl NavigatorSection {
         );
         let leader = Leader {
             laser: laser?,
-            sector_rad: self.sector_deg.map_or(usual.sector_rad, |deg| deg.map(f64::to_radians)),
+            sector_rad: self
+                .sector_deg
+                .map_or(usual.sector_rad, |ends| ends.map(|deg| f64::from(deg).to_radians())),
             speed_m_s,
             near_m: self.near_m.unwrap_or(usual.near_m),
             far_m: self.far_m.unwrap_or(usual.far_m),
@@ -200,7 +220,7 @@ impl NavigatorSection {
             },
             leave_rule: self.leave_rule.unwrap_or(true).then(LeaveRule::default),
             target_sense: TargetSense {
-                range_m: self.detects_from_m.unwrap_or(f64::INFINITY),
+                range_m: self.detects_from_m.map_or(f64::INFINITY, f64::from),
                 needs_line_of_sight: self.needs_line_of_sight,
             },
             turning: match self.turning {

@@ -5,7 +5,7 @@ use super::super::ground::{Corridor, Course, Leg, Mover, Movers, Site};
 use super::super::rods::chain::Chain;
 use super::super::rods::geometry::{Bounds, Core, Cuboid, Point};
 use super::super::rods::obstacle::{Obstacle, Obstacles, outline};
-use super::super::world::ChainSpec;
+use super::super::world::{ChainSpec, push_parts};
 use super::{Compiler, MOST, Measure, Place};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -24,8 +24,7 @@ pub(super) struct GroundSection {
     corridor: Option<Spanned<CorridorSection>>,
     /// A map of ROS (`.yaml`).
     map: Option<String>,
-    #[serde(default)]
-    unknown: UnknownWord,
+    unknown: Option<UnknownWord>,
     /// A world of Stage (`.world`).
     stage: Option<String>,
 }
@@ -137,14 +136,7 @@ impl<const D: usize> Compiler<'_, D> {
         site: Option<&Site>,
         chains: &[ChainSpec<D>],
     ) -> Result<Ground<D>, InputError> {
-        let mut all = Gathered { still: Vec::new(), movers: Vec::new(), next_id: 0 };
-        self.add_corridor(&mut all)?;
-        if let Some(site) = site {
-            all.add_still(site.obstacles(0).iter().map(lifted));
-        }
-        for section in &self.file.obstacles.0 {
-            self.add_obstacle(section, &mut all)?;
-        }
+        let mut all = self.given(site)?;
         for (k, section) in (0..).zip(&self.file.fields.0) {
             self.add_field(section, k, chains, &mut all)?;
         }
@@ -164,6 +156,32 @@ impl<const D: usize> Compiler<'_, D> {
         })
     }
 
+    /// Returns all obstacles but those at random places, which keep away from chains.
+    fn given(&self, site: Option<&Site>) -> Result<Gathered<D>, InputError> {
+        let mut all = Gathered { still: Vec::new(), movers: Vec::new(), next_id: 0 };
+        self.add_corridor(&mut all)?;
+        if let Some(site) = site {
+            all.add_still(site.obstacles(0).iter().map(lifted));
+        }
+        for section in &self.file.obstacles.0 {
+            self.add_obstacle(section, &mut all)?;
+        }
+        Ok(all)
+    }
+
+    /// Returns what a chain has to be placed between: all obstacles but those at random places, where they are at the
+    /// start, and the parts of the chains that are placed already.
+    pub(super) fn in_the_way(
+        &self,
+        site: Option<&Site>,
+        placed: &[ChainSpec<D>],
+    ) -> Result<Vec<Obstacle<D>>, InputError> {
+        let Gathered { still: mut all, movers, .. } = self.given(site)?;
+        all.extend(movers.iter().map(|mover| mover.at(0.0)));
+        (0..).zip(placed).for_each(|(slot, spec)| push_parts(&mut all, slot, &spec.start));
+        Ok(all)
+    }
+
     /// Returns the floors of a map or of a Stage world, if the scenario names one.
     pub(super) fn site(&self) -> Result<Option<Site>, InputError> {
         let Some(section) = &self.file.ground else { return Ok(None) };
@@ -180,7 +198,9 @@ impl<const D: usize> Compiler<'_, D> {
             let remedy = "set chain.dimensions = 2, or leave [ground] out";
             return Err(self.source.error(at, "a ground lies in the plane", remedy));
         }
-        let unknown = match s.unknown {
+        let unknown = [("unknown", s.unknown.is_some(), s.map.is_some())];
+        self.has_no_idle_key(&unknown, "without ground.map", at.clone())?;
+        let unknown = match s.unknown.unwrap_or_default() {
             UnknownWord::Solid => UnknownPolicy::Wall,
             UnknownWord::Free => UnknownPolicy::Free,
         };

@@ -32,6 +32,19 @@ impl<const D: usize> Recipe<D> {
         !self.file.fields.0.is_empty() || self.file.is_anywhere()
     }
 
+    /// Returns the rules that are given, by their keys, and whether they have an effect only where obstacles move; the
+    /// others have one only where connectors are held.
+    pub(crate) fn given_rules(&self) -> impl Iterator<Item = (&'static str, bool)> + use<D> {
+        let rules = &self.file.chain;
+        let all = [
+            ("joint_speed_m_s", rules.joint_speed_m_s.is_some(), false),
+            ("escape_by", rules.escape_by.is_some(), true),
+            ("escape_speed_m_s", rules.escape_speed_m_s.is_some(), true),
+            ("escape_ahead_s", rules.escape_ahead_s.is_some(), true),
+        ];
+        all.into_iter().filter(|(_, is_given, _)| *is_given).map(|(key, _, moves)| (key, moves))
+    }
+
     /// Compiles it.
     pub(super) fn compile(self) -> Result<Compiled<D>, InputError> {
         let compiled = self.compiled(&self.head, None)?;

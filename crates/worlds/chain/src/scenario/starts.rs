@@ -66,7 +66,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Returns the place of the section that a chain comes from.
-    fn section_of(&self, slot: usize) -> Option<Range<usize>> {
+    pub(super) fn section_of(&self, slot: usize) -> Option<Range<usize>> {
         let sections = self.file.chains.0.iter();
         let mut spans = sections.flat_map(|s| std::iter::repeat_n(s.span(), s.get_ref().count));
         spans.nth(slot)

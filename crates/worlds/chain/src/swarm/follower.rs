@@ -91,6 +91,11 @@ impl Follower {
         })
     }
 
+    /// Returns the distance from its place within which its body and its bumper stay for `dt_s` seconds.
+    pub(crate) fn reach_m(&self, dt_s: f64) -> f64 {
+        self.ring.radius_m + self.drive.max_wheel_m_s() * dt_s + BUMPER_M
+    }
+
     /// Returns wheel speeds that keep to a connector, limited by the sensors' readings. The wheels
     /// will turn for `dt_s`.
     pub fn decide(&self, pose: &Pose, goal: &Goal, gaps: &Gaps, dt_s: f64) -> Command {

@@ -175,7 +175,8 @@ impl Leader {
     ///
     /// # Errors
     /// When the speed is not above 0; the distances are not 0 < near <= far <= lost <= the laser's
-    /// range; or the laser does not see the sector.
+    /// range; the sector's ends are not finite, or in the wrong order; targets are detected from no distance above 0; or
+    /// the laser does not see the sector.
     pub fn check(&self) -> Result<(), InputError> {
         let wrong = |cause: String, remedy: &str| Err(InputError::new("leader", cause, remedy));
         let Self { speed_m_s, near_m, far_m, lost_m, sector_rad: [from, to], .. } = *self;
@@ -188,6 +189,15 @@ impl Leader {
                 format!("has walls near at {near_m}, far at {far_m}, lost at {lost_m} m"),
                 "give 0 < near <= far <= lost <= the laser's range",
             );
+        }
+        if !(from <= to && from.is_finite() && to.is_finite()) {
+            let cause = format!("looks for walls from {from} to {to} rad");
+            return wrong(cause, "give the right end of the sector first, both finite");
+        }
+        let detects_m = self.target_sense.range_m;
+        if detects_m.is_nan() || detects_m <= 0.0 {
+            let cause = format!("detects targets from {detects_m} m");
+            return wrong(cause, "give more than 0, or inf");
         }
         if !self.laser.sees([from, to]) || !self.laser.sees([-to, -from]) {
             let cause = format!("looks for walls from {from} to {to} rad, where it has no beams");

@@ -114,7 +114,9 @@ impl Builder<'_> {
         let mut last = base;
         while !self.adjacent(&last, &tip) {
             let next = candidates.iter().filter(|c| c.last > last.last && self.adjacent(&last, c));
-            last = *next.reduce(further).expect("every axis has a connector");
+            // Far from the origin rounding may part a connector from its axis; the rest of the arm is then one rod.
+            let Some(next) = next.reduce(further) else { break };
+            last = *next;
             connectors.push(last);
         }
         if !self.coincide(&last, &tip) {

@@ -348,3 +348,46 @@ proptest! {
         }
     }
 }
+
+/// An arm whose second joint mimics the first, with an offset, and whose other joint has a limit and a velocity.
+fn mimic(
+    [offset, multiplier, upper, velocity]: [&str; 4],
+) -> Result<Model, sidestep_kernel::InputError> {
+    let text = format!(
+        "<robot name='m'><link name='l0'/><link name='l1'/><link name='l2'/><link name='l3'/><link name='l4'/>
+        <joint name='a' type='continuous'><parent link='l0'/><child link='l1'/><axis xyz='0 0 1'/></joint>
+        <joint name='b' type='prismatic'><parent link='l1'/><child link='l2'/><origin xyz='0.5 0 0'/>\
+        <axis xyz='1 0 0'/><limit lower='-1' upper='0'/>\
+        <mimic joint='a' multiplier='{multiplier}' offset='{offset}'/></joint>
+        <joint name='c' type='revolute'><parent link='l2'/><child link='l3'/>\
+        <origin xyz='0 0.5 0.3' rpy='0.3 0.3 0.5'/><axis xyz='0 0 1'/>\
+        <limit lower='-1' upper='{upper}' velocity='{velocity}'/></joint>
+        <joint name='d' type='prismatic'><parent link='l3'/><child link='l4'/><origin xyz='0.8 0 0.5'/>\
+        <axis xyz='0 1 0'/><limit lower='0' upper='1' velocity='1'/></joint></robot>"
+    );
+    Model::parse("m.urdf", &text)
+}
+
+#[test]
+fn numbers_of_joints_that_no_robot_has_are_refused_at_their_place() {
+    let usual = ["0.1", "-1", "1", "1"];
+    mimic(usual).expect("usual numbers");
+    for (k, line) in [(0, 3), (1, 3), (2, 4), (3, 4)] {
+        let mut numbers = usual;
+        numbers[k] = "1e300";
+        let error = mimic(numbers).expect_err("an absurd number");
+        assert_eq!(error.cause(), "1e300 is beyond 1e6");
+        assert_eq!(error.position().map(|(line, _)| line), Some(line), "{error}");
+    }
+}
+
+#[test]
+fn arms_far_from_their_base_have_connectors_from_base_to_tip() {
+    for offset in ["1e3", "1e4", "1e5", "1e6", "-1e6", "123456.789"] {
+        let arm = chain_of(&mimic([offset, "-1", "1", "1"]).expect("a model"), None);
+        let skeleton = arm.skeleton();
+        let places = arm.connectors(&skeleton, &arm.forward(&arm.rest()));
+        assert_eq!(places.len(), skeleton.rods.len() + 1, "{offset}");
+        assert!(places.iter().flatten().all(|x| x.is_finite()), "{offset}");
+    }
+}

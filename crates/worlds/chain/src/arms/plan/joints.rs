@@ -8,8 +8,8 @@ use crate::rods::chain::Chain;
 use crate::rods::geometry::Point;
 use crate::rods::obstacle::Obstacles;
 use crate::rods::veto::Veto;
-use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Draws;
+use sidestep_kernel::{InputError, interrupt};
 use std::f64::consts::PI;
 
 /// Distinct postures at a target that are looked for, and random ones that the search starts from.
@@ -17,6 +17,8 @@ const SOLUTIONS: usize = 12;
 const RESTARTS: usize = 60;
 /// Most of those from which the second tree grows.
 const GOALS: usize = 4;
+/// Least step between two postures that are checked, in parts of the arm's reach.
+const LEAST_STEP: f64 = 1e-3;
 
 /// The postures of one arm among obstacles: a value for each of its joints.
 pub(crate) struct JointSpace<'a, const D: usize> {
@@ -39,7 +41,8 @@ impl<'a, const D: usize> JointSpace<'a, D> {
         k: usize,
     ) -> Self {
         let judge = Judge { chain, obstacles, self_collision };
-        Self { arm, present, judge, k, step_m: chain.step_m() }
+        let step_m = chain.step_m().max(LEAST_STEP * arm.skeleton.reach_m);
+        Self { arm, present, judge, k, step_m }
     }
 
     /// Returns the objection to the places of an arm's connectors, if there is one.
@@ -100,7 +103,10 @@ impl<const D: usize> Postures for JointSpace<'_, D> {
 
     fn is_way_free(&self, a: &Vec<f64>, b: &Vec<f64>) -> bool {
         let n = (self.apart_m(a, b) / self.step_m).ceil().max(1.0) as usize;
-        (1..=n).all(|step| self.is_free(&self.at(a, b, step as f64 / n as f64)))
+        (1..=n).all(|step| {
+            interrupt::look();
+            self.is_free(&self.at(a, b, step as f64 / n as f64))
+        })
     }
 
     fn any(&self, draws: &mut Draws) -> Vec<f64> {

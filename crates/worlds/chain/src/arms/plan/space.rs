@@ -7,9 +7,9 @@ use crate::rods::geometry::{
     Point, add, along, between, distance, first_axis, norm, norm2, scaled, sub, unit,
 };
 use crate::rods::obstacle::Obstacles;
-use sidestep_kernel::InputError;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::Draws;
+use sidestep_kernel::{InputError, interrupt};
 use std::f64::consts::PI;
 
 /// The postures of one chain among obstacles.
@@ -106,6 +106,7 @@ impl<const D: usize> Postures for RodSpace<'_, D> {
         let n = (self.apart_m(a, b) / self.step_m).ceil().max(1.0) as usize;
         let mut before = a.clone();
         (1..=n).all(|step| {
+            interrupt::look();
             let next = self.at(a, b, step as f64 / n as f64);
             // Rods that nearly turn round jump in between.
             let is_near = self.apart_m(&before, &next) <= MOST_STEPS * self.step_m;

@@ -5,7 +5,9 @@ use crate::rods::chain::{Connector, Mobility, Rod};
 use crate::rods::obstacle::Obstacle;
 use crate::scenes::clearance_m;
 use sidestep_kernel::Seed;
+use sidestep_kernel::interrupt::Interrupt;
 use sidestep_kernel::stream::{Purpose, Streams};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 fn draws(seed: u64) -> Draws {
     Streams::new(Seed(seed)).draws(0, 0, Purpose(9))
@@ -89,4 +91,16 @@ fn a_chain_without_a_base_has_no_plan() {
     let chain = Chain::straight([0.0; 2], [1.0, 0.0], 5, rod, Connector::free(0.03)).unwrap();
     let error = plan(&chain, &wall(), Rules::default(), &BEHIND, &mut draws(1)).unwrap_err();
     assert_eq!(error.place(), "planner");
+}
+
+#[test]
+fn a_search_heeds_an_interrupt() {
+    let interrupt = Interrupt::default();
+    interrupt.raise();
+    let search = || {
+        let _heeded = interrupt.heeded_here();
+        plan(&arm(), &wall(), Rules::default(), &BEHIND, &mut draws(1))
+    };
+    let payload = catch_unwind(AssertUnwindSafe(search)).expect_err("it unwinds");
+    assert!(interrupt.explains(payload.as_ref()));
 }

@@ -1,6 +1,7 @@
 //! Two trees of postures that grow toward each other.
 
 use super::Postures;
+use sidestep_kernel::interrupt;
 use sidestep_kernel::stream::Draws;
 
 /// Most random postures that the trees grow toward.
@@ -81,6 +82,7 @@ pub(super) fn way<S: Postures>(
     let towards_goals = goals.into_iter().map(|goal| (goal, most));
     let drawn = std::iter::repeat_with(|| None).take(MOST_DRAWN);
     for (i, toward) in towards_goals.map(Some).chain(drawn).enumerate() {
+        interrupt::look();
         // The trees take turns; the first tries are straight to the goals.
         let (one, other) = if toward.is_some() { (0, 1) } else { (i % 2, 1 - i % 2) };
         let (to, strides) = toward.unwrap_or_else(|| (space.any(draws), 1));

@@ -14,8 +14,8 @@ use crate::rods::own_body::OwnBody;
 use crate::rods::reach::{Reach, Reached, reach};
 use crate::rods::scene::TOLERANCE_M;
 use crate::rods::veto::{Mode, Motion, Outcome, Reason, Request, Source, Veto};
-use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin};
+use sidestep_kernel::{InputError, interrupt};
 use std::ops::Range;
 
 /// Leads parts out of the way one after the other.
@@ -89,6 +89,7 @@ impl<const D: usize> Literal<D> {
         while *tries > 0 {
             let Some(deepest) = self.deepest() else { break };
             *tries -= 1;
+            interrupt::look();
             match self.relieve(tick, deepest)? {
                 Ok(touched) => {
                     self.measure(tick, &touched);

@@ -134,6 +134,9 @@ impl Follower {
         guide: Option<&[Vector]>,
         led: &[Aim],
     ) -> Vec<f64> {
+        if start.is_empty() {
+            return Vec::new();
+        }
         let room = Bounds { ranges: room.to_vec() };
         let mut fit = Fit::new(self, start);
         if let Some(guide) = guide {

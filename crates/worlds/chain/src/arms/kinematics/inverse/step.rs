@@ -79,6 +79,9 @@ impl Stepper {
         let n = values.len();
         next.clear();
         next.extend_from_slice(values);
+        if n == 0 {
+            return;
+        }
         self.is_free.clear();
         self.is_free.resize(n, true);
         self.wanted.clear();

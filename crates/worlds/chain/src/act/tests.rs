@@ -1,0 +1,282 @@
+//! Whole runs of small scenarios: what chains do to each other, and what is told of it.
+
+use crate::events::EventKind;
+use crate::rods::geometry::distance;
+use crate::scenario::Compiled;
+use crate::{
+    Chain, ChainRun, Connector, Mode, Motion, Obstacle, Obstacles, Propagator, Request, Rod, Source,
+};
+use sidestep_kernel::Simulation;
+use sidestep_kernel::interrupt::Interrupt;
+use sidestep_kernel::ports::{MemoryRecorder, Recorder, Values};
+use sidestep_scenario::Source as Text;
+use sidestep_testing::root;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// Returns a run of a scenario in the plane.
+fn run(text: &str) -> ChainRun<2> {
+    let source = Text::new("s.toml", format!("format = 1\nworld = \"chain\"\n{text}"), root());
+    Compiled::new(&source).unwrap_or_else(|error| panic!("{error}")).start(&source, 1)
+}
+
+/// Advances a run; returns the names and values of its events.
+fn told(run: &mut ChainRun<2>, cycles: u64) -> Vec<(String, f64)> {
+    run.begin_recording();
+    let mut rows = MemoryRecorder::new(&run.schemas());
+    while run.cycle() < cycles && !run.is_over() {
+        run.advance(1);
+        run.record(&mut rows).expect("memory has room");
+    }
+    rows.finish().expect("memory has room");
+    let Some(Values::Label(kinds)) = rows.column("events", "event") else { panic!("kinds") };
+    let Some(Values::F64(values)) = rows.column("events", "value") else { panic!("values") };
+    let name = |kind: &u32| EventKind::ALL[*kind as usize].name().to_owned();
+    kinds.iter().map(name).zip(values.iter().copied()).collect()
+}
+
+fn count(told: &[(String, f64)], kind: &str) -> usize {
+    told.iter().filter(|(of, _)| of == kind).count()
+}
+
+/// Two swarms, one of which cannot keep up with its connectors, cross at some angle.
+fn crossing(heading_deg: u32) -> String {
+    format!(
+        "seed = 1\ncycles = 700\n[[chains]]\nconnectors = 2\nat_m = [0.0, 0.0]\nrod_m = [0.8, 1.0]\n\
+         robots = {{ radius_m = 0.25, wheel_speed_m_s = 0.05 }}\n\
+         tasks = [{{ kind = \"script\", script = \"forward 5\" }}]\n\
+         [[chains]]\nconnectors = 2\nat_m = [0.0, -3.0]\nheading_deg = {heading_deg}\nrod_m = [0.8, 1.0]\n\
+         robots = {{ radius_m = 0.25 }}\ntasks = [{{ kind = \"script\", script = \"wait 2 forward 6\" }}]\n"
+    )
+}
+
+#[test]
+fn robots_of_different_chains_never_overlap_however_far_they_lag() {
+    for heading_deg in [80, 90, 100] {
+        let mut run = run(&crossing(heading_deg));
+        while run.cycle() < 700 && !run.is_over() {
+            run.advance(1);
+            let [a, b] = [0, 1].map(|slot| run.state().body(slot).robots.clone());
+            let pairs = a.iter().flat_map(|a| b.iter().map(move |b| (a, b)));
+            let gap_m = pairs.map(|(a, b)| distance(a.pose.at, b.pose.at) - 0.5);
+            let least_m = gap_m.fold(f64::INFINITY, f64::min);
+            assert!(least_m > -1e-9, "{heading_deg} deg, cycle {}: {least_m} m", run.cycle());
+        }
+    }
+}
+
+/// A chain whose last connector is held, on its way to places that are too far for it, and maybe to one that is not.
+fn held(targets_m: &str) -> String {
+    format!(
+        "seed = 1\ncycles = 2000\n[[chains]]\nconnectors = 3\nrod_m = 0.5\n\
+         limits = [{{ connector = 2, mobility = \"fixed\" }}]\n\
+         tasks = [{{ kind = \"targets\", targets_m = {targets_m}, planner = \"none\", patience_s = 1.0 }}]\n"
+    )
+}
+
+#[test]
+fn a_task_none_of_whose_targets_was_reached_is_given_up_and_not_done() {
+    let mut none = run(&held("[[10.0, 0.0], [0.0, 10.0]]"));
+    let events = told(&mut none, 2000);
+    let given_up: Vec<_> = events.iter().filter(|(kind, _)| kind.ends_with("given-up")).collect();
+    let expected = [("target-given-up", 0.0), ("target-given-up", 1.0), ("given-up", 0.0)];
+    assert_eq!(given_up.len(), 3, "{events:?}");
+    for (told, (kind, value)) in given_up.into_iter().zip(expected) {
+        assert_eq!((told.0.as_str(), told.1), (kind, value), "{events:?}");
+    }
+    let tally = none.world().metrics_of(none.state(), 0).tally;
+    assert!(none.is_over() && tally.done == 0 && count(&events, "done") == 0, "{events:?}");
+
+    let mut some = run(&held("[[10.0, 0.0], [-0.5, 0.5]]"));
+    let events = told(&mut some, 2000);
+    let tally = some.world().metrics_of(some.state(), 0).tally;
+    // The target and its task.
+    assert!(some.is_over() && tally.done == 2 && count(&events, "done") == 1, "{events:?}");
+}
+
+/// A chain that breaks, and is to be joined again, with more in the way.
+fn broken(joins_s: &str, by_m: f64, more: &str) -> String {
+    format!(
+        "seed = 3\ncycles = 1500\n{more}\n[[chains]]\nconnectors = 6\nrod_m = [0.4, 0.5]\n\
+         tasks = [{{ kind = \"rest\", lasts_s = 8.0 }}]\n\
+         changes = [{{ at_s = {joins_s}, reform = true }}, {{ at_s = 1.0, scatter = [1, 4], by_m = {by_m} }}]\n"
+    )
+}
+
+#[test]
+fn a_chain_that_breaks_in_a_cycle_can_be_joined_in_it_wherever_the_file_says_so() {
+    // Both are in cycle 50.
+    let mut run = run(&broken("1.005", 0.5, ""));
+    let events = told(&mut run, 1500);
+    let kinds: Vec<_> = events.iter().map(|(kind, _)| kind.as_str()).collect();
+    assert_eq!(&kinds[..2], ["broken", "reforming"], "{events:?}");
+    assert_eq!(count(&events, "reformed"), 1, "{events:?}");
+    assert!(run.is_over() && run.state().body(0).scattered.is_none());
+}
+
+/// Advances a run; asserts that no connector passes through its obstacles, nor is deeper in one than by rounding.
+fn assert_nothing_is_passed(run: &mut ChainRun<2>, cycles: u64, case: &str) -> usize {
+    let obstacles = run.world().obstacles.clone();
+    let (mut before, mut reformed) = (run.state().body(0).chain.points().to_vec(), 0);
+    while run.cycle() < cycles && !run.is_over() {
+        let was_whole = run.state().body(0).scattered.is_none();
+        run.advance(1);
+        let body = run.state().body(0);
+        let is_whole = body.scattered.is_none();
+        reformed += usize::from(is_whole && !was_whole);
+        // A part that is thrown flies over whatever is below.
+        let is_thrown = was_whole && !is_whole;
+        for (k, (was, at)) in before.iter().zip(body.chain.points()).enumerate() {
+            let from = if is_thrown { at } else { was };
+            let gap_m = obstacles.clearance_m([*from, *at], 0.05, 1.0);
+            assert!(gap_m > -1e-9, "{case}, cycle {}: {k} is {gap_m} m away", run.cycle());
+        }
+        for rod in body.chain.points().windows(2).filter(|_| is_whole) {
+            assert!(obstacles.clearance_m([rod[0], rod[1]], 0.01, 1.0) > -1e-9, "{case}");
+        }
+        before.copy_from_slice(body.chain.points());
+    }
+    reformed
+}
+
+#[test]
+fn parts_that_come_back_pass_through_nothing_and_the_chain_is_whole_only_where_there_is_room() {
+    let mut reformed = 0;
+    for seed in 1..=12 {
+        let wall = "[[obstacles]]\nends_m = [[-1.2, 0.3], [-1.2, 30.0]]\nradius_m = 0.05";
+        let field = "[[fields]]\nlo_m = [-3.5, -1.5]\nhi_m = [1.0, 1.5]\npart = 0.06\nradius_m = 0.08\nkeep_m = 0.02";
+        for (more, by_m) in [(wall, 2.0), (field, 0.5), ("", 1.0)] {
+            let text = broken("1.5", by_m, more).replace("seed = 3", &format!("seed = {seed}"));
+            let case = format!("{seed} {by_m}");
+            reformed += assert_nothing_is_passed(&mut run(&text), 1500, &case);
+        }
+    }
+    assert!(reformed >= 12, "{reformed}");
+}
+
+#[test]
+fn parts_that_something_keeps_from_coming_back_are_told_with_what_it_is() {
+    let box_ = "[[obstacles]]\ncorners_m = [[-1.5, 0.3], [-0.5, 0.3], [-0.5, 0.5], [-1.5, 0.5]]\n";
+    let told_of = |seed: u32| {
+        let text = broken("1.5", 2.0, box_).replace("seed = 3", &format!("seed = {seed}"));
+        let mut run = run(&text);
+        let events = told(&mut run, 1500);
+        (count(&events, "not-reformed"), run.metrics().not_reformed, run.is_over())
+    };
+    let all: Vec<_> = (1..=12).map(told_of).collect();
+    assert!(all.iter().any(|(told, ..)| *told == 1), "{all:?}");
+    assert!(
+        all.iter().all(|(told, counted, is_over)| {
+            *told as u64 == *counted && (*told == 0) == *is_over
+        })
+    );
+}
+
+#[test]
+fn parts_that_come_back_stay_in_the_claim_of_their_chain_from_the_first_cycle_on() {
+    let fast = "changes = [{ at_s = 1.0, scatter = [1, 4], by_m = 0.001 }, { at_s = 1.0, reform = true, speed_m_s = 50.0 }]";
+    let text = format!(
+        "seed = 1\ncycles = 100\n[[chains]]\nconnectors = 6\nrod_m = 0.5\n\
+         tasks = [{{ kind = \"rest\", lasts_s = 2.0 }}]\n{fast}\n\
+         [[chains]]\nconnectors = 2\nat_m = [0.0, 9.0]\nrod_m = 0.5\ntasks = [{{ kind = \"rest\" }}]\n"
+    );
+    let mut run = run(&text);
+    run.advance(51);
+    let (claim, body) = (run.state().claim(0), run.state().body(0));
+    let way_m = 50.0 * run.world().dt_s;
+    assert!(claim.lo[1] <= -way_m && claim.hi[1] >= way_m, "{claim:?}: {way_m} m a cycle");
+    assert!(body.chain.points().iter().all(|p| claim.lo[1] <= p[1] && p[1] <= claim.hi[1]));
+}
+
+/// A lift whose joint can bring its ends together, and a hinge on it.
+const LIFT: &str = "<robot name='lift'><link name='base'/><link name='c'/><link name='a'/><link name='b'/>\
+    <link name='tool'/>\
+    <joint name='lift' type='prismatic'><parent link='base'/><child link='c'/><axis xyz='0 0 1'/>\
+    <limit lower='0' upper='0.6' velocity='0.5'/></joint>\
+    <joint name='j1' type='revolute'><parent link='c'/><child link='a'/><axis xyz='0 0 1'/>\
+    <limit lower='-2.5' upper='2.5' velocity='3'/></joint>\
+    <joint name='j2' type='revolute'><parent link='a'/><child link='b'/><origin xyz='0.4 0 0'/><axis xyz='0 0 1'/>\
+    <limit lower='-2.5' upper='2.5' velocity='3'/></joint>\
+    <joint name='tip' type='fixed'><parent link='b'/><child link='tool'/><origin xyz='0.3 0 0'/></joint></robot>";
+
+fn lift(target_m: &str, more: &str) -> Compiled<3> {
+    let text = format!(
+        "format = 1\nworld = \"chain\"\nseed = 1\ncycles = 250\n[chain]\ndimensions = 3\n{more}\n[[chains]]\n\
+         arm = {{ urdf_text = \"{LIFT}\", joints = [0.3, 0.5, 0.5] }}\nradius_m = 0.03\n[[chains.tasks]]\n\
+         kind = \"targets\"\nconnector = 3\ntargets_m = [{target_m}]\nspeed_m_s = 0.3\n"
+    );
+    Compiled::new(&Text::new("s.toml", text, "")).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn a_joint_that_can_close_its_rod_does_not_shorten_the_steps_of_an_arm() {
+    let step_m = lift("[0.4, 0.3, 0.45]", "").world.chains[0].start.step_m();
+    assert!(step_m >= 0.005, "{step_m}");
+}
+
+/// A pole is in the way, so the arm has to plan.
+#[test]
+fn an_arm_whose_rod_can_close_plans_like_any_other() {
+    let pole = "[[obstacles]]\nends_m = [[0.5, -0.1, -1.0], [0.5, -0.1, 2.0]]\nradius_m = 0.08";
+    let compiled = lift("[0.35, -0.45, 0.3]", pole);
+    let mut run = compiled.start(&Text::new("s.toml", "", ""), 1);
+    run.advance(250);
+    let tally = run.world().metrics_of(run.state(), 0).tally;
+    assert!(tally.rungs.planned + tally.rungs.not_planned > 0, "{tally:?}");
+}
+
+/// A ball from which a chain flees at a speed of very many sub-steps.
+#[test]
+fn a_literal_escape_of_very_many_steps_is_refused() {
+    let text = |speed: &str, by: &str| {
+        format!(
+            "format = 1\nworld = \"chain\"\n[chain]\nstep_m = 0.001\nescape_speed_m_s = {speed}\nescape_by = \"{by}\"\n\
+             [[obstacles]]\nat_m = [9.0, 0.0]\nradius_m = 0.5\nvelocity_m_s = [-1.0, 0.0]\n\
+             [[chains]]\nconnectors = 3\nrod_m = 0.5\ntasks = [{{ kind = \"rest\" }}]\n"
+        )
+    };
+    let compiled = |text: String| Compiled::<2>::new(&Text::new("s.toml", text, ""));
+    let error = compiled(text("1e5", "literal")).expect_err("too many steps");
+    assert!(error.cause().contains("flee 2e3 m in a cycle"), "{error}");
+    assert!(
+        error.position().is_some() && error.remedy().contains("chain.escape_speed_m_s"),
+        "{error}"
+    );
+    compiled(text("1e5", "simultaneous")).expect("solved at once");
+    compiled(text("10.0", "literal")).expect("few steps");
+}
+
+#[test]
+fn a_motion_of_many_sub_steps_heeds_an_interrupt() {
+    let rod = Rod::fixed(0.5, 0.01);
+    let mut chain =
+        Chain::straight([0.0; 2], [-1.0, 0.0], 3, rod, Connector::free(0.05)).expect("a chain");
+    let ball = Obstacles::new(vec![Obstacle::ball(0, [0.0, 99.0], 0.1)], 1.0).expect("a ball");
+    let motion = Motion::Connector { k: 0, to: [2.0, 0.0] };
+    let request = Request { motion, source: Source::Autonomous, mode: Mode::Exact };
+    let interrupt = Interrupt::default();
+    interrupt.raise();
+    let moved = || {
+        let _heeded = interrupt.heeded_here();
+        Propagator::default().propagate(&mut chain, &ball, &request)
+    };
+    let payload = catch_unwind(AssertUnwindSafe(moved)).expect_err("it unwinds");
+    assert!(interrupt.explains(payload.as_ref()));
+}
+
+/// Chains side by side, so many that they are sorted, which wander into each other.
+const MANY: &str = "seed = 1\ncycles = 200\n[[chains]]\nconnectors = 3\ncount = 50\napart_m = [0.0, 0.35]\nrod_m = 0.3\n\
+    tasks = [{ kind = \"wander\", turn_deg = 60 }]\n";
+
+#[test]
+fn many_chains_join_the_same_groups_on_any_number_of_workers_and_never_overlap() {
+    let digest = |workers: usize| {
+        let source = Text::new("s.toml", format!("format = 1\nworld = \"chain\"\n{MANY}"), "");
+        let compiled = Compiled::<2>::new(&source).expect("valid");
+        let mut run = compiled.start(&source, workers);
+        run.share_always();
+        run.advance(200);
+        assert_eq!(run.metrics().penetrations, 0, "{workers} workers");
+        run.digest()
+    };
+    assert_eq!(digest(1), digest(3));
+}

@@ -1,0 +1,130 @@
+//! Scenarios that are refused, and those that look much like them and are valid.
+
+use super::*;
+
+/// Two links that a fixed joint holds together, and a third that turns.
+const WRIST: &str = "<robot name='wrist'><link name='base'/><link name='post'/><link name='hand'/><link name='tool'/>\
+    <joint name='mount' type='fixed'><parent link='base'/><child link='post'/><origin xyz='0.5 0 0'/></joint>\
+    <joint name='turn' type='continuous'><parent link='post'/><child link='hand'/><axis xyz='0 0 1'/></joint>\
+    <joint name='grip' type='fixed'><parent link='hand'/><child link='tool'/><origin xyz='0.5 0 0'/></joint></robot>";
+
+/// Returns the error of a scenario, in one line; none if it is valid.
+fn error_of(text: &str) -> Option<String> {
+    let text = format!("format = 1\nworld = \"chain\"\n{text}");
+    let error = AnyCompiled::new(&Source::new("s.toml", text, "")).err()?;
+    Some(format!("{} | {}", error.cause(), error.remedy()))
+}
+
+fn assert_refused(text: &str, words: &[&str]) {
+    let error = error_of(text).unwrap_or_else(|| panic!("is taken for valid:\n{text}"));
+    assert!(words.iter().all(|word| error.contains(word)), "{error}, not {words:?}:\n{text}");
+}
+
+fn assert_valid(text: &str) {
+    assert_eq!(error_of(text), None, "{text}");
+}
+
+fn arm(keys: &str) -> String {
+    format!(
+        "[chain]\ndimensions = 3\n[[chains]]\narm = {{ urdf_text = \"{WRIST}\", {keys} }}\nradius_m = 0.02\n\
+         [[chains.tasks]]\nkind = \"wander\"\nconnector = 1\n"
+    )
+}
+
+#[test]
+fn an_arm_without_a_joint_that_moves_is_refused() {
+    let words = ["nothing moves between", "name another base or another tip"];
+    assert_refused(&arm("base = \"base\", tip = \"post\""), &words);
+    assert_refused(&arm("base = \"hand\""), &words);
+    assert_valid(&arm("base = \"base\""));
+}
+
+#[test]
+fn numbers_of_a_navigator_are_numbers_and_in_order() {
+    let navigator = |keys: &str| {
+        format!(
+            "[[chains]]\nconnectors = 3\nrod_m = 0.8\n[[chains.tasks]]\nkind = \"navigate\"\n\
+             navigator = {{ target_m = [9.0, 0.0], {keys} }}\n"
+        )
+    };
+    for keys in ["sector_deg = [nan, nan]", "sector_deg = [nan, 90]", "sector_deg = [-inf, 90]"] {
+        assert_refused(&navigator(keys), &["-360 to 360"]);
+    }
+    assert_refused(&navigator("sector_deg = [90, 10]"), &["the right end of the sector first"]);
+    for keys in ["detects_from_m = nan", "detects_from_m = -3.0", "detects_from_m = 0.0"] {
+        assert_refused(&navigator(keys), &["a number above 0, or inf"]);
+    }
+    assert_valid(&navigator("sector_deg = [0, 90], detects_from_m = inf"));
+}
+
+/// Two chains anywhere on a map.
+fn anywhere(second: &str) -> String {
+    let chain = "[[chains]]\nconnectors = 3\nrod_m = 0.4\nradius_m = 0.1\nanywhere = true\n";
+    let task = "[[chains.tasks]]\nkind = \"wander\"\n";
+    format!(
+        "format = 1\nworld = \"chain\"\nseed = 1\n[ground]\nmap = \"examples/building.yaml\"\n\
+         {chain}{task}{chain}{second}{task}"
+    )
+}
+
+fn starts(text: &str, seed: u64) -> Vec<Vec<[f64; 2]>> {
+    let text = text.replace("seed = 1", &format!("seed = {seed}"));
+    let source = Source::new("s.toml", text, sidestep_testing::root());
+    let compiled = Compiled::<2>::new(&source).unwrap_or_else(|error| panic!("{seed}: {error}"));
+    compiled.world.chains.iter().map(|spec| spec.start.points().to_vec()).collect()
+}
+
+#[test]
+fn chains_anywhere_have_places_of_their_own_beside_each_other_and_beside_obstacles() {
+    let alone = anywhere("");
+    for seed in 1..=10 {
+        let [a, b] = &starts(&alone, seed)[..] else { panic!("two chains") };
+        assert_ne!(a, b, "{seed}");
+    }
+    // A room that only just holds both, and a pillar in it.
+    let within = "within_m = [[0.3, 0.3], [2.5, 2.5]]\n";
+    let pillar = "[[obstacles]]\nat_m = [1.2, 1.2]\nradius_m = 0.2\n[[chains]]";
+    let cramped =
+        anywhere(within).replacen("anywhere = true\n", &format!("anywhere = true\n{within}"), 1);
+    let cramped = cramped.replacen("[[chains]]", pillar, 1);
+    for seed in 1..=10 {
+        assert_eq!(starts(&cramped, seed).len(), 2);
+    }
+}
+
+#[test]
+fn a_chain_that_is_whole_is_not_joined() {
+    let chain = |breaks_s: f64, joins_s: f64| {
+        format!(
+            "[[chains]]\nconnectors = 6\nrod_m = 0.5\ntasks = [{{ kind = \"rest\" }}]\n\
+             changes = [{{ at_s = {joins_s}, reform = true }}, {{ at_s = {breaks_s}, scatter = [2, 3] }}]\n"
+        )
+    };
+    // Cycles are rounded, of 0.02 s.
+    assert_refused(&chain(1.0, 0.985), &["reform of a chain that is whole"]);
+    assert_valid(&chain(1.0, 1.0));
+    assert_valid(&chain(1.005, 1.0));
+}
+
+#[test]
+fn keys_that_have_no_effect_are_refused() {
+    let task = "tasks = [{ kind = \"rest\" }]\n";
+    let points = |key: &str| {
+        format!("[[chains]]\npoints_m = [[0.0, 0.0], [0.5, 0.0]]\nrod_m = 0.5\n{key}\n{task}")
+    };
+    assert_refused(&points("heading_deg = 90"), &["`heading_deg` does nothing", "points_m"]);
+    assert_refused(&points("along = [1.0, 0.0]"), &["`along` does nothing", "points_m"]);
+    assert_valid(&points(""));
+    let apart = |count: &str| {
+        format!("[[chains]]\nconnectors = 2\nrod_m = 0.5\napart_m = [0.0, 2.0]\n{count}\n{task}")
+    };
+    assert_refused(&apart(""), &["`apart_m` does nothing", "count"]);
+    assert_refused(&apart("count = 1"), &["`apart_m` does nothing", "count"]);
+    assert_valid(&apart("count = 2"));
+    let folded =
+        arm("base = \"base\"").replace("radius_m = 0.02", "radius_m = 0.02\nfolded_m = [1.0, 0.5]");
+    assert_refused(&folded, &["an arm has its shape from its URDF file", "folded_m"]);
+    let corridor = "[ground]\ncorridor = { width_m = 1.5 }\nunknown = \"free\"\n";
+    let chain = format!("[[chains]]\nconnectors = 2\nrod_m = 0.5\n{task}");
+    assert_refused(&format!("{corridor}{chain}"), &["`unknown` does nothing", "ground.map"]);
+}
