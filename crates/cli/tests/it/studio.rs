@@ -216,7 +216,7 @@ fn noise_is_answered_with_problems_and_the_session_goes_on() {
     }
     page.socket.send(Message::binary(vec![0xff; 1000])).expect("sent");
     assert!(page.wait_reply(0)["problem"].is_object());
-    page.send(" ".repeat(20_000_000));
+    page.send(" ".repeat(42_000_000));
     assert!(page.wait_reply(0)["problem"]["cause"].as_str().is_some_and(|c| c.contains("bytes")));
     for call in [
         json!({ "do": "play", "session": 77, "speed": "fastest" }),

@@ -1,10 +1,10 @@
 //! Scenarios that are saved: whole or not at all, and never over what somebody else wrote meanwhile.
 
-use super::stage::Means;
+use crate::files::Files;
 use crate::protocol::{Answer, Problem};
 use crate::write::{Target, replaced};
 use serde_json::Value;
-use sidestep::scenario::Source;
+use sidestep::scenario::{Source, Worlds};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -62,13 +62,17 @@ pub(super) struct Wish {
 ///
 /// # Errors
 /// With the file that it names, or what it has to be.
-pub(super) fn writable(means: &Means, target: &Target, source: &Source) -> Result<(), Problem> {
+pub(super) fn writable(
+    (files, worlds): (&Files, &Worlds),
+    target: &Target,
+    source: &Source,
+) -> Result<(), Problem> {
     let Ok(values) = source.parse::<Value>() else { return Ok(()) };
-    means.files.check_text(source)?;
+    files.check_text(source)?;
     match target.real.exists() || values["world"].is_string() {
         true => Ok(()),
         false => {
-            let worlds = means.worlds.names().join(", ");
+            let worlds = worlds.names().join(", ");
             let remedy = format!("begin it with world = \"...\", one of {worlds}");
             Err(Problem::new(
                 source.place.as_str(),

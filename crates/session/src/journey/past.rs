@@ -16,7 +16,7 @@ pub enum RestoreError {
     /// Rows that wait cannot be handed over.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// What was stored cannot be taken back.
+    /// Rows that were stored cannot be taken back.
     #[error(
         "the run goes to {place}, which holds one past: it stands at cycle {now}, and the checkpoint is of {state}"
     )]

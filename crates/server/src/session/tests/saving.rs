@@ -1,4 +1,4 @@
-//! What a page saves: it reads nothing elsewhere by it, makes nothing but scenarios, and loses nobody's changes.
+//! Saves of a page: they read nothing elsewhere, make nothing but scenarios, and lose nobody's changes.
 
 use super::*;
 use std::fs;
