@@ -186,8 +186,6 @@ impl<const D: usize> Compiler<'_, D> {
         around: Around<D>,
     ) -> Result<ChainSpec<D>, InputError> {
         let (s, at) = (section.get_ref(), section.span());
-        let apart = [("apart_m", s.apart_m.is_some(), s.count != 1)];
-        self.has_no_idle_key(&apart, "without count = 2 or more", at.clone())?;
         let (start, arm) = self.shape(s, around, at.clone())?;
         let tasks = self.tasks(s, &start, at.clone())?;
         if let Some(arm) = &arm {

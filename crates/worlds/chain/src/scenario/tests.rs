@@ -118,8 +118,8 @@ fn keys_that_have_no_effect_are_refused() {
     let apart = |count: &str| {
         format!("[[chains]]\nconnectors = 2\nrod_m = 0.5\napart_m = [0.0, 2.0]\n{count}\n{task}")
     };
-    assert_refused(&apart(""), &["`apart_m` does nothing", "count"]);
-    assert_refused(&apart("count = 1"), &["`apart_m` does nothing", "count"]);
+    // Sweeps vary the number of chains from one on.
+    assert_valid(&apart("count = 1"));
     assert_valid(&apart("count = 2"));
     let folded =
         arm("base = \"base\"").replace("radius_m = 0.02", "radius_m = 0.02\nfolded_m = [1.0, 0.5]");
