@@ -119,17 +119,13 @@ impl<'a> Columns<'a> {
         Ok(Sample {
             time_s: self.time_s(row.field(self.time))?,
             position: LatLon {
-                lat_deg: self.within(row.field(self.lat), -90.0, 90.0)?,
-                lon_deg: self.within(row.field(self.lon), -180.0, 180.0)?,
+                lat_deg: self.within(row.field(self.lat), -90.0..=90.0)?,
+                lon_deg: self.within(row.field(self.lon), -180.0..=180.0)?,
             },
-            altitude_ft: self.within(
-                row.field(self.altitude),
-                *ALTITUDES_FT.start(),
-                *ALTITUDES_FT.end(),
-            )?,
-            ground_speed_kt: self.within(row.field(self.ground_speed), 0.0, 10_000.0)?,
+            altitude_ft: self.within(row.field(self.altitude), ALTITUDES_FT)?,
+            ground_speed_kt: self.within(row.field(self.ground_speed), 0.0..=10_000.0)?,
             // 360 is north, as is 0.
-            track_deg: self.within(row.field(self.track), 0.0, 360.0)? % 360.0,
+            track_deg: self.within(row.field(self.track), 0.0..=360.0)? % 360.0,
             vertical_speed_fpm: vertical_speed.map(|word| word.number(&self.place)).transpose()?,
         })
     }
@@ -143,12 +139,12 @@ impl<'a> Columns<'a> {
         Err(word.error(&self.place, cause, "give seconds; divide milliseconds by 1000"))
     }
 
-    fn within(&self, word: Word, min: f64, max: f64) -> Result<f64, InputError> {
+    fn within(&self, word: Word, range: RangeInclusive<f64>) -> Result<f64, InputError> {
         let value = word.number(&self.place)?;
-        if (min..=max).contains(&value) {
+        if range.contains(&value) {
             return Ok(value);
         }
-        let cause = format!("{value:?} is not between {min} and {max}");
+        let cause = format!("{value:?} is not between {} and {}", range.start(), range.end());
         Err(word.error(&self.place, cause, "restore the value or delete the row"))
     }
 

@@ -97,15 +97,16 @@ mod tests {
     use crate::Source;
     use serde::Deserialize;
 
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[expect(dead_code, reason = "only the error is of interest")]
+    struct Small {
+        cycles: u32,
+        seed: u32,
+    }
+
     #[test]
     fn an_unknown_key_is_answered_with_the_nearest() {
-        #[derive(Debug, Deserialize)]
-        #[serde(deny_unknown_fields)]
-        #[expect(dead_code, reason = "only the error is of interest")]
-        struct Small {
-            cycles: u32,
-            seed: u32,
-        }
         let error = Source::new("s.toml", "seed = 1\ncylces = 3\n", "").parse::<Small>();
         let error = error.expect_err("misspelled");
         assert_eq!(error.position(), Some((2, 1)));
@@ -117,13 +118,6 @@ mod tests {
 
     #[test]
     fn known_keys_are_listed_once_though_the_top_level_has_them_too() {
-        #[derive(Debug, Deserialize)]
-        #[serde(deny_unknown_fields)]
-        #[expect(dead_code, reason = "only the error is of interest")]
-        struct Small {
-            cycles: u32,
-            seed: u32,
-        }
         let error = toml::from_str::<Small>("wheelbarrow = 1").expect_err("unknown");
         let (_, remedy) = explain(&error, &["format", "seed", "cycles"], String::new());
         assert_eq!(remedy, "known are: cycles, seed, format");
