@@ -148,26 +148,39 @@ def worlds() -> None:
     rates, walls = [], []
     batches = [sidestep.Batch(robots(10, 12), 256, workers=workers) for workers in (1, 2)]
     outs = [batch.observe() for batch in batches]
+    # Threads that have nothing in common show what the machine's cores give at that time.
+    halves = [sidestep.Batch(robots(10, 12), 128) for _ in range(2)]
+    half_outs = [batch.observe() for batch in halves]
 
-    def run(batch: sidestep.Batch, out: dict[str, np.ndarray]) -> None:
+    def run(batch: sidestep.Batch, out: dict[str, np.ndarray], actions: np.ndarray) -> None:
         for _ in range(20):
             batch.order("action", actions)
             batch.step()
             batch.observe(out=out)
 
-    # In turns, so that other work on the machine slows both down.
-    for _ in range(15):
-        for k, (batch, out) in enumerate(zip(batches, outs, strict=True)):
+    def run_halves() -> None:
+        works = zip(halves, half_outs, (actions[:128], actions[128:]), strict=True)
+        threads = [threading.Thread(target=run, args=work) for work in works]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+
+    ways = [lambda k=k: run(batches[k], outs[k], actions) for k in (0, 1)]
+    # In turns, so that other work on the machine slows all of them down.
+    for _ in range(40):
+        for k, way in enumerate([*ways, run_halves]):
             cpu, wall = time.process_time(), time.perf_counter()
-            run(batch, out)
+            way()
             took = time.process_time() - cpu, time.perf_counter() - wall
             rates.append((k, 256 * 10 * 20 / took[0]))
             walls.append((k, took[1]))
     rate = max(rate for k, rate in rates if k == 0)
-    one, two = (min(wall for each, wall in walls if each == k) for k in (0, 1))
+    one, two, apart = (min(wall for each, wall in walls if each == k) for k in (0, 1, 2))
     figure = f"{rate / 1e6:.2f} million"
     told("256 worlds x 10 robots, agent-steps per CPU second", figure, "2 million")
     told("the same, 2 workers beside one", f"{one / two:.2f} times", "1.8 times")
+    told("two threads of 128 worlds beside one of 256", f"{one / apart:.2f} times", "none, it is what the cores give")
 
 
 def resets() -> None:

@@ -68,7 +68,11 @@ pub(crate) fn numbers(
         let (has, wanted) = (PyTuple::new(py, array.shape())?, PyTuple::new(py, &wanted)?);
         return Err(told(format!("needs an array of the shape {wanted}, not {has}")));
     }
-    Ok(array.readonly().as_array().iter().copied().collect())
+    let array = array.readonly();
+    // Where they lie in a row they are copied at once.
+    Ok(array
+        .as_slice()
+        .map_or_else(|_| array.as_array().iter().copied().collect(), <[f64]>::to_vec))
 }
 
 /// Returns a dict for each of `names`: the k-th one has the k-th cell of each column, by its name. It is what PettingZoo

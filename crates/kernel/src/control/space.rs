@@ -70,11 +70,11 @@ impl Space {
     /// Returns whether a value may stand in it.
     pub fn holds(&self, value: f64) -> bool {
         let between = |least: f64, most: f64| least <= value && value <= most;
+        // By a conversion, since looking at the fraction is a call of a library where processors of any age are built for.
+        let is_whole = || value as i64 as f64 == value;
         match &self.bounds {
-            Bounds::Choice(names) => value.fract() == 0.0 && between(0.0, names.len() as f64 - 1.0),
-            &Bounds::Whole { least, most } => {
-                value.fract() == 0.0 && between(least as f64, most as f64)
-            }
+            Bounds::Choice(names) => between(0.0, names.len() as f64 - 1.0) && is_whole(),
+            &Bounds::Whole { least, most } => between(least as f64, most as f64) && is_whole(),
             &Bounds::Real { least, most } => value.is_finite() && between(least, most),
         }
     }

@@ -2,16 +2,21 @@
 
 use super::Padded;
 use crate::interrupt::desert;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 /// Numbers in the largest chunk that a worker takes at once.
 const CHUNK: usize = 8;
+/// Times that a worker looks whether there is something for it before it sleeps: some 50 us. Falling asleep and being
+/// woken takes as long as a small call, and callers come with the next one at once; each look leaves the processor
+/// to whoever else wants it.
+const LOOKS: usize = 100;
 
 /// A task that any worker does for some numbers.
 pub type Task = Arc<dyn Fn(usize) + Send + Sync>;
 
-/// A caller and W - 1 threads, which are started at the first call and sleep between calls.
+/// A caller and W - 1 threads, which are started at the first call and wait between calls, asleep after a short
+/// while.
 #[derive(Debug)]
 pub struct Waiting {
     workers: usize,
@@ -31,6 +36,10 @@ struct Shared {
     call: Mutex<Call>,
     called: Condvar,
     done: Condvar,
+    /// The number of the present call, beside the lock.
+    number: AtomicU64,
+    /// Threads that have begun and not ended their part.
+    working: AtomicUsize,
     /// The next number of each worker's share.
     cursors: Vec<Padded>,
     is_broken: AtomicBool,
@@ -43,15 +52,13 @@ struct Call {
     n: usize,
     /// `None` when it is over; who comes later goes back to sleep.
     task: Option<Task>,
-    /// Threads that have begun and not ended their part.
-    working: usize,
     is_last: bool,
 }
 
 impl std::fmt::Debug for Call {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { number, n, working, is_last, .. } = self;
-        write!(f, "Call({number}, {n} tasks, {working} working, last: {is_last})")
+        let Self { number, n, is_last, .. } = self;
+        write!(f, "Call({number}, {n} tasks, last: {is_last})")
     }
 }
 
@@ -111,6 +118,8 @@ impl Crew {
             call: Mutex::default(),
             called: Condvar::new(),
             done: Condvar::new(),
+            number: AtomicU64::new(0),
+            working: AtomicUsize::new(0),
             cursors: (0..workers).map(|_| Padded::default()).collect(),
             is_broken: AtomicBool::new(false),
         });
@@ -143,6 +152,7 @@ impl Shared {
         let mut call = self.call();
         call.number += 1;
         (call.n, call.task) = (n, Some(task));
+        self.number.store(call.number, Ordering::Release);
         drop(call);
         self.called.notify_all();
     }
@@ -151,12 +161,13 @@ impl Shared {
     fn wait_and_work(&self, index: usize) {
         let mut seen = 0;
         loop {
+            look_for(|| self.number.load(Ordering::Acquire) != seen);
             let mut call = self.call();
             while (call.number == seen || call.task.is_none()) && !call.is_last {
                 call = self.called.wait(call).unwrap_or_else(PoisonError::into_inner);
             }
             let (n, Some(task), false) = (call.n, call.task.clone(), call.is_last) else { return };
-            call.working += 1;
+            self.working.fetch_add(1, Ordering::Relaxed);
             seen = call.number;
             drop(call);
             let _ended = Ended(self);
@@ -185,6 +196,16 @@ impl Shared {
     }
 }
 
+/// Looks some times whether something is so.
+fn look_for(mut is_so: impl FnMut() -> bool) {
+    for _ in 0..LOOKS {
+        if is_so() {
+            return;
+        }
+        std::thread::yield_now();
+    }
+}
+
 /// Tells that a thread has ended its part, also when it panicked.
 struct Ended<'a>(&'a Shared);
 
@@ -193,9 +214,9 @@ impl Drop for Ended<'_> {
         if std::thread::panicking() {
             self.0.is_broken.store(true, Ordering::Relaxed);
         }
-        let mut call = self.0.call();
-        call.working -= 1;
-        if call.working == 0 {
+        if self.0.working.fetch_sub(1, Ordering::Release) == 1 {
+            // Behind the lock: who has just looked, and is about to sleep, is not missed.
+            drop(self.0.call());
             self.0.done.notify_all();
         }
     }
@@ -206,10 +227,12 @@ struct Awaited<'a>(&'a Shared);
 
 impl Drop for Awaited<'_> {
     fn drop(&mut self) {
-        let mut call = self.0.call();
         // Nothing is left to do: whoever has not begun, because its processor has other work, is not waited for.
-        call.task = None;
-        while call.working > 0 {
+        self.0.call().task = None;
+        let is_done = || self.0.working.load(Ordering::Acquire) == 0;
+        look_for(is_done);
+        let mut call = self.0.call();
+        while !is_done() {
             call = self.0.done.wait(call).unwrap_or_else(PoisonError::into_inner);
         }
     }
@@ -219,7 +242,6 @@ impl Drop for Awaited<'_> {
 mod tests {
     use super::*;
     use std::panic::{AssertUnwindSafe, catch_unwind};
-    use std::sync::atomic::AtomicU64;
 
     #[test]
     fn every_number_is_done_once_in_every_call() {
