@@ -13,7 +13,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::{Duration, Instant};
 
 /// Duration of a slice, and so the longest wait for a stop.
-const SLICE: Duration = Duration::from_millis(30);
+const SLICE: Duration = Duration::from_millis(20);
 
 /// The cycles and the time of a stretch of a run in this process.
 #[derive(Debug, Clone, Copy, Default)]
@@ -191,9 +191,9 @@ mod tests {
         pace.note(1, Duration::from_micros(1));
         assert_eq!(pace.cycles(), 4);
         (0..20).for_each(|_| pace.note(100, Duration::from_micros(100)));
-        assert_eq!(pace.cycles(), 30_000);
-        pace.note(30_000, Duration::from_secs(30));
-        assert_eq!(pace.cycles(), 30);
+        assert_eq!(pace.cycles(), 20_000);
+        pace.note(20_000, Duration::from_secs(20));
+        assert_eq!(pace.cycles(), 20);
         pace.note(1, Duration::from_secs(30));
         assert_eq!(pace.cycles(), 1);
     }
