@@ -107,7 +107,7 @@ pub(super) fn of_fleet(now: &FleetNow, fleet: &Look<'_>) -> String {
     text.value("absurd_controls_total", "", tally.absurd_controls);
     text.metric("refused_total", "counter", "Nodes that were refused, by reason.");
     for (reason, count) in &tally.refused {
-        text.value("refused_total", &format!("reason=\"{reason}\""), count);
+        text.value("refused_total", &label("reason", reason), count);
     }
     text.metric("frames_total", "counter", "Frames that the server has sent.");
     text.value("frames_total", "", fleet.mail.counts().frames);
@@ -166,9 +166,10 @@ fn of_nodes(text: &mut Text, now: &FleetNow, fleet: &Look<'_>) {
     of_mail(text, &statuses.collect::<Vec<_>>());
 }
 
-/// Returns the label of an agent.
-fn label(noun: &str, name: &str) -> String {
-    format!("{noun}=\"{name}\"")
+/// Returns a label with its value between quotes, where a quote, a backslash and the end of a line are escaped.
+fn label(name: &str, value: &str) -> String {
+    let value = value.replace('\\', r"\\").replace('"', "\\\"").replace('\n', r"\n");
+    format!("{name}=\"{value}\"")
 }
 
 /// Adds what nodes tell of their mail, by the labels of their agents.
@@ -182,7 +183,7 @@ fn of_mail(text: &mut Text, statuses: &[(String, &Status)]) {
     );
     for (agent, status) in statuses {
         for (reason, count) in &status.dropped {
-            let labels = format!("{agent},reason=\"{reason}\"");
+            let labels = format!("{agent},{}", label("reason", reason));
             text.value("dropped_total", &labels, count);
         }
     }
@@ -201,4 +202,15 @@ pub(super) fn of_node(agent: AgentName, status: &Status) -> String {
     text.each("heard", "gauge", "Other agents that a node has heard in a cycle.", heard);
     of_mail(&mut text, &[(agent.clone(), status)]);
     text.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_of_any_letters_stays_one_label() {
+        assert_eq!(label("airplane", "A12"), r#"airplane="A12""#);
+        assert_eq!(label("airplane", "a\"b\\c\nd"), r#"airplane="a\"b\\c\nd""#);
+    }
 }
