@@ -127,7 +127,7 @@ fn knows_worlds(members: &[Member]) -> Vec<String> {
     wrong
 }
 
-/// Returns where code names threads and may not. To sleep, as who waits for a lock of a file does, starts none.
+/// Returns where code names threads and may not. Sleeping starts no thread.
 fn threads(members: &[Member]) -> Vec<String> {
     let may_not = |member: &&Member| !THREADS.iter().any(|folder| is(member, folder));
     let mut wrong = Vec::new();

@@ -9,6 +9,9 @@ use std::hash::{BuildHasher, RandomState};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+/// Time in which no letter comes to another node before the straight way there is looked at.
+const SUSPECT: Duration = Duration::from_secs(2);
+
 /// Counts of a party's mail.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Counts {
@@ -106,18 +109,19 @@ impl Mail {
         Some(self.now().saturating_sub(heard))
     }
 
-    /// Whether no letter to another node has come for some time although there are some, over a straight way that seems
-    /// to be open.
-    pub fn is_deaf(&self, member: &Member, within: Duration) -> bool {
-        let since = self.others.get(&Party::Node(member.agent)).and_then(|o| o.post.waits_since());
-        since.is_some_and(|since| self.now().saturating_sub(since) > within)
-            && self.wire.is_open_to(member)
+    /// Whether the straight way to another node is deaf: no letter comes there, and its end has left questions unanswered for
+    /// some time.
+    pub fn is_deaf(&mut self, member: &Member, within: Duration) -> bool {
+        let other = self.others.get(&Party::Node(member.agent));
+        let since = other.and_then(|other| other.post.waits_since());
+        since.is_some_and(|since| self.now().saturating_sub(since) > SUSPECT)
+            && self.wire.is_deaf_to(member, within)
     }
 
     /// Closes the straight ways to all other nodes, and opens them anew.
     ///
     /// # Errors
-    /// When an endpoint cannot be had again.
+    /// When an endpoint cannot be had again: all goes by the server then, and it can be tried once more.
     pub fn reopen(&mut self) -> Result<(), WireError> {
         self.wire.reopen()
     }

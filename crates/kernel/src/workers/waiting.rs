@@ -215,7 +215,7 @@ impl Drop for Ended<'_> {
             self.0.is_broken.store(true, Ordering::Relaxed);
         }
         if self.0.working.fetch_sub(1, Ordering::Release) == 1 {
-            // Behind the lock: who has just looked, and is about to sleep, is not missed.
+            // Under the lock, so that a caller that is about to sleep is not missed.
             drop(self.0.call());
             self.0.done.notify_all();
         }

@@ -20,8 +20,11 @@ use turn::{Ends, Turn};
 /// Time between two reports of a node.
 const REPORT: Duration = Duration::from_millis(500);
 
-/// Time in which no letter comes to another node before the link is taken for deaf, if it seems to be open.
-const DEAF: Duration = Duration::from_secs(5);
+/// Time in which the other end of an open link answers nothing before the link is taken for deaf.
+const DEAF: Duration = Duration::from_secs(3);
+
+/// Time between two openings of links, at least.
+const REOPEN: Duration = Duration::from_secs(10);
 
 /// Time after which it looks around, at most.
 const LOOK: Duration = Duration::from_millis(100);
@@ -75,6 +78,8 @@ pub struct Node {
     report_at: Instant,
     /// Time before which no link is opened anew.
     mend_at: Instant,
+    /// Whether its links are closed, and could not be opened.
+    is_cut_off: bool,
     looks: Looks,
 }
 
@@ -103,6 +108,7 @@ impl Node {
             part: Default::default(),
             report_at: Instant::now(),
             mend_at: Instant::now(),
+            is_cut_off: false,
             looks: Box::new(|_| {}),
         }
     }
@@ -125,7 +131,7 @@ impl Node {
                 return Ok(self.status);
             };
             self.go_on();
-            self.report()?;
+            self.report();
             let silent = self.mail.silent_for(Party::Server);
             // What has come while this process stood still is heard first.
             if heard == 0 && silent.is_some_and(|silent| silent > self.lease) {
@@ -265,28 +271,36 @@ impl Node {
     }
 
     /// Tells the server how this node is, now and then.
-    fn report(&mut self) -> Result<(), NodeError> {
+    fn report(&mut self) {
         let now = Instant::now();
         if now < self.report_at {
-            return Ok(());
+            return;
         }
         self.report_at = now + REPORT;
         self.note_status();
         (self.looks)(&self.status);
         self.mail.note(Party::Server, Word::Status(self.status.clone()));
-        self.mend_links(now)
+        self.mend_links(now);
     }
 
     /// Opens the straight ways anew when one of them is deaf: alive at both ends, and nothing comes through. Zenoh leaves
     /// such links behind where opening one took as long as it may, and on a busy machine that is not rare.
-    fn mend_links(&mut self, now: Instant) -> Result<(), NodeError> {
+    fn mend_links(&mut self, now: Instant) {
         // Of two, the one with the higher id has opened the link.
         let mut before = self.members.iter().filter(|member| member.agent < self.agent);
         let deaf = before.find(|member| self.mail.is_deaf(member, DEAF));
-        let Some(deaf) = deaf.filter(|_| now >= self.mend_at) else { return Ok(()) };
-        tracing::warn!(agent = self.agent, other = deaf.agent, "a link is deaf: opened anew");
-        self.mend_at = now + 2 * DEAF;
-        Ok(self.mail.reopen()?)
+        if now < self.mend_at || (deaf.is_none() && !self.is_cut_off) {
+            return;
+        }
+        let (agent, other) = (self.agent, deaf.map(|member| member.agent));
+        tracing::warn!(agent, other, "a link is deaf or closed: links are opened anew");
+        self.mend_at = now + REOPEN;
+        let opened = self.mail.reopen();
+        self.is_cut_off = opened.is_err();
+        if let Err(error) = opened {
+            // Until it can be done, all goes by the server.
+            tracing::warn!(agent, %error, "links cannot be opened yet");
+        }
     }
 
     fn note_status(&mut self) {

@@ -37,15 +37,16 @@ pub trait Wire: Send {
         Ok(())
     }
 
-    /// Whether there is a straight way to another node that seems to be open, whatever comes through.
-    fn is_open_to(&self, _member: &Member) -> bool {
+    /// Asks the other end of a straight way, and returns whether the way seems to be open and all questions have been left
+    /// unanswered for some time. Ends answer by themselves, however busy their nodes are.
+    fn is_deaf_to(&mut self, _member: &Member, _within: Duration) -> bool {
         false
     }
 
     /// Closes the straight ways to all other nodes, and opens them anew.
     ///
     /// # Errors
-    /// When an endpoint cannot be had again.
+    /// When an endpoint cannot be had again: there are no straight ways then, and it can be tried once more.
     fn reopen(&mut self) -> Result<(), WireError> {
         Ok(())
     }
@@ -64,8 +65,8 @@ impl<W: Wire + ?Sized> Wire for Box<W> {
         (**self).join(me, members)
     }
 
-    fn is_open_to(&self, member: &Member) -> bool {
-        (**self).is_open_to(member)
+    fn is_deaf_to(&mut self, member: &Member, within: Duration) -> bool {
+        (**self).is_deaf_to(member, within)
     }
 
     fn reopen(&mut self) -> Result<(), WireError> {

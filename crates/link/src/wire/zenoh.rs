@@ -4,9 +4,12 @@
 //! In a mesh it has another one as a *peer*, connected with every other node: packets go the straight way there.
 //! A frame that cannot be sent soon is dropped rather than waited for, so that nobody who has stopped stops others.
 
+mod echo;
+
 use super::endpoint::{Held, WireError, host_and_port, taken, vacant};
 use super::{Party, Wire, handshake};
 use crate::words::Member;
+use echo::Echoes;
 use sidestep::kernel::EntityId;
 use sidestep_session::fleet::Tls;
 use std::collections::BTreeMap;
@@ -17,7 +20,7 @@ use std::time::{Duration, Instant};
 use zenoh::key_expr::KeyExpr;
 use zenoh::pubsub::Subscriber;
 use zenoh::qos::CongestionControl;
-use zenoh::sample::Locality;
+use zenoh::sample::{Locality, Sample};
 use zenoh::{Config, Session, Wait};
 
 /// Time without a sign of life after which Zenoh takes a link for broken, in milliseconds.
@@ -28,8 +31,8 @@ const LEASE_MS: u64 = 2_000;
 /// end stays alive and deaf (`Wire::reopen`).
 const OPENED_WITHIN_MS: u64 = 3_000;
 
-/// Time in which the endpoints of a session that was closed can be had again.
-const FREED_WITHIN: Duration = Duration::from_secs(5);
+/// Time in which the endpoints of a session that was closed can mostly be had again.
+const FREED_WITHIN: Duration = Duration::from_secs(1);
 
 /// Settings of a Zenoh session.
 #[derive(Debug, Clone, Default)]
@@ -124,6 +127,8 @@ pub struct ZenohWire {
     me_there: u128,
     /// and how often it has opened them.
     opened: u32,
+    /// Questions to the other ends of the mesh.
+    echoes: Echoes,
 }
 
 /// A session, and who is sent to over it.
@@ -156,12 +161,23 @@ fn key(to: Party) -> String {
 }
 
 impl Line {
-    fn new(session: Session, me: Party, arrives: &Sender<Vec<u8>>) -> Result<Self, String> {
+    fn new(
+        session: Session,
+        me: Party,
+        arrives: &Sender<Vec<u8>>,
+        echoes: &Echoes,
+    ) -> Result<Self, String> {
         let hear = |key: &str| {
             let arrives = arrives.clone();
-            // The receiver is gone when the wire is.
-            let took = move |sample: zenoh::sample::Sample| {
-                let _ = arrives.send(sample.payload().to_bytes().into_owned());
+            let is_echo = match me {
+                Party::Node(agent) => Some(echoes.taking(agent, session.clone())),
+                Party::Server => None,
+            };
+            let took = move |sample: Sample| {
+                if is_echo.as_ref().is_none_or(|is_echo| !is_echo(&sample)) {
+                    // The receiver is gone when the wire is.
+                    let _ = arrives.send(sample.payload().to_bytes().into_owned());
+                }
             };
             session.declare_subscriber(key).callback(took).wait().map_err(|e| e.to_string())
         };
@@ -180,19 +196,28 @@ impl Line {
         let key = self.keys.entry(to).or_insert_with(|| {
             KeyExpr::try_from(key(to)).expect("a path of letters and digits is a key")
         });
-        put(&self.session, key, frame);
+        put(&self.session, key, frame, None);
+    }
+
+    /// Whether there is a link to another node that shows signs of life, whatever else comes through.
+    fn is_open_to(&self, member: &Member) -> bool {
+        let is_it = |id: zenoh::session::ZenohId| {
+            u128::from_le_bytes(id.to_le_bytes()) & NAME == name(member)
+        };
+        self.session.info().peers_zid().wait().any(is_it)
     }
 
     /// Sends a frame to all who hear this session but for itself.
     fn send_to_all(&self, frame: &[u8]) {
         let key = KeyExpr::try_from(ALL).expect("a path of letters is a key");
-        put(&self.session, &key, frame);
+        put(&self.session, &key, frame, None);
     }
 }
 
-fn put(session: &Session, key: &KeyExpr<'_>, frame: &[u8]) {
+/// Sends a frame; what is no mail has a mark.
+fn put(session: &Session, key: &KeyExpr<'_>, frame: &[u8], mark: Option<&'static [u8]>) {
     // Not by a publisher: the first thing that one does in a client is to wait for the other end.
-    let put = session.put(key, frame).allowed_destination(Locality::Remote);
+    let put = session.put(key, frame).attachment(mark).allowed_destination(Locality::Remote);
     // Lost where it cannot be sent, as on the way.
     let _ = put.congestion_control(CongestionControl::Drop).wait();
 }
@@ -230,8 +255,8 @@ impl ZenohWire {
     }
 
     fn over(me: Party, settings: &Settings<'_>) -> Result<Self, String> {
-        let (arrives, arrived) = channel();
-        let hub = Line::new(settings.open()?, me, &arrives)?;
+        let ((arrives, arrived), echoes) = (channel(), Echoes::default());
+        let hub = Line::new(settings.open()?, me, &arrives, &echoes)?;
         Ok(Self {
             me,
             arrived,
@@ -245,6 +270,7 @@ impl ZenohWire {
             connect: Vec::new(),
             me_there: 0,
             opened: 0,
+            echoes,
         })
     }
 
@@ -262,7 +288,8 @@ impl ZenohWire {
         let id = Some(format!("{:x}", u128::from(self.opened) << 96 | self.me_there));
         let (listen, connect, tls) = (&self.listens, &self.connect, self.tls.as_ref());
         let settings = Settings { id, mode: "peer", listen, connect, tls, connected_within: None };
-        let open = settings.open().and_then(|session| Line::new(session, self.me, &self.arrives));
+        let line = |session| Line::new(session, self.me, &self.arrives, &self.echoes);
+        let open = settings.open().and_then(line);
         self.mesh = Some(open.map_err(|reason| taken(listen, reason))?);
         Ok(())
     }
@@ -328,18 +355,20 @@ impl Wire for ZenohWire {
         self.open_mesh()
     }
 
-    fn is_open_to(&self, member: &Member) -> bool {
-        let is_it = |id: zenoh::session::ZenohId| {
-            u128::from_le_bytes(id.to_le_bytes()) & NAME == name(member)
-        };
-        self.mesh.as_ref().is_some_and(|mesh| mesh.session.info().peers_zid().wait().any(is_it))
+    fn is_deaf_to(&mut self, member: &Member, within: Duration) -> bool {
+        let (Some(mesh), Party::Node(me)) = (&self.mesh, self.me) else { return false };
+        mesh.is_open_to(member) && self.echoes.are_missing(&mesh.session, me, member.agent, within)
     }
 
     fn reopen(&mut self) -> Result<(), WireError> {
-        let Some(mesh) = self.mesh.take() else { return Ok(()) };
-        // What it has not sent is lost, as on the way.
-        let _ = mesh.session.close().wait();
-        drop(mesh);
+        if let Some(mesh) = self.mesh.take() {
+            // Unsent frames are lost, as frames in transit are.
+            let _ = mesh.session.close().wait();
+        }
+        self.echoes.forget();
+        if self.listens.is_empty() {
+            return Ok(());
+        }
         let until = Instant::now() + FREED_WITHIN;
         loop {
             match self.open_mesh() {

@@ -28,7 +28,7 @@ fn line(mode: &str, me: Party, [listen, connect]: [&[String]; 2]) -> (Line, Rece
         .open()
         .expect("open");
     let (arrives, arrived) = channel();
-    (Line::new(session, me, &arrives).expect("a line"), arrived)
+    (Line::new(session, me, &arrives, &Echoes::default()).expect("a line"), arrived)
 }
 
 /// Sends a frame again and again until it has come.
@@ -235,32 +235,49 @@ fn deaf_at_first(server: &str) -> String {
     endpoint
 }
 
-/// A link over which signs of life come and nothing else: Zenoh keeps it for good, and the wire sees it and opens it anew.
-#[test]
-fn a_link_that_lives_and_is_deaf_is_found_out_and_opened_anew() {
+/// Returns a server's endpoint with two nodes in a mesh, and what each is to the other; the second sees the first at an
+/// endpoint that is made of its own.
+fn two_in_a_mesh(seen: impl Fn(&str) -> String) -> ([ZenohWire; 3], Vec<Member>) {
     let at = [free()];
-    let _hub = ZenohWire::server(&at, None).expect("a server");
+    let hub = ZenohWire::server(&at, None).expect("a server");
     let held = [0, 1].map(|_| hold("tcp/127.0.0.1:0").expect("a free port"));
     let lives = [5, 6].map(crate::words::Life);
-    let seen_at = [deaf_at_first(&held[0].endpoint), held[1].endpoint.clone()];
+    let seen_at = [seen(&held[0].endpoint), held[1].endpoint.clone()];
     let members: Vec<Member> = (0..)
         .zip(lives)
         .zip(seen_at)
         .map(|((agent, life), seen)| Member { agent, life, listens: vec![seen] })
         .collect();
-    let [mut first, mut second] = [0, 1]
-        .map(|agent| ZenohWire::node(Party::Node(agent), &at, None, LONG).expect("it answers"));
+    let node = |(agent, held)| {
+        let wire = ZenohWire::node(Party::Node(agent), &at, None, LONG).expect("it answers");
+        let mut wire = wire.listening(vec![held]);
+        wire.join(agent, &members).expect("a mesh");
+        wire
+    };
     let [first_held, second_held] = held;
-    first = first.listening(vec![first_held]);
-    second = second.listening(vec![second_held]);
-    first.join(0, &members).expect("a mesh");
-    second.join(1, &members).expect("a mesh");
+    let (first, second) = (node((0, first_held)), node((1, second_held)));
+    until(|| is_open(&second, &members[0]));
+    ([hub, first, second], members)
+}
+
+fn is_open(wire: &ZenohWire, member: &Member) -> bool {
+    wire.mesh.as_ref().is_some_and(|mesh| mesh.is_open_to(member))
+}
+
+/// Waits until something is so, which it is at some time.
+fn until(mut is_so: impl FnMut() -> bool) {
     let until = Instant::now() + LONG;
-    while !second.is_open_to(&members[0]) {
-        assert!(Instant::now() < until, "there is no link");
+    while !is_so() {
+        assert!(Instant::now() < until, "it never is");
         std::thread::sleep(Duration::from_millis(20));
     }
-    // Seldom: who sends anything gives no sign of life besides.
+}
+
+/// A link over which signs of life come and nothing else: Zenoh keeps it for good, and the wire sees it and opens it anew.
+#[test]
+fn a_link_that_lives_and_is_deaf_is_found_out_and_opened_anew() {
+    let ([_hub, mut first, mut second], members) = two_in_a_mesh(deaf_at_first);
+    // Rarely, because a sender gives no other sign of life.
     let mut comes = |second: &mut ZenohWire, times: u32| {
         (0..times).any(|_| {
             second.send(&[Party::Node(0)], b"frame");
@@ -268,11 +285,49 @@ fn a_link_that_lives_and_is_deaf_is_found_out_and_opened_anew() {
         })
     };
     assert!(!comes(&mut second, 4), "it is deaf");
-    assert!(second.is_open_to(&members[0]), "and nobody says so");
+    assert!(is_open(&second, &members[0]), "and nobody says so");
+    assert!(!second.is_deaf_to(&members[0], LONG), "it was asked just now");
+    let is_deaf = |wire: &mut ZenohWire| {
+        std::thread::sleep(Duration::from_millis(LEASE_MS / 3));
+        wire.is_deaf_to(&members[0], Duration::from_secs(1))
+    };
+    assert!((0..20).any(|_| is_deaf(&mut second)), "it answers nothing");
     second.reopen().expect("its endpoint is free again");
     assert!(comes(&mut second, 40), "it is heard");
     let other = Member { agent: 0, life: crate::words::Life(7), listens: Vec::new() };
-    assert!(!second.is_open_to(&other), "another life of it is not there");
+    assert!(!is_open(&second, &other), "another life of it is not there");
+}
+
+/// The first node takes nothing that comes, as one that computes for long: its session answers all the same.
+#[test]
+fn a_node_that_takes_nothing_is_not_taken_for_deaf() {
+    let ([_hub, mut first, mut second], members) = two_in_a_mesh(ToString::to_string);
+    for _ in 0..3 {
+        assert!(!second.is_deaf_to(&members[0], LONG));
+        until(|| second.echoes.take_answers());
+    }
+    second.send(&[Party::Node(0)], b"frame");
+    assert_eq!(first.receive(LONG).as_deref(), Some(&b"frame"[..]), "no question is mail");
+}
+
+#[test]
+fn links_that_could_not_be_opened_are_opened_at_another_time() {
+    let ([_hub, mut first, mut second], members) = two_in_a_mesh(ToString::to_string);
+    let mesh = second.mesh.take().expect("a mesh");
+    mesh.session.close().wait().expect("it is closed");
+    drop(mesh);
+    let port = second.listens[0].trim_start_matches("tcp/").to_string();
+    let mut other = None;
+    until(|| {
+        other = TcpListener::bind(&port).ok();
+        other.is_some()
+    });
+    assert!(second.reopen().is_err(), "somebody else has its port");
+    drop(other);
+    until(|| second.reopen().is_ok());
+    until(|| is_open(&second, &members[0]));
+    second.send(&[Party::Node(0)], b"frame");
+    assert_eq!(first.receive(LONG).as_deref(), Some(&b"frame"[..]));
 }
 
 /// An end that takes connections and answers nobody, as one behind a cut cable, holds up nobody for long.

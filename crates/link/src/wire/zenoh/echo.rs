@@ -1,0 +1,96 @@
+//! Questions to the other end of a link. Its session answers by itself, however busy its node is: a link over which no
+//! answer comes is deaf.
+
+use super::put;
+use sidestep::kernel::EntityId;
+use std::collections::BTreeMap;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::{Duration, Instant};
+use zenoh::Session;
+use zenoh::key_expr::KeyExpr;
+use zenoh::sample::Sample;
+
+/// Marks of frames that are no mail.
+const QUESTION: &[u8] = b"question";
+const ANSWER: &[u8] = b"answer";
+
+/// Time after which a question counts for nothing if none has followed it.
+const FORGOTTEN: Duration = Duration::from_secs(2);
+
+/// The questions that a node has asked of others over its links, and their answers.
+pub(super) struct Echoes {
+    /// The first and the last question since the last answer.
+    asked: BTreeMap<EntityId, (Instant, Instant)>,
+    answered: Receiver<EntityId>,
+    answers: Sender<EntityId>,
+}
+
+impl Default for Echoes {
+    fn default() -> Self {
+        let (answers, answered) = channel();
+        Self { asked: BTreeMap::new(), answered, answers }
+    }
+}
+
+impl Echoes {
+    /// Returns the function of node `me` that answers questions, takes answers, and leaves mail alone: whether it was no
+    /// mail. It is called by a thread of the session.
+    pub(super) fn taking(
+        &self,
+        me: EntityId,
+        session: Session,
+    ) -> impl Fn(&Sample) -> bool + use<> {
+        let answers = self.answers.clone();
+        move |sample| {
+            let Some(mark) = sample.attachment().map(|mark| mark.to_bytes()) else { return false };
+            let from =
+                <[u8; 4]>::try_from(&*sample.payload().to_bytes()).map(EntityId::from_le_bytes);
+            match (&*mark, from) {
+                (QUESTION, Ok(from)) => send(&session, me, from, ANSWER),
+                // The receiver is gone when the wire is.
+                (ANSWER, Ok(from)) => drop(answers.send(from)),
+                // From a build of another day.
+                _ => {}
+            }
+            true
+        }
+    }
+
+    /// Asks another node, and returns whether it has left all questions unanswered for some time.
+    pub(super) fn are_missing(
+        &mut self,
+        session: &Session,
+        me: EntityId,
+        of: EntityId,
+        within: Duration,
+    ) -> bool {
+        self.take_answers();
+        let now = Instant::now();
+        let (first, last) = self.asked.entry(of).or_insert((now, now));
+        if now.duration_since(*last) > FORGOTTEN {
+            *first = now;
+        }
+        *last = now;
+        send(session, me, of, QUESTION);
+        now.duration_since(*first) > within
+    }
+
+    /// Forgets all questions, as where links are new.
+    pub(super) fn forget(&mut self) {
+        self.asked.clear();
+    }
+
+    /// Takes the answers that have come. Returns whether no question is open.
+    pub(super) fn take_answers(&mut self) -> bool {
+        for from in self.answered.try_iter() {
+            self.asked.remove(&from);
+        }
+        self.asked.is_empty()
+    }
+}
+
+fn send(session: &Session, me: EntityId, to: EntityId, mark: &'static [u8]) {
+    let key = KeyExpr::try_from(super::key(super::Party::Node(to)));
+    let key = key.expect("a path of letters and digits is a key");
+    put(session, &key, &me.to_le_bytes(), Some(mark));
+}
