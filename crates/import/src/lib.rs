@@ -9,6 +9,7 @@ pub mod ascii;
 pub mod bag;
 pub mod bluesky;
 pub mod carmen;
+mod extension;
 pub mod image;
 pub mod local_plane;
 mod map_file;

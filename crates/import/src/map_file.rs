@@ -4,6 +4,7 @@ use std::path::Path;
 
 use sidestep_kernel::InputError;
 
+use super::extension::extension;
 use super::{PixelMap, ascii, movingai, rosmap};
 use sidestep_map::{GridMap, UnknownPolicy};
 
@@ -76,13 +77,6 @@ fn character_map(path: &Path, boxes: AsBoxes) -> Result<GridMap, InputError> {
         "map" => movingai::load_map(path, boxes.box_size_m),
         _ => ascii::load(path, boxes.box_size_m),
     }
-}
-
-/// Returns the extension in lower case, the one before `.gz` where that is the last.
-fn extension(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
-    let name = name.strip_suffix(".gz").unwrap_or(&name);
-    name.rsplit_once('.').map_or("", |(_, extension)| extension).to_owned()
 }
 
 fn not_read(path: &Path) -> InputError {

@@ -22,6 +22,7 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::view::Plane;
 
 use super::PixelMap;
+use super::extension;
 use super::image::Bitmap;
 use super::map_yaml::{MAX_YAML_BYTES, Metadata, Reading};
 use sidestep_scenario::file::read_text;
@@ -30,9 +31,10 @@ use sidestep_scenario::file::read_text;
 /// image that exists only with `.gz` after its name is found too.
 ///
 /// # Errors
-/// When a file is missing, damaged or absurdly large, or a key is missing or has a wrong
+/// When the YAML file does not end in `.yaml` or `.yml`, a file is missing, damaged or absurdly large, or a key is missing or has a wrong
 /// value.
 pub fn load(path: &Path) -> Result<PixelMap, InputError> {
+    extension::check(path, "a map of ROS", &["yaml", "yml"])?;
     let place = path.display().to_string();
     let text = read_text(path, MAX_YAML_BYTES)?;
     let meta = Metadata::parse(&place, &text, path.parent().unwrap_or(Path::new("")))?;
@@ -151,6 +153,20 @@ mod tests {
         let (_folder, path) = written("a.pgm", &IMAGE[..12]);
         let error = load(&path).expect_err("cut");
         assert!(error.place().ends_with("a.pgm") && error.cause().contains("short"), "{error}");
+    }
+
+    #[test]
+    fn what_does_not_end_as_a_map_is_not_read_as_one() {
+        let (folder, path) = written("a.pgm", IMAGE);
+        for (name, is_map) in
+            [("b.yml", true), ("B.YAML.gz", true), ("b.toml", false), ("b", false)]
+        {
+            let other = folder.path().join(name);
+            std::fs::copy(&path, &other).expect("copied");
+            assert_eq!(load(&other).is_ok(), is_map, "{name}");
+        }
+        let error = load(&folder.path().join("b.toml")).expect_err("a scenario");
+        assert!(error.remedy().contains(".yaml or .yml"), "{error}");
     }
 
     #[test]

@@ -27,5 +27,6 @@ pub use mcap::{
 pub use parquet::ParquetRecorder;
 pub use read::{Table, for_each_block, read_table, tables};
 pub use schema::Origin;
+pub use staging::followed;
 pub use table_file::TableFile;
 pub use whole::WholeTable;

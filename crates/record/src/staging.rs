@@ -21,7 +21,7 @@ pub(crate) struct Staging {
 impl Staging {
     /// Creates an empty folder in the parent of `target`, and that parent if it is missing.
     pub(crate) fn new(target: &Path) -> Result<Self, InputError> {
-        let target = followed(target)?;
+        let target = followed(target).map_err(|e| cannot_make(target, e))?;
         let path = beside(&target, "new")?;
         let mut made: Vec<_> = disk::parent(&target)
             .ancestors()
@@ -76,13 +76,19 @@ impl Drop for Staging {
     }
 }
 
-/// Returns the folder that a link leads to; a path that is no link stays. A rename would replace the link itself, and
-/// write to another disk than the one that the user has chosen.
-fn followed(target: &Path) -> Result<PathBuf, InputError> {
+/// Returns the place of a folder that is to be made, without `/` at its end: of a link, the folder that it leads to. A
+/// rename would replace the link itself, and write to another disk than the one that the user has chosen.
+///
+/// # Errors
+/// A link to what is not there.
+pub fn followed(target: &Path) -> io::Result<PathBuf> {
+    // With a `/` at its end, a link is not known as one, and a name beside the folder would be one inside.
+    let target: PathBuf = target.components().collect();
     if !target.is_symlink() {
-        return Ok(target.to_path_buf());
+        return Ok(target);
     }
-    let to_nowhere = |e| cannot_make(target, format!("a link to what is not there ({e})"));
+    let to_nowhere =
+        |e: io::Error| io::Error::new(e.kind(), format!("a link to what is not there ({e})"));
     target.canonicalize().map_err(to_nowhere)
 }
 

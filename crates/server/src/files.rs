@@ -103,14 +103,7 @@ impl Files {
         let is_plain = |real: &Path| real.is_file() || real.is_dir();
         let is_allowed =
             found.canonicalize().is_ok_and(|real| self.holds(&real) && is_plain(&real));
-        match is_allowed {
-            true => Ok(found),
-            false => {
-                let cause = "is not below the folders that were named at start";
-                let remedy = "start the studio with its folder: sidestep studio FOLDER";
-                Err(Problem::new(path, cause, remedy))
-            }
-        }
+        if is_allowed { Ok(found) } else { Err(elsewhere(path)) }
     }
 
     /// Whether a path without links is below the folders, or is named by a scenario that was named at start.
@@ -134,11 +127,9 @@ impl Files {
     }
 
     fn check_value(&self, source: &Source, text: &str) -> Result<(), Problem> {
+        // It is read from the scenario's folder, wherever the server was started.
         let real = source.path(Path::new(text)).canonicalize();
-        match real.is_ok_and(|real| !self.holds(&real)) {
-            true => self.find(text).map(drop).map_err(|p| Problem { place: text.into(), ..p }),
-            false => Ok(()),
-        }
+        if real.is_ok_and(|real| !self.holds(&real)) { Err(elsewhere(text)) } else { Ok(()) }
     }
 
     /// Lists what can be opened in a folder, or all that was named at start.
@@ -170,6 +161,12 @@ impl Files {
         entries.sort_by_key(|entry| (entry.kind != FileKind::Folder, entry.name.clone()));
         Ok(entries)
     }
+}
+
+/// Returns the problem of a path that may not be read.
+fn elsewhere(path: &str) -> Problem {
+    let cause = "is not below the folders that were named at start";
+    Problem::new(path, cause, "start the studio with its folder: sidestep studio FOLDER")
 }
 
 /// Returns all strings in a text, any of which may be the path of a file.
@@ -341,6 +338,16 @@ mod tests {
         assert_eq!(check("a = [{ b = \"../out/secret.toml\" }]"), Err("../out/secret.toml".into()));
         assert_eq!(check("a = \"/etc/passwd\""), Err("/etc/passwd".into()));
         assert_eq!(check("a = = 1"), Err("s.toml".into()));
+    }
+
+    #[test]
+    fn a_name_leads_from_the_scenarios_folder_wherever_the_server_was_started() {
+        let (folder, _) = places();
+        // From the working directory, `.` leads inside.
+        let files = Files::below(&[".".into()]).expect("a folder");
+        assert!(files.find(".").is_ok());
+        let source = Source::new("s.toml", "a = \".\"", folder.path().join("out"));
+        assert_eq!(files.check_text(&source).map_err(|p| p.place), Err(".".into()));
     }
 
     #[test]

@@ -275,7 +275,7 @@ mod tests {
             stream.write_all(b"GET /much HTTP/1.1\r\nHost: a\r\n\r\n").expect("sent");
             stream
         };
-        let asleep = ask();
+        let mut asleep = ask();
         let mut slow = ask();
         let (mut part, mut bytes) = (vec![0; 2 << 20], 0);
         while let Ok(read @ 1..) = slow.read(&mut part) {
@@ -283,7 +283,12 @@ mod tests {
             std::thread::sleep(Duration::from_millis(20));
         }
         assert!(bytes > 100 << 20, "{bytes}");
-        std::thread::sleep(Duration::from_secs(5));
+        // It must not read to learn that it was given up: a write fails then.
+        let started = Instant::now();
+        while asleep.write_all(b"\n").is_ok() {
+            assert!(started.elapsed() < Duration::from_secs(30), "it is waited for");
+            std::thread::sleep(Duration::from_millis(10));
+        }
         assert!(heard(asleep).len() < 100 << 20);
     }
 

@@ -192,9 +192,9 @@ pub enum Told {
     Listens(Vec<String>),
     /// The fleet as it is now.
     Fleet(FleetNow),
-    /// To who watches: what stays as it is.
+    /// To watchers: all that stays as it is.
     Scene(Box<Staged>),
-    /// To who watches: the world and the fleet as they are now.
+    /// To watchers: the world and the fleet as they are now.
     Seen(Box<Seen>),
     /// The fleet has come to its end, or was stopped.
     Ended {
@@ -224,7 +224,7 @@ pub struct Failed {
     pub remedy: String,
 }
 
-/// All of a fleet that stays as it is, for who watches it.
+/// All of a fleet that stays as it is, for its watchers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Staged {
     /// The build of its server.
@@ -239,7 +239,7 @@ pub struct Staged {
     pub scenery: Scenery,
 }
 
-/// A world and its fleet at one moment, for who watches it.
+/// A world and its fleet at one moment, for its watchers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Seen {
     /// Its number among all that were shown, from 1.

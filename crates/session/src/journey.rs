@@ -197,7 +197,7 @@ impl Journey {
         self.run.as_ref()
     }
 
-    /// The run, for who watches it or hands controls over.
+    /// The run, for callers that watch it or hand controls over.
     pub fn simulation_mut(&mut self) -> &mut dyn Simulation {
         self.run.as_mut()
     }

@@ -1,4 +1,4 @@
-/** Which metrics a chart may show. */
+/** The metrics that a chart may show. */
 
 import type { MetricName } from "../protocol";
 

@@ -14,13 +14,13 @@ class GivenUp extends Error {
   }
 }
 
-/** Why a run cannot be compared. */
+/** The reason why a run cannot be compared. */
 function noDigest({ scene, status }: Session): GivenUp {
   return new GivenUp(`${scene.name} cannot be compared, as its states have no digests. ${status.banner ?? ""}`.trim());
 }
 
 export class Comparison {
-  /** What it does or has found; empty before. */
+  /** Words on what it does or has found; empty before. */
   words = $state("");
   isRunning = $state(false);
   #round = 0;

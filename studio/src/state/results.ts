@@ -13,7 +13,7 @@ export function reportAddress(path: string, part?: string): string {
   return address("report", { path, as: part });
 }
 
-/** Why there is no result, as the server has said it: place, cause, and help on a line of its own. */
+/** The reason why there is no result, as the server has said it: place, cause, and help on a line of its own. */
 export function failureOf(path: string, said: string): Problem {
   const [, place, cause, help] = /^(.*?): ([^]*?)(?:\nhelp: ([^]*))?$/.exec(said.trim()) ?? [];
   if (cause === undefined || help === undefined) return problemOf(path, said.trim() || "the server gives no report", "try it again");
@@ -26,7 +26,7 @@ export interface WantedRun {
   seed: string | null;
 }
 
-/** What a message of a report's page asks for; anything else is no concern of ours. */
+/** The run that a message of a report's page asks for; anything else is no concern of ours. */
 export function wantedRun(data: unknown): WantedRun | null {
   const { opens } = (data ?? {}) as { opens?: Partial<WantedRun> };
   if (typeof opens !== "object" || opens === null || typeof opens.variant !== "string") return null;

@@ -22,6 +22,7 @@ mod tests;
 
 use std::path::Path;
 
+use crate::extension;
 use sidestep_kernel::InputError;
 
 /// The maximum size of a file, in bytes.
@@ -100,8 +101,10 @@ pub struct Robot {
 /// that names them.
 ///
 /// # Errors
-/// Files that cannot be read, wrong syntax, wrong values: with file, line and column. Files that
-/// include themselves; more than 1000 files, 100,000 models, or 64 levels of models within models.
+/// A name that ends neither in `.world` nor in `.inc`; included files may end otherwise. Files that
+/// cannot be read, wrong syntax, wrong values: with file, line and column. Files that include
+/// themselves; more than 1000 files, 100,000 models, or 64 levels of models within models.
 pub fn load(path: &Path) -> Result<World, InputError> {
+    extension::check(path, "a world of Stage", &["world", "inc"])?;
     read::world(path)
 }

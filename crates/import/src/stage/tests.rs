@@ -39,6 +39,17 @@ fn a_floor_plan_is_stretched_to_its_size_and_place() {
 }
 
 #[test]
+fn what_does_not_end_as_a_world_is_not_read_as_one_but_may_be_included() {
+    for (name, is_world) in [("a.inc", true), ("A.WORLD.gz", true), ("a.toml", false), ("a", false)]
+    {
+        assert_eq!(read(&[(name, "speedup 3")]).is_ok(), is_world, "{name}");
+    }
+    let told = read(&[("a.toml", "include \"b.world\"")]).expect_err("a scenario");
+    assert!(told.remedy().contains(".world or .inc"), "{told}");
+    assert!(read(&[("a.world", "include \"robots.def\""), ("robots.def", "speedup 3")]).is_ok());
+}
+
+#[test]
 fn robots_and_boxes_have_what_they_inherit() {
     let text = "
         speedup 3

@@ -57,19 +57,17 @@ pub(super) struct Wish {
     pub(super) over: bool,
 }
 
-/// Refuses a text that would let a page read what it may not, and a new file that is no scenario. A text that is no
-/// TOML may be saved: nobody reads anything else because of it.
+/// Refuses a text that would let a page read what it may not, and one that is no scenario. A text that is no TOML may be
+/// saved, half-typed: neither as a scenario nor as the file of another program can it be read, and what names further
+/// files (maps, worlds of Stage) is never read from a file that ends in `.toml`.
 ///
 /// # Errors
 /// With the file that it names, or what it has to be.
-pub(super) fn writable(
-    (files, worlds): (&Files, &Worlds),
-    target: &Target,
-    source: &Source,
-) -> Result<(), Problem> {
+pub(super) fn writable(files: &Files, worlds: &Worlds, source: &Source) -> Result<(), Problem> {
     let Ok(values) = source.parse::<Value>() else { return Ok(()) };
     files.check_text(source)?;
-    match target.real.exists() || values["world"].is_string() {
+    // Also over a scenario: in two saves, a page could otherwise make any file out of one.
+    match values["world"].is_string() {
         true => Ok(()),
         false => {
             let worlds = worlds.names().join(", ");

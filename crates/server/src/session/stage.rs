@@ -192,7 +192,7 @@ impl Stage {
         let target = self.means.files.target(&path)?;
         let folder = target.path.parent().map(Path::to_path_buf).unwrap_or_default();
         let source = Source::new(path, text, folder);
-        writable((&self.means.files, &self.means.worlds), &target, &source)?;
+        writable(&self.means.files, &self.means.worlds, &source)?;
         let Source { text, folder, .. } = source;
         let answer = saved(&target, self.own.as_ref(), &text, &wish)?;
         if let Answer::Saved { place } = &answer {

@@ -4,6 +4,7 @@ use super::Job;
 use crate::Error;
 use crate::files::whereabouts_of;
 use sidestep::kernel::InputError;
+use sidestep_record::followed;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
@@ -89,15 +90,11 @@ impl Target {
         &self,
         fill: impl FnOnce(&Path) -> Result<T, Error>,
     ) -> Result<T, Error> {
-        // Of a link, the folder that it leads to: the link stays.
-        let path = match self.path.is_symlink() {
-            true => self.path.canonicalize().map_err(|e| Error::write(&self.path, &e))?,
-            false => self.path.clone(),
-        };
+        let failed = |e: std::io::Error| Error::write(&self.path, &e);
+        let path = followed(&self.path).map_err(failed)?;
         let mut growing = path.as_os_str().to_owned();
         growing.push(".partial");
         let growing = PathBuf::from(growing);
-        let failed = |e: std::io::Error| Error::write(&self.path, &e);
         // Remains of a process that was killed.
         remove(&growing).map_err(failed)?;
         std::fs::create_dir_all(&growing).map_err(failed)?;

@@ -1,11 +1,11 @@
 //! Recorded runs in other formats.
 
-use crate::support::{Place, StopAt, WORLDS};
+use crate::support::{Place, StopAt, WORLDS, names};
 use sidestep_session::export::{Export, Film, Form, export};
 use sidestep_session::{Error, Keep, Recorded, Unwatched, replay_all};
 use std::path::{Path, PathBuf};
 
-fn wanted(form: Form, out: &Path) -> Export<'_> {
+pub(crate) fn wanted(form: Form, out: &Path) -> Export<'_> {
     Export {
         form,
         out: Some(out),
@@ -82,6 +82,19 @@ fn a_recording_is_not_exported_onto_itself() {
     }
     let out = place.path("part.mcap");
     export(&recorded, &Export { out: Some(&out), ..part }, &Unwatched).expect("beside it");
+}
+
+#[test]
+fn a_folder_that_is_named_with_a_slash_at_its_end_is_replaced_by_the_new_export() {
+    let place = Place::new();
+    let recorded = Recorded::open(WORLDS, &place.record("run").0).expect("recorded");
+    let out = place.path("out/");
+    for replace in [false, true] {
+        let wanted = Export { replace, ..wanted(Form::Csv(None), &out) };
+        export(&recorded, &wanted, &Unwatched).expect("written");
+        assert!(out.join("events.csv").is_file() && out.join("trajectories.csv").is_file());
+        assert_eq!(names(&place), ["out", "pond.toml", "run"]);
+    }
 }
 
 #[test]

@@ -4,6 +4,8 @@ mod builds;
 mod changed;
 mod controls;
 mod exports;
+#[cfg(unix)]
+mod links;
 mod orders;
 mod places;
 mod pond;

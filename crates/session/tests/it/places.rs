@@ -39,24 +39,3 @@ fn a_recording_in_the_place_of_the_folder_or_above_it_is_refused() {
     start(&place, &same, &same.join("run.mcap")).expect("a file in the folder");
     assert!(same.join("run.mcap").is_file() && same.join("run.json").is_file());
 }
-#[test]
-#[cfg(unix)]
-fn a_link_to_a_folder_stays_a_link() {
-    use sidestep_session::sweep::{Folder, planned};
-    use std::os::unix::fs::symlink;
-    let place = Place::new();
-    for (real, link) in [("disk/run", "run"), ("disk/sweep", "sweep")] {
-        std::fs::create_dir_all(place.path(real)).expect("made");
-        symlink(place.path(real), place.path(link)).expect("linked");
-    }
-    place.record("run");
-    let sweep = crate::sweeps::sweep(&place);
-    planned(crate::support::WORLDS, &sweep, &place.path("sweep"), 1, &Unwatched).expect("planned");
-    assert!(place.path("run").is_symlink() && place.path("disk/run/run.json").is_file());
-    assert!(place.path("sweep").is_symlink() && Folder::open(&place.path("disk/sweep")).is_ok());
-    symlink(place.path("nowhere"), place.path("dangling")).expect("linked");
-    let keep = Keep { folder: Some(&place.path("dangling")), ..Keep::default() };
-    let refused = place.start(1, keep).map(drop).expect_err("nowhere").to_string();
-    assert!(refused.contains("a link to what is not there"), "{refused}");
-    assert!(place.path("dangling").is_symlink());
-}

@@ -91,20 +91,43 @@ fn what_is_read_stays_inside_where_a_session_goes_on_in_another_folder() {
 }
 
 #[test]
-fn a_new_file_is_a_scenario_or_a_text_that_cannot_be_read_yet() {
+fn what_is_saved_is_a_scenario_or_a_text_that_cannot_be_read_yet() {
     let (mut page, inside) = page();
     let other = inside.join("Cargo.toml");
-    let reply = page.save("hello = 1\n", Some(&other), None, false);
-    assert!(reply["problem"]["cause"].as_str().is_some_and(|c| c.contains("world")), "{reply}");
+    let refuse = |page: &mut Page| {
+        let reply = page.save("hello = 1\n", Some(&other), None, true);
+        assert!(reply["problem"]["cause"].as_str().is_some_and(|c| c.contains("world")), "{reply}");
+    };
+    refuse(&mut page);
     assert!(!other.exists());
-    assert_eq!(
-        page.save("world = = 1", Some(&inside.join("half.toml")), None, false)["answer"]["is"],
-        "saved"
-    );
-    assert_eq!(
-        page.save("hello = 1\n", Some(&inside.join("half.toml")), None, false)["answer"]["is"],
-        "saved"
-    );
+    // Nor in two saves, over what may be saved.
+    for first in ["world = = 1", ROBOTS] {
+        assert_eq!(page.save(first, Some(&other), None, true)["answer"]["is"], "saved");
+        refuse(&mut page);
+        assert_eq!(fs::read_to_string(&other).expect("read"), first);
+    }
+}
+
+#[test]
+fn no_text_that_is_saved_is_read_as_a_map_or_a_floor_that_names_files_elsewhere() {
+    let (mut page, inside) = page();
+    fs::write(inside.join("../out/secret.pgm"), "P2 2 2 255 0 255 255 205").expect("written");
+    fs::write(inside.join("../out/secret.inc"), "speedup 3").expect("written");
+    let map = "image: ../out/secret.pgm\nresolution: 0.05\norigin: [9, 9, 0]\nnegate: 0\n\
+               occupied_thresh: 0.65\nfree_thresh: 0.196\n";
+    // A scenario by its `world`, and a map as well.
+    let both = format!("name = \"\"\": 1\n{map}last: |\n  \"\"\"\n  world = \"chain\"\n");
+    let floor = "model ( bitmap \"../out/secret.pgm\" size [1 1 1] pose [9 9 0 0] )\n";
+    let part = "include \"../out/secret.inc\"\n";
+    for (key, text) in [("map", map), ("map", &both), ("stage", floor), ("stage", part)] {
+        let saved = page.save(text, Some(&inside.join("m.toml")), None, true);
+        assert_eq!(saved["answer"]["is"], "saved", "{saved}");
+        let text = format!("{CHAINS}[ground]\n{key} = \"m.toml\"\n");
+        let id = page.send(json!({ "do": "restart", "session": 1, "seed": null, "text": text }));
+        let reply = page.wait(id);
+        let cause = reply["problem"]["cause"].as_str().unwrap_or_default();
+        assert!(cause.contains("the file name does not say"), "{text}: {reply}");
+    }
 }
 
 #[test]

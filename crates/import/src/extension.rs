@@ -1,0 +1,26 @@
+//! Kinds of files, as their names tell them.
+
+use std::path::Path;
+
+use sidestep_kernel::InputError;
+
+/// Returns the extension in lower case, the one before `.gz` where that is the last.
+pub(crate) fn extension(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    name.rsplit_once('.').map_or("", |(_, extension)| extension).to_owned()
+}
+
+/// Refuses a file whose name does not say that it is of a kind. Files that name further files need it: one text can be a
+/// scenario and a map at once, so whoever may write scenarios alone could have files read that a scenario may not name.
+///
+/// # Errors
+/// With the extensions of that kind.
+pub(crate) fn check(path: &Path, kind: &str, extensions: &[&str]) -> Result<(), InputError> {
+    if extensions.contains(&extension(path).as_str()) {
+        return Ok(());
+    }
+    let cause = format!("the file name does not say that this is {kind}");
+    let remedy = format!("give a file that ends in .{}, also with .gz", extensions.join(" or ."));
+    Err(InputError::new(path.display(), cause, remedy))
+}

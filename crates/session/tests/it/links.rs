@@ -1,0 +1,52 @@
+//! Links to folders, in whose place something is written: they stay, and what they lead to is filled.
+
+use crate::exports::wanted;
+use crate::support::{Place, WORLDS};
+use sidestep_session::export::{Export, Form, export};
+use sidestep_session::sweep::{Folder, planned};
+use sidestep_session::{Keep, Recorded, Unwatched};
+use std::os::unix::fs::symlink;
+
+#[test]
+fn a_link_to_a_folder_stays_a_link_also_with_a_slash_at_its_end() {
+    for end in ["", "/"] {
+        let place = Place::new();
+        let recorded = place.record("recorded").0;
+        for name in ["run", "sweep", "tables"] {
+            std::fs::create_dir_all(place.path("disk").join(name)).expect("made");
+            symlink(place.path("disk").join(name), place.path(name)).expect("linked");
+        }
+        let named = |name: &str| place.path(&format!("{name}{end}"));
+        place.record(&format!("run{end}"));
+        let sweep = crate::sweeps::sweep(&place);
+        planned(WORLDS, &sweep, &named("sweep"), 1, &Unwatched).expect("planned");
+        let tables = named("tables");
+        let wanted = Export { replace: true, ..wanted(Form::Csv(None), &tables) };
+        let recorded = Recorded::open(WORLDS, &recorded).expect("recorded");
+        export(&recorded, &wanted, &Unwatched).expect("written");
+        for name in ["run", "sweep", "tables"] {
+            assert!(place.path(name).is_symlink(), "{name}{end}");
+        }
+        assert!(place.path("disk/run/run.json").is_file());
+        assert!(Folder::open(&place.path("disk/sweep")).is_ok());
+        assert!(place.path("disk/tables/events.csv").is_file());
+    }
+}
+
+#[test]
+fn a_link_to_what_is_not_there_is_refused_and_stays() {
+    let place = Place::new();
+    let recorded = place.record("recorded").0;
+    let recorded = Recorded::open(WORLDS, &recorded).expect("recorded");
+    symlink(place.path("nowhere"), place.path("link")).expect("linked");
+    for name in ["link", "link/"] {
+        let folder = place.path(name);
+        let keep = Keep { folder: Some(&folder), ..Keep::default() };
+        let run = place.start(1, keep).map(drop).expect_err("nowhere");
+        let tables = export(&recorded, &wanted(Form::Csv(None), &folder), &Unwatched);
+        for refused in [run, tables.expect_err("nowhere")] {
+            assert!(refused.to_string().contains("a link to what is not there"), "{refused}");
+        }
+        assert!(place.path("link").is_symlink(), "{name}");
+    }
+}
