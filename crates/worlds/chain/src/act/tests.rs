@@ -93,6 +93,42 @@ fn a_task_none_of_whose_targets_was_reached_is_given_up_and_not_done() {
     assert!(some.is_over() && tally.done == 2 && count(&events, "done") == 1, "{events:?}");
 }
 
+/// One target is given up after a second; the time of the task ends before another one could be.
+#[test]
+fn a_task_whose_time_ends_before_it_reached_a_target_is_given_up_and_not_done() {
+    let cases = [
+        ("[[10.0, 0.0]]", 0.5, 0, "given-up"),
+        ("[[10.0, 0.0], [0.0, 10.0]]", 1.5, 0, "given-up"),
+        ("[[-0.5, 0.5], [10.0, 0.0]]", 2.3, 1, "done"),
+        ("[[10.0, 0.0], [-0.5, 0.5], [0.0, 10.0]]", 3.3, 1, "done"),
+    ];
+    for (targets_m, lasts_s, reached, ends) in cases {
+        let text =
+            held(targets_m).replace("patience_s", &format!("lasts_s = {lasts_s}, patience_s"));
+        let mut run = run(&text);
+        let events = told(&mut run, 2000);
+        assert_eq!(count(&events, "target"), reached, "{targets_m}: {events:?}");
+        assert_eq!(events.last(), Some(&(ends.to_owned(), 0.0)), "{targets_m}: {events:?}");
+        let tally = run.world().metrics_of(run.state(), 0).tally;
+        let is_done = usize::from(ends == "done");
+        assert_eq!(tally.done as usize, reached + is_done, "{targets_m}: {events:?}");
+    }
+}
+
+/// A corridor that ends where it begins.
+#[test]
+fn a_navigator_goes_round_a_corridor_that_comes_back_to_its_start() {
+    let legs = "{ straight_m = 10 }, { radius_m = 3, turn_deg = 180 }";
+    let mut run = run(&format!(
+        "seed = 1\ncycles = 500\n[ground]\ncorridor = {{ width_m = 2.0, legs = [{legs}, {legs}] }}\n\
+         [[chains]]\nconnectors = 1\nat_m = [-0.2, 0.0]\nrod_m = 0.5\ntasks = [{{ kind = \"navigate\" }}]\n"
+    ));
+    let events = told(&mut run, 500);
+    assert!(!run.is_over() && count(&events, "done") == 0, "{events:?}");
+    let (progress, at) = (run.metrics().progress, run.state().body(0).chain.points()[0]);
+    assert!(at[0] > 1.0 && (0.02..0.5).contains(&progress), "{progress} at {at:?}");
+}
+
 /// A chain that breaks, and is to be joined again, with more in the way.
 fn broken(joins_s: &str, by_m: f64, more: &str) -> String {
     format!(
