@@ -92,6 +92,9 @@ pub struct Scattered {
     /// and the places where all connectors will be joined again, coordinate after coordinate; empty
     /// while the parts lie where they are.
     pub goals_m: Vec<f64>,
+    /// Cycles in a row in which something kept the parts from being joined; see [`Snapshot::waited`].
+    #[serde(skip)]
+    pub(crate) waited: Cycle,
 }
 
 /// A way to a target: the postures that are not reached yet, each straight from the one before; at least one.
@@ -140,6 +143,8 @@ pub struct Snapshot {
     pub(crate) ways_out: Vec<(u32, WayOut)>,
     /// Cycles for which navigators have stood because something moves ahead, where they have, by id.
     pub(crate) stood: Vec<(EntityId, u32)>,
+    /// Cycles for which scattered parts have waited for what is in their way, where they have, by id.
+    pub(crate) waited: Vec<(EntityId, Cycle)>,
     /// Orders from outside and answers, of chains that have any, by id.
     pub(crate) externals: Vec<(u32, External)>,
     /// Lost connectors, as those of their chain know, of chains in which somebody is lost; by id.
@@ -312,27 +317,11 @@ impl<const D: usize> ChainState<D> {
         for (slot, stood) in &snapshot.stood {
             bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?.stood = *stood;
         }
-        for (slot, external) in &snapshot.externals {
+        for (slot, waited) in &snapshot.waited {
             let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
-            let is_its_own = external.is_within(body.chain.points().len());
-            body.external = is_its_own.then_some(*external).ok_or(CheckpointError::Damaged)?;
+            body.scattered.as_mut().ok_or(CheckpointError::Damaged)?.waited = *waited;
         }
-        for (slot, missing) in &snapshot.missing {
-            let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
-            let n = body.chain.points().len();
-            let is_its_own = |k: &u32| (*k as usize) < n;
-            if missing.len() != n || !missing.iter().flatten().flatten().all(is_its_own) {
-                return Err(CheckpointError::Damaged);
-            }
-            body.missing = missing.clone();
-        }
-        for (slot, handed) in &snapshot.handed {
-            let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
-            let (n, now) = (body.chain.points().len(), snapshot.cycle);
-            let read = postcard::from_bytes::<Handed<D>>(handed).ok();
-            let handed = read.filter(|read| read.cycle == now && read.check(n).is_ok());
-            body.handed = Some(handed.ok_or(CheckpointError::Damaged)?);
-        }
+        restore_agents(&mut bodies, snapshot)?;
         Ok(Self::of(bodies.into_iter()))
     }
 
@@ -421,6 +410,7 @@ impl<const D: usize> ChainState<D> {
         let joints = slots.clone().map(|slot| (slot as EntityId, self.body(slot).joints.clone()));
         let ways_out = slots.clone().map(|slot| (slot as EntityId, self.body(slot).way_out));
         let stood = slots.clone().map(|slot| (slot as EntityId, self.body(slot).stood));
+        let waited = |slot| Some((slot as EntityId, self.body(slot).scattered.as_ref()?.waited));
         let externals = slots.clone().map(|slot| (slot as EntityId, self.body(slot).external));
         let missing = slots.clone().map(|slot| (slot as EntityId, self.body(slot).missing.clone()));
         let handed = slots.clone().map(|slot| (slot as EntityId, self.body(slot).handed_in(cycle)));
@@ -428,6 +418,7 @@ impl<const D: usize> ChainState<D> {
             cycle,
             chains: slots.clone().map(|slot| self.body(slot).record()).collect(),
             joints: joints.filter_map(|(slot, values)| Some((slot, values?))).collect(),
+            waited: slots.clone().filter_map(waited).filter(|(_, cycles)| *cycles > 0).collect(),
             plans: slots.filter_map(plan).collect(),
             ways_out: ways_out.filter(|(_, way_out)| !way_out.is_none()).collect(),
             stood: stood.filter(|(_, cycles)| *cycles > 0).collect(),
@@ -441,6 +432,35 @@ impl<const D: usize> ChainState<D> {
     pub(crate) fn tallies(&self) -> Vec<Tally> {
         (0..self.len()).map(|slot| self.body(slot).tally.clone()).collect()
     }
+}
+
+/// Gives bodies back what is told to their agents from outside, and what those know of each other.
+fn restore_agents<const D: usize>(
+    bodies: &mut [Body<D>],
+    snapshot: &Snapshot,
+) -> Result<(), CheckpointError> {
+    for (slot, external) in &snapshot.externals {
+        let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
+        let is_its_own = external.is_within(body.chain.points().len());
+        body.external = is_its_own.then_some(*external).ok_or(CheckpointError::Damaged)?;
+    }
+    for (slot, missing) in &snapshot.missing {
+        let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
+        let n = body.chain.points().len();
+        let is_its_own = |k: &u32| (*k as usize) < n;
+        if missing.len() != n || !missing.iter().flatten().flatten().all(is_its_own) {
+            return Err(CheckpointError::Damaged);
+        }
+        body.missing = missing.clone();
+    }
+    for (slot, handed) in &snapshot.handed {
+        let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
+        let (n, now) = (body.chain.points().len(), snapshot.cycle);
+        let read = postcard::from_bytes::<Handed<D>>(handed).ok();
+        let handed = read.filter(|read| read.cycle == now && read.check(n).is_ok());
+        body.handed = Some(handed.ok_or(CheckpointError::Damaged)?);
+    }
+    Ok(())
 }
 
 impl<const D: usize> Plan<D> {
@@ -489,6 +509,7 @@ impl Snapshot {
         add_any(&mut hasher, &self.plans);
         add_any(&mut hasher, &self.ways_out);
         add_any(&mut hasher, &self.stood);
+        add_any(&mut hasher, &self.waited);
         add_any(&mut hasher, &self.externals);
         add_any(&mut hasher, &self.missing);
         add_any(&mut hasher, &self.handed);

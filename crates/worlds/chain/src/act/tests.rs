@@ -1,10 +1,13 @@
 //! Whole runs of small scenarios: what chains do to each other, and what is told of it.
 
 use crate::events::EventKind;
+use crate::metrics::Tally;
 use crate::rods::geometry::distance;
 use crate::scenario::Compiled;
+use crate::state::Snapshot;
 use crate::{
-    Chain, ChainRun, Connector, Mode, Motion, Obstacle, Obstacles, Propagator, Request, Rod, Source,
+    Chain, ChainRun, ChainState, Connector, Mode, Motion, Obstacle, Obstacles, Propagator, Request,
+    Rod, Source,
 };
 use sidestep_kernel::Simulation;
 use sidestep_kernel::interrupt::Interrupt;
@@ -205,6 +208,41 @@ fn parts_that_something_keeps_from_coming_back_are_told_with_what_it_is() {
             *told as u64 == *counted && (*told == 0) == *is_over
         })
     );
+}
+
+/// Nothing but the wait goes on, so it alone tells two of these states apart.
+#[test]
+fn the_time_for_which_scattered_parts_have_waited_is_a_part_of_the_state() {
+    let box_ = "[[obstacles]]\ncorners_m = [[-1.5, 0.3], [-0.5, 0.3], [-0.5, 0.5], [-1.5, 0.5]]\n";
+    let stuck = |seed: u32| {
+        let text = broken("1.5", 2.0, box_).replace("seed = 3", &format!("seed = {seed}"));
+        let events = told(&mut run(&text), 1500);
+        let is_stuck = ["reforming", "not-reformed"].iter().all(|kind| count(&events, kind) == 1);
+        is_stuck.then_some(text)
+    };
+    let text = (1..=12).find_map(stuck).expect("a chain that something keeps from coming together");
+    let mut whole = run(&text);
+    while whole.metrics().not_reformed == 0 {
+        whole.advance(1);
+    }
+    let ends = whole.cycle();
+    let mut run = run(&text);
+    run.advance(ends - 100);
+    let [before, after] = [0, 1].map(|cycles| {
+        run.advance(cycles);
+        Snapshot { cycle: 0, ..run.state().snapshot(0) }
+    });
+    assert_eq!(before.chains[0].points_m, after.chains[0].points_m, "nothing moves");
+    assert_ne!(before.digest(), after.digest());
+
+    // Also without its counts a chain that is restored gives up when it would have.
+    let world = run.world();
+    let state = ChainState::restore(world, &after, vec![Tally::default()]).expect("its own state");
+    let waited = |state: &ChainState<2>| state.body(0).scattered.as_ref().map(|s| s.waited);
+    assert!(waited(&state).is_some_and(|cycles| cycles > 100), "{:?}", waited(&state));
+    assert_eq!(waited(&state), waited(run.state()));
+    let told = run.agent_metrics().to_string();
+    assert!(told.contains("\"not_reformed\"") && !told.contains("reform_waits"), "{told}");
 }
 
 #[test]
