@@ -10,6 +10,8 @@ use super::neighbors::Neighbors;
 use super::put_off::PutOff;
 use super::rods::chain::Chain;
 use super::rods::geometry::{Bounds, Point, in_dimensions, unit};
+use super::rods::grid::Grid;
+use super::rods::obstacle::around;
 use super::script::Motion;
 use super::swarm::drive::Pose;
 use super::swarm::leader::{Decision, LeaderState};
@@ -18,10 +20,15 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::math::atan2;
-use sidestep_kernel::{Cycle, Digest, EntityId, InputError};
+use sidestep_kernel::{Cycle, Digest, EntityId, InputError, Slot};
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+
+/// Number of chains up to which a look at each takes no longer than finding those nearby.
+const FEW: usize = 16;
+/// Room for rounding between boxes and distances, meters.
+const ROUNDING_M: f64 = 1e-6;
 
 /// The state of a world of chains; slots are ids.
 #[derive(Debug)]
@@ -31,6 +38,10 @@ pub struct ChainState<const D: usize> {
     claims: AtomicU64,
     /// The claims of this cycle, sorted by the first worker that needs them.
     neighbors: RwLock<Neighbors<D>>,
+    /// Whether some body may have changed since the boxes below were made.
+    has_changed: AtomicBool,
+    /// The boxes around the solid parts of all chains in the plane, made by the first worker that needs them.
+    crowd: RwLock<Grid<2>>,
 }
 
 /// One chain's share of the state. None of its locks is ever waited for: in the first phase all workers only
@@ -200,6 +211,12 @@ impl<const D: usize> Body<D> {
         (0..self.chain.points().len()).map(move |k| (k, solid(k)))
     }
 
+    /// Returns the box around its solid parts in the plane.
+    fn solid_bounds(&self) -> Bounds<2> {
+        let boxes = self.solids().map(|(_, solid)| Bounds::of(&[solid.at]).grown(solid.radius_m));
+        boxes.fold(Bounds::nothing(), |all, one| all.joined(&one))
+    }
+
     /// Returns a navigator's memory; at the start of its task it stands at its connector and looks
     /// ahead.
     pub(crate) fn leader(&self, task: &Task<D>) -> LeaderState {
@@ -272,6 +289,8 @@ impl<const D: usize> ChainState<D> {
             cells: bodies.map(cell).collect(),
             claims: AtomicU64::new(0),
             neighbors: RwLock::default(),
+            has_changed: AtomicBool::new(true),
+            crowd: RwLock::default(),
         }
     }
 
@@ -364,6 +383,10 @@ impl<const D: usize> ChainState<D> {
 
     /// Locks one chain for writing.
     pub(crate) fn body_mut(&self, slot: usize) -> RwLockWriteGuard<'_, Body<D>> {
+        // Workers that act would wait for each other if all of them wrote it.
+        if !self.has_changed.load(Relaxed) {
+            self.has_changed.store(true, Relaxed);
+        }
         self.cells[slot].body.write().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -375,18 +398,31 @@ impl<const D: usize> ChainState<D> {
     /// Returns the claims by where they begin; valid while nobody claims anything.
     pub(crate) fn neighbors(&self) -> RwLockReadGuard<'_, Neighbors<D>> {
         let made = self.claims.load(Relaxed);
-        let read = || self.neighbors.read().unwrap_or_else(PoisonError::into_inner);
-        let known = read();
-        if known.is_of(made) {
-            return known;
+        renewed(
+            &self.neighbors,
+            |neighbors| neighbors.is_of(made),
+            |neighbors| neighbors.sort(made, (0..self.len()).map(|slot| self.claim(slot))),
+        )
+    }
+
+    /// Lists the chains, in order, of which some solid part may be within a distance of a place, among them all of
+    /// which one is; valid while nobody changes a body.
+    pub(crate) fn list_near(&self, at: Point<2>, range_m: f64, slots: &mut Vec<Slot>) {
+        slots.clear();
+        if self.len() <= FEW {
+            return slots.extend(0..self.len() as Slot);
         }
-        drop(known);
-        let mut neighbors = self.neighbors.write().unwrap_or_else(PoisonError::into_inner);
-        if !neighbors.is_of(made) {
-            neighbors.sort(made, (0..self.len()).map(|slot| self.claim(slot)));
-        }
-        drop(neighbors);
-        read()
+        let crowd = renewed(
+            &self.crowd,
+            |_| !self.has_changed.load(Relaxed),
+            |crowd| {
+                let boxes = (0..self.len()).map(|slot| self.body(slot).solid_bounds());
+                crowd.rebuild(boxes, range_m);
+                self.has_changed.store(false, Relaxed);
+            },
+        );
+        crowd.visit(&around(at, range_m).grown(ROUNDING_M), |slot| slots.push(slot as Slot));
+        slots.sort_unstable();
     }
 
     pub(crate) fn set_claim(&self, slot: usize, claim: Bounds<D>) {
@@ -432,6 +468,26 @@ impl<const D: usize> ChainState<D> {
     pub(crate) fn tallies(&self) -> Vec<Tally> {
         (0..self.len()).map(|slot| self.body(slot).tally.clone()).collect()
     }
+}
+
+/// Returns what a lock holds, renewed by the first worker that comes if it is out of date.
+fn renewed<T>(
+    lock: &RwLock<T>,
+    is_current: impl Fn(&T) -> bool,
+    renew: impl FnOnce(&mut T),
+) -> RwLockReadGuard<'_, T> {
+    let read = || lock.read().unwrap_or_else(PoisonError::into_inner);
+    let known = read();
+    if is_current(&known) {
+        return known;
+    }
+    drop(known);
+    let mut held = lock.write().unwrap_or_else(PoisonError::into_inner);
+    if !is_current(&held) {
+        renew(&mut held);
+    }
+    drop(held);
+    read()
 }
 
 /// Gives bodies back what is told to their agents from outside, and what those know of each other.
