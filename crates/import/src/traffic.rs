@@ -78,8 +78,9 @@ const LONGEST_S: f64 = 1e9;
 /// The range of altitudes, in ft.
 const ALTITUDES_FT: RangeInclusive<f64> = -1e6..=1e6;
 
-/// The greatest speed between two rows, in m/s: beyond it one of the two places is wrong.
-const FASTEST_M_S: f64 = 1e6;
+/// The greatest speed between two rows, in m/s: beyond it one of the two places is wrong. Airplanes of the simulator are
+/// bounded by it as well, so that what is too fast is told at its own row.
+pub const FASTEST_M_S: f64 = 1e6;
 
 /// The indices of the columns.
 struct Columns<'a> {

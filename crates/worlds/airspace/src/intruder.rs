@@ -4,8 +4,9 @@
 //! wants to go. Methods take it to fly straight on. The shield knows where it can be within `dt`:
 //! anywhere in a circle that grows at its greatest speed.
 
-use crate::flight::{FASTEST_M_S, Levels, Point};
+use crate::flight::{Levels, Point};
 use serde::{Deserialize, Serialize};
+use sidestep_import::traffic::FASTEST_M_S;
 use sidestep_kernel::Slot;
 
 /// Bounds on what is told of an intruder: meters, meters per second and seconds beyond which nothing makes sense, or

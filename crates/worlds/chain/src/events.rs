@@ -46,7 +46,7 @@ pub enum EventKind {
     Target,
     /// A task is done; the value is its number.
     Done,
-    /// A task was given up, or all of its targets were; the value is its number.
+    /// A task was given up, or ended with none of its targets reached; the value is its number.
     GivenUp,
     /// A planner has found a way to a target; the value is the number of its straight pieces.
     Planned,

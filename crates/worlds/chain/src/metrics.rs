@@ -54,8 +54,6 @@ pub struct Tally {
     pub not_reformed: u64,
     /// Greatest number of parts that were missing then.
     pub missing_parts: u64,
-    /// Steps in a row in which something kept broken parts from being joined.
-    pub reform_waits: u64,
     /// Steps in which each layer of a navigator acted, layer 1 first.
     pub layers: [u64; 6],
     /// Counts for the robots on wheels.
@@ -265,7 +263,6 @@ impl Default for Tally {
             reformed: 0,
             not_reformed: 0,
             missing_parts: 0,
-            reform_waits: 0,
             layers: [0; 6],
             robots: RobotTally::default(),
             rungs: RungTally::default(),

@@ -32,8 +32,13 @@ pub(crate) enum Goal {
         /// Distance at which the place counts as reached, meters.
         tolerance_m: f64,
     },
-    /// The end of a line, such as the middle of a corridor, which the navigator does not know.
-    EndOf(Vec<Point<2>>),
+    /// The end of the middle of a corridor, which the navigator does not know.
+    EndOf {
+        /// Points of the middle; at least two.
+        line: Vec<Point<2>>,
+        /// Width of the corridor, meters.
+        width_m: f64,
+    },
 }
 
 impl Navigator {
@@ -48,23 +53,26 @@ impl Goal {
     pub(crate) fn target(&self) -> Option<Point<2>> {
         match self {
             Self::Target { at, .. } => Some(*at),
-            Self::EndOf(_) => None,
+            Self::EndOf { .. } => None,
         }
     }
 
-    /// Returns the point of the line at which a navigator begins that stands at `at`: the nearest one.
+    /// Returns the point of the line at which a navigator begins that stands at `at`: the first one beside which it is
+    /// in the corridor, since a corridor may come back to where it was; the nearest one if it is outside.
     pub(crate) fn begins(&self, at: Point<2>) -> usize {
-        let Self::EndOf(line) = self else { return 0 };
-        nearest(line, 0..line.len(), at).unwrap_or(0)
+        let Self::EndOf { line, width_m } = self else { return 0 };
+        match line.iter().position(|&p| distance(p, at) <= 0.5 * width_m) {
+            Some(first) => nearer_from(line, first, at),
+            None => nearest(line, 0..line.len(), at).unwrap_or(0),
+        }
     }
 
     /// Returns the point of the line that a navigator at `at` has reached, if it was at `index`: it goes on while points
     /// come nearer, also beyond some that do not.
     pub(crate) fn passed(&self, at: Point<2>, mut index: usize) -> usize {
-        let Self::EndOf(line) = self else { return index };
-        let nearer = |i: usize| distance(line[i + 1], at) <= distance(line[i], at);
+        let Self::EndOf { line, .. } = self else { return index };
         loop {
-            let here = (index..line.len() - 1).find(|&i| !nearer(i)).unwrap_or(line.len() - 1);
+            let here = nearer_from(line, index, at);
             let ahead = here..(here + 1 + AHEAD).min(line.len());
             match nearest(line, ahead, at).filter(|&i| i > here) {
                 Some(further) => index = further,
@@ -76,21 +84,35 @@ impl Goal {
     pub(crate) fn is_reached(&self, at: Point<2>, index: usize) -> bool {
         match self {
             Self::Target { at: target, tolerance_m } => distance(at, *target) <= *tolerance_m,
-            Self::EndOf(line) => distance(line[index], line[line.len() - 1]) <= BEFORE_THE_END_M,
+            // All that is left of the line is near its end: near it alone is also where a line begins that comes back.
+            Self::EndOf { line, .. } => {
+                let end = line[line.len() - 1];
+                line[index..].iter().all(|&p| distance(p, end) <= BEFORE_THE_END_M)
+            }
         }
     }
 
-    /// Returns the part of the way that is done: by the points of a line, or by the distance left
-    /// to a target compared with the distance at the start.
+    /// Returns the part of the way that is done: by the points of a line from where it began, or by the
+    /// distance left to a target compared with the distance at the start.
     pub(crate) fn progress(&self, index: usize, start: Point<2>, nearest_m: f64) -> f64 {
         match self {
             Self::Target { at, .. } if nearest_m.is_finite() => {
                 1.0 - nearest_m / distance(start, *at).max(nearest_m).max(1e-9)
             }
             Self::Target { .. } => 0.0,
-            Self::EndOf(line) => index as f64 / (line.len() - 1).max(1) as f64,
+            Self::EndOf { line, .. } => {
+                let first = self.begins(start);
+                let left = (line.len() - 1).saturating_sub(first);
+                index.saturating_sub(first) as f64 / left.max(1) as f64
+            }
         }
     }
+}
+
+/// Returns the last point of a line up to which all from `index` on come nearer.
+fn nearer_from(line: &[Point<2>], index: usize, at: Point<2>) -> usize {
+    let nearer = |i: usize| distance(line[i + 1], at) <= distance(line[i], at);
+    (index..line.len() - 1).find(|&i| !nearer(i)).unwrap_or(line.len() - 1)
 }
 
 /// Returns the nearest of some points of a line; of equals the first.
@@ -101,6 +123,7 @@ fn nearest(line: &[Point<2>], among: Range<usize>, at: Point<2>) -> Option<usize
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ground::{Corridor, Leg};
 
     /// Two legs of 5 m, 4 m apart, and the way from one to the other.
     fn hairpin() -> Goal {
@@ -109,7 +132,61 @@ mod tests {
         };
         let turn = (0..40).map(|k| [5.0, 0.1 * f64::from(k)]);
         let there = leg(0.0, &|x| x);
-        Goal::EndOf(there.into_iter().chain(turn).chain(leg(4.0, &|x| 5.0 - x)).collect())
+        let line = there.into_iter().chain(turn).chain(leg(4.0, &|x| 5.0 - x)).collect();
+        Goal::EndOf { line, width_m: 2.0 }
+    }
+
+    /// The middle of a corridor of 2 m.
+    fn middle(legs: &[Leg]) -> Goal {
+        let corridor = Corridor::new(legs.to_vec(), 2.0).unwrap();
+        let line = corridor.line(0.1).iter().map(|pose| pose.at).collect();
+        Goal::EndOf { line, width_m: 2.0 }
+    }
+
+    /// Passes the line from `begins` on, along its own points; returns how many of them went by before the end.
+    fn passes_all(goal: &Goal, begins: usize) -> usize {
+        let Goal::EndOf { line, .. } = goal else { panic!("a line") };
+        let (mut index, mut count) = (begins, 0);
+        for &at in &line[begins..] {
+            if goal.is_reached(at, index) {
+                return count;
+            }
+            (index, count) = (goal.passed(at, index), count + 1);
+        }
+        panic!("the end is never reached: at {index}")
+    }
+
+    #[test]
+    fn a_line_that_ends_where_it_begins_is_passed_as_a_whole() {
+        let turn = |turn_deg| Leg::Bend { radius_m: 3.0, turn_deg };
+        let straight = Leg::Straight { length_m: 10.0 };
+        let round = middle(&[straight, turn(180.0), straight, turn(180.0)]);
+        for at in [[-0.2, 0.0], [0.0, 0.0], [0.03, 0.4]] {
+            let begins = round.begins(at);
+            assert_eq!(begins, 0, "{at:?}");
+            assert!(!round.is_reached(at, begins), "{at:?}");
+        }
+        assert!(passes_all(&round, 0) > 380);
+        for turn_deg in [720.0, 3600.0, -720.0] {
+            let laps = middle(&[turn(turn_deg)]);
+            let Goal::EndOf { line, .. } = &laps else { panic!("a line") };
+            let lap = (line.len() - 1) as f64 * 360.0 / turn_deg.abs();
+            for &at in &line[..lap as usize - 12] {
+                let begins = laps.begins(at) as f64;
+                assert!(begins < lap, "{turn_deg} deg, {at:?}: {begins} of {lap}");
+            }
+            assert!(passes_all(&laps, 0) > line.len() - 10, "{turn_deg} deg");
+        }
+    }
+
+    #[test]
+    fn progress_along_a_line_counts_from_where_it_began() {
+        let goal = middle(&[Leg::Straight { length_m: 20.0 }]);
+        let start = [10.0, 0.3];
+        let begins = goal.begins(start);
+        assert_eq!(begins, 100);
+        let progress = |index| goal.progress(index, start, f64::INFINITY);
+        assert_eq!([begins, 150, 200].map(progress), [0.0, 0.5, 1.0]);
     }
 
     #[test]
@@ -126,7 +203,8 @@ mod tests {
 
     #[test]
     fn a_navigator_is_not_held_up_by_a_point_beside_its_line() {
-        let bumpy = Goal::EndOf(vec![[0.0, 0.0], [0.1, 0.0], [0.15, 0.3], [0.2, 0.0], [0.9, 0.0]]);
+        let line = vec![[0.0, 0.0], [0.1, 0.0], [0.15, 0.3], [0.2, 0.0], [0.9, 0.0]];
+        let bumpy = Goal::EndOf { line, width_m: 2.0 };
         assert_eq!(bumpy.passed([0.2, 0.0], 0), 3);
     }
 }

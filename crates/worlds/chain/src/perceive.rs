@@ -65,16 +65,120 @@ impl<'a, const D: usize> Looking<'a, D> {
         leader: &LeaderState,
     ) {
         let range_m = navigator.leader.laser.range_m();
-        let seen = &mut self.scratch.seen;
+        let Scratch { seen, near, .. } = &mut *self.scratch;
         seen.clear();
-        for other in 0..self.state.len() {
-            let body = self.state.body(other);
-            let is_own = other == slot as usize;
+        self.state.list_near(leader.pose.at, range_m, near);
+        for &other in &*near {
+            let body = self.state.body(other as usize);
+            let is_own = other == slot;
             body.solids().filter(|(k, _)| !(is_own && *k == agent)).for_each(|(_, solid)| {
                 if distance(leader.pose.at, solid.at) - solid.radius_m <= range_m {
                     seen.push(solid.as_seen());
                 }
             });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rods::geometry::Point;
+    use crate::scenario::Compiled;
+    use crate::swarm::laser::Body as Seen;
+    use proptest::prelude::*;
+    use sidestep_scenario::Source;
+
+    /// Range of the lasers, meters.
+    const RANGE_M: f64 = 1.5;
+
+    /// Chains of two connectors, and as many on wheels, each with a navigator.
+    fn crowd(count: usize) -> (ChainWorld<2>, ChainState<2>) {
+        let chains = |at: &str, more: &str| {
+            format!(
+                "[[chains]]\nconnectors = 2\ncount = {count}\nat_m = {at}\napart_m = [0.0, 2.0]\nrod_m = 1.0\n{more}\n\
+                 tasks = [{{ kind = \"navigate\", navigator = {{ range_m = {RANGE_M} }} }}]\n"
+            )
+        };
+        let [bare, wheels] = [chains("[0.0, 0.0]", ""), chains("[9.0, 0.0]", "robots = {}")];
+        let text = format!("format = 1\nworld = \"chain\"\n{bare}{wheels}");
+        let compiled = Compiled::<2>::new(&Source::new("s.toml", text, "")).expect("valid");
+        let state = ChainState::new(&compiled.world).expect("valid");
+        ((*compiled.world).clone(), state)
+    }
+
+    /// Puts the ends of all chains, and their robots, elsewhere.
+    fn put(state: &ChainState<2>, places: &[[Point<2>; 2]]) {
+        for (slot, ends) in (0..state.len()).zip(places.iter().cycle()) {
+            let mut body = state.body_mut(slot);
+            body.chain.points_mut().copy_from_slice(ends);
+            body.robots.iter_mut().zip(ends).for_each(|(robot, at)| robot.pose.at = *at);
+        }
+    }
+
+    /// Returns what a look at each part of each chain shows to the first connector of one of them.
+    fn seen_of_all(state: &ChainState<2>, slot: usize) -> Vec<Seen> {
+        let at = state.body(slot).chain.points()[0];
+        let mut seen = Vec::new();
+        for other in 0..state.len() {
+            let body = state.body(other);
+            let others = body.solids().filter(|(k, _)| (other, *k) != (slot, 0));
+            let near =
+                others.filter(|(_, solid)| distance(at, solid.at) - solid.radius_m <= RANGE_M);
+            seen.extend(near.map(|(_, solid)| solid.as_seen()));
+        }
+        seen
+    }
+
+    fn assert_all_is_seen(world: &ChainWorld<2>, state: &ChainState<2>) {
+        let mut scratch = Scratch::new(world);
+        let mut looking = Looking { world, state, now: 0, scratch: &mut scratch };
+        for slot in 0..state.len() {
+            looking.sight(slot as Slot).expect("it navigates");
+            assert_eq!(looking.scratch.seen, seen_of_all(state, slot), "chain {slot}");
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(60))]
+        #[test]
+        fn a_navigator_sees_exactly_what_a_look_at_every_chain_shows(
+            count in 1..40usize,
+            places in prop::collection::vec(prop::array::uniform4(-1.0..1.0f64), 2..90),
+            spread_m in prop::array::uniform2(0.1..12.0f64),
+            is_rounded: bool,
+        ) {
+            let (world, state) = crowd(count);
+            assert_all_is_seen(&world, &state);
+            // Then everybody is elsewhere, also on the very edge of what is seen.
+            for stretch in [1.0, 0.5] {
+                let at = |part: f64, axis: usize| {
+                    let m = part * stretch * spread_m[axis];
+                    if is_rounded { (4.0 * m).round() / 4.0 } else { m }
+                };
+                let ends = |p: &[f64; 4]| [[at(p[0], 0), at(p[1], 1)], [at(p[2], 0), at(p[3], 1)]];
+                put(&state, &places.iter().map(ends).collect::<Vec<_>>());
+                assert_all_is_seen(&world, &state);
+                assert_all_is_seen(&world, &state.copied());
+            }
+        }
+    }
+
+    #[test]
+    fn of_many_chains_a_navigator_looks_at_those_beside_it_only() {
+        let (_, state) = crowd(500);
+        let mut near = Vec::new();
+        state.list_near([0.0, 100.0], RANGE_M, &mut near);
+        assert_eq!(near, [50]);
+        // A chain of 1 m that stretches from far away to here, and one that has gone.
+        state.body_mut(900).chain.points_mut()[1] = [0.5, 100.0];
+        state.body_mut(900).robots[1].pose.at = [0.5, 100.0];
+        put_far_away(&state, 50);
+        state.list_near([0.0, 100.0], RANGE_M, &mut near);
+        assert_eq!(near, [900]);
+    }
+
+    fn put_far_away(state: &ChainState<2>, slot: usize) {
+        state.body_mut(slot).chain.points_mut().iter_mut().for_each(|at| at[0] -= 90.0);
     }
 }

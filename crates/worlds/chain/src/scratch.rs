@@ -30,6 +30,8 @@ pub struct Scratch<const D: usize> {
     has_others: bool,
     /// Robots around a robot.
     pub(crate) seen: Vec<Seen>,
+    /// Chains near a robot.
+    pub(crate) near: Vec<Slot>,
     pub(crate) scan: Scan,
     /// Boxes around a chain's rods.
     pub(crate) own: OwnBody<D>,
@@ -63,6 +65,7 @@ impl<const D: usize> Scratch<D> {
             guests: Vec::new(),
             has_others: false,
             seen: Vec::new(),
+            near: Vec::new(),
             scan: Scan::default(),
             own: OwnBody::default(),
             before: Vec::new(),

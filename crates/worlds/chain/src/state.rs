@@ -10,6 +10,8 @@ use super::neighbors::Neighbors;
 use super::put_off::PutOff;
 use super::rods::chain::Chain;
 use super::rods::geometry::{Bounds, Point, in_dimensions, unit};
+use super::rods::grid::Grid;
+use super::rods::obstacle::around;
 use super::script::Motion;
 use super::swarm::drive::Pose;
 use super::swarm::leader::{Decision, LeaderState};
@@ -18,10 +20,15 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::math::atan2;
-use sidestep_kernel::{Cycle, Digest, EntityId, InputError};
+use sidestep_kernel::{Cycle, Digest, EntityId, InputError, Slot};
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+
+/// Number of chains up to which a look at each takes no longer than finding those nearby.
+const FEW: usize = 16;
+/// Room for rounding between boxes and distances, meters.
+const ROUNDING_M: f64 = 1e-6;
 
 /// The state of a world of chains; slots are ids.
 #[derive(Debug)]
@@ -31,6 +38,10 @@ pub struct ChainState<const D: usize> {
     claims: AtomicU64,
     /// The claims of this cycle, sorted by the first worker that needs them.
     neighbors: RwLock<Neighbors<D>>,
+    /// Whether some body may have changed since the boxes below were made.
+    has_changed: AtomicBool,
+    /// The boxes around the solid parts of all chains in the plane, made by the first worker that needs them.
+    crowd: RwLock<Grid<2>>,
 }
 
 /// One chain's share of the state. None of its locks is ever waited for: in the first phase all workers only
@@ -92,6 +103,9 @@ pub struct Scattered {
     /// and the places where all connectors will be joined again, coordinate after coordinate; empty
     /// while the parts lie where they are.
     pub goals_m: Vec<f64>,
+    /// Cycles in a row in which something kept the parts from being joined; see [`Snapshot::waited`].
+    #[serde(skip)]
+    pub(crate) waited: Cycle,
 }
 
 /// A way to a target: the postures that are not reached yet, each straight from the one before; at least one.
@@ -140,6 +154,8 @@ pub struct Snapshot {
     pub(crate) ways_out: Vec<(u32, WayOut)>,
     /// Cycles for which navigators have stood because something moves ahead, where they have, by id.
     pub(crate) stood: Vec<(EntityId, u32)>,
+    /// Cycles for which scattered parts have waited for what is in their way, where they have, by id.
+    pub(crate) waited: Vec<(EntityId, Cycle)>,
     /// Orders from outside and answers, of chains that have any, by id.
     pub(crate) externals: Vec<(u32, External)>,
     /// Lost connectors, as those of their chain know, of chains in which somebody is lost; by id.
@@ -193,6 +209,12 @@ impl<const D: usize> Body<D> {
             }
         };
         (0..self.chain.points().len()).map(move |k| (k, solid(k)))
+    }
+
+    /// Returns the box around its solid parts in the plane.
+    fn solid_bounds(&self) -> Bounds<2> {
+        let boxes = self.solids().map(|(_, solid)| Bounds::of(&[solid.at]).grown(solid.radius_m));
+        boxes.fold(Bounds::nothing(), |all, one| all.joined(&one))
     }
 
     /// Returns a navigator's memory; at the start of its task it stands at its connector and looks
@@ -267,6 +289,8 @@ impl<const D: usize> ChainState<D> {
             cells: bodies.map(cell).collect(),
             claims: AtomicU64::new(0),
             neighbors: RwLock::default(),
+            has_changed: AtomicBool::new(true),
+            crowd: RwLock::default(),
         }
     }
 
@@ -312,27 +336,11 @@ impl<const D: usize> ChainState<D> {
         for (slot, stood) in &snapshot.stood {
             bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?.stood = *stood;
         }
-        for (slot, external) in &snapshot.externals {
+        for (slot, waited) in &snapshot.waited {
             let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
-            let is_its_own = external.is_within(body.chain.points().len());
-            body.external = is_its_own.then_some(*external).ok_or(CheckpointError::Damaged)?;
+            body.scattered.as_mut().ok_or(CheckpointError::Damaged)?.waited = *waited;
         }
-        for (slot, missing) in &snapshot.missing {
-            let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
-            let n = body.chain.points().len();
-            let is_its_own = |k: &u32| (*k as usize) < n;
-            if missing.len() != n || !missing.iter().flatten().flatten().all(is_its_own) {
-                return Err(CheckpointError::Damaged);
-            }
-            body.missing = missing.clone();
-        }
-        for (slot, handed) in &snapshot.handed {
-            let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
-            let (n, now) = (body.chain.points().len(), snapshot.cycle);
-            let read = postcard::from_bytes::<Handed<D>>(handed).ok();
-            let handed = read.filter(|read| read.cycle == now && read.check(n).is_ok());
-            body.handed = Some(handed.ok_or(CheckpointError::Damaged)?);
-        }
+        restore_agents(&mut bodies, snapshot)?;
         Ok(Self::of(bodies.into_iter()))
     }
 
@@ -375,6 +383,10 @@ impl<const D: usize> ChainState<D> {
 
     /// Locks one chain for writing.
     pub(crate) fn body_mut(&self, slot: usize) -> RwLockWriteGuard<'_, Body<D>> {
+        // Workers that act would wait for each other if all of them wrote it.
+        if !self.has_changed.load(Relaxed) {
+            self.has_changed.store(true, Relaxed);
+        }
         self.cells[slot].body.write().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -386,18 +398,31 @@ impl<const D: usize> ChainState<D> {
     /// Returns the claims by where they begin; valid while nobody claims anything.
     pub(crate) fn neighbors(&self) -> RwLockReadGuard<'_, Neighbors<D>> {
         let made = self.claims.load(Relaxed);
-        let read = || self.neighbors.read().unwrap_or_else(PoisonError::into_inner);
-        let known = read();
-        if known.is_of(made) {
-            return known;
+        renewed(
+            &self.neighbors,
+            |neighbors| neighbors.is_of(made),
+            |neighbors| neighbors.sort(made, (0..self.len()).map(|slot| self.claim(slot))),
+        )
+    }
+
+    /// Lists the chains, in order, of which some solid part may be within a distance of a place, among them all of
+    /// which one is; valid while nobody changes a body.
+    pub(crate) fn list_near(&self, at: Point<2>, range_m: f64, slots: &mut Vec<Slot>) {
+        slots.clear();
+        if self.len() <= FEW {
+            return slots.extend(0..self.len() as Slot);
         }
-        drop(known);
-        let mut neighbors = self.neighbors.write().unwrap_or_else(PoisonError::into_inner);
-        if !neighbors.is_of(made) {
-            neighbors.sort(made, (0..self.len()).map(|slot| self.claim(slot)));
-        }
-        drop(neighbors);
-        read()
+        let crowd = renewed(
+            &self.crowd,
+            |_| !self.has_changed.load(Relaxed),
+            |crowd| {
+                let boxes = (0..self.len()).map(|slot| self.body(slot).solid_bounds());
+                crowd.rebuild(boxes, range_m);
+                self.has_changed.store(false, Relaxed);
+            },
+        );
+        crowd.visit(&around(at, range_m).grown(ROUNDING_M), |slot| slots.push(slot as Slot));
+        slots.sort_unstable();
     }
 
     pub(crate) fn set_claim(&self, slot: usize, claim: Bounds<D>) {
@@ -421,6 +446,7 @@ impl<const D: usize> ChainState<D> {
         let joints = slots.clone().map(|slot| (slot as EntityId, self.body(slot).joints.clone()));
         let ways_out = slots.clone().map(|slot| (slot as EntityId, self.body(slot).way_out));
         let stood = slots.clone().map(|slot| (slot as EntityId, self.body(slot).stood));
+        let waited = |slot| Some((slot as EntityId, self.body(slot).scattered.as_ref()?.waited));
         let externals = slots.clone().map(|slot| (slot as EntityId, self.body(slot).external));
         let missing = slots.clone().map(|slot| (slot as EntityId, self.body(slot).missing.clone()));
         let handed = slots.clone().map(|slot| (slot as EntityId, self.body(slot).handed_in(cycle)));
@@ -428,6 +454,7 @@ impl<const D: usize> ChainState<D> {
             cycle,
             chains: slots.clone().map(|slot| self.body(slot).record()).collect(),
             joints: joints.filter_map(|(slot, values)| Some((slot, values?))).collect(),
+            waited: slots.clone().filter_map(waited).filter(|(_, cycles)| *cycles > 0).collect(),
             plans: slots.filter_map(plan).collect(),
             ways_out: ways_out.filter(|(_, way_out)| !way_out.is_none()).collect(),
             stood: stood.filter(|(_, cycles)| *cycles > 0).collect(),
@@ -441,6 +468,55 @@ impl<const D: usize> ChainState<D> {
     pub(crate) fn tallies(&self) -> Vec<Tally> {
         (0..self.len()).map(|slot| self.body(slot).tally.clone()).collect()
     }
+}
+
+/// Returns what a lock holds, renewed by the first worker that comes if it is out of date.
+fn renewed<T>(
+    lock: &RwLock<T>,
+    is_current: impl Fn(&T) -> bool,
+    renew: impl FnOnce(&mut T),
+) -> RwLockReadGuard<'_, T> {
+    let read = || lock.read().unwrap_or_else(PoisonError::into_inner);
+    let known = read();
+    if is_current(&known) {
+        return known;
+    }
+    drop(known);
+    let mut held = lock.write().unwrap_or_else(PoisonError::into_inner);
+    if !is_current(&held) {
+        renew(&mut held);
+    }
+    drop(held);
+    read()
+}
+
+/// Gives bodies back what is told to their agents from outside, and what those know of each other.
+fn restore_agents<const D: usize>(
+    bodies: &mut [Body<D>],
+    snapshot: &Snapshot,
+) -> Result<(), CheckpointError> {
+    for (slot, external) in &snapshot.externals {
+        let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
+        let is_its_own = external.is_within(body.chain.points().len());
+        body.external = is_its_own.then_some(*external).ok_or(CheckpointError::Damaged)?;
+    }
+    for (slot, missing) in &snapshot.missing {
+        let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
+        let n = body.chain.points().len();
+        let is_its_own = |k: &u32| (*k as usize) < n;
+        if missing.len() != n || !missing.iter().flatten().flatten().all(is_its_own) {
+            return Err(CheckpointError::Damaged);
+        }
+        body.missing = missing.clone();
+    }
+    for (slot, handed) in &snapshot.handed {
+        let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
+        let (n, now) = (body.chain.points().len(), snapshot.cycle);
+        let read = postcard::from_bytes::<Handed<D>>(handed).ok();
+        let handed = read.filter(|read| read.cycle == now && read.check(n).is_ok());
+        body.handed = Some(handed.ok_or(CheckpointError::Damaged)?);
+    }
+    Ok(())
 }
 
 impl<const D: usize> Plan<D> {
@@ -489,6 +565,7 @@ impl Snapshot {
         add_any(&mut hasher, &self.plans);
         add_any(&mut hasher, &self.ways_out);
         add_any(&mut hasher, &self.stood);
+        add_any(&mut hasher, &self.waited);
         add_any(&mut hasher, &self.externals);
         add_any(&mut hasher, &self.missing);
         add_any(&mut hasher, &self.handed);

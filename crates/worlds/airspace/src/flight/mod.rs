@@ -24,7 +24,7 @@ pub use air::Air;
 pub use airplane::{Airplane, Known};
 pub use leg::{Approach, Leg, Zone, is_lost};
 pub use levels::Levels;
-pub use motion::{FASTEST_M_S, Model, Point, Pose, Timing, distance_m};
+pub use motion::{Model, Point, Pose, Timing, distance_m};
 pub use order::{FlightOrder, MAX_ORDERS, Task};
 pub use pilot::{After, Passing, Pilot, Prediction};
 pub(crate) use stage::{Later, Stage, later};

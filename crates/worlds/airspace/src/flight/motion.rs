@@ -9,9 +9,6 @@ use sidestep_kernel::math;
 /// A point of the plane, meters.
 pub type Point = [f64; 2];
 
-/// Bound on all speeds of airplanes through the air, and of recorded ones over the ground, in meters per second.
-pub const FASTEST_M_S: f64 = 1e6;
-
 /// Returns the distance of two points in meters.
 #[inline]
 pub fn distance_m(a: Point, b: Point) -> f64 {

@@ -3,12 +3,13 @@
 use super::compile::Compiler;
 use super::values::{Measure, Speed, TurnRate, Turns};
 use crate::flight::Airplane;
-use crate::flight::{FASTEST_M_S, Model, Pose, Timing, Track};
+use crate::flight::{Model, Pose, Timing, Track};
 use crate::flight_plan::AirplaneSection;
 use crate::generate::GeneratorKind;
 use crate::generate::{Order, generate};
 use schemars::JsonSchema;
 use serde::Deserialize;
+use sidestep_import::traffic::FASTEST_M_S;
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Streams;
 use sidestep_scenario::{AboveBelow, FromBelow, Number, Spanned, Whole};

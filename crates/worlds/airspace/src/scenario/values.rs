@@ -1,8 +1,8 @@
 //! Values of airplanes that check themselves on reading.
 
-use crate::flight::FASTEST_M_S;
 use serde::Deserialize;
 use serde_json::{Value, json};
+use sidestep_import::traffic::FASTEST_M_S;
 use sidestep_scenario::{AboveBelow, Number, Rule, refused, schema_by_hand};
 
 /// A separation.

@@ -6,8 +6,8 @@ use sidestep_kernel::{Slot, interrupt};
 
 /// Seconds, or steps where these are longer, after which a flight is taken to be endless.
 const ENDLESS: f64 = 1e6;
-/// Number of steps computed one by one after which it is, too: those of 0.1 s in all that time. Long stretches straight
-/// on are flown at once, and cost one.
+/// Most steps computed singly, enough for 1e6 s in steps of 0.1 s; beyond it a flight also counts as endless. Long
+/// stretches straight on are flown at once, and cost one.
 const MOST_COMPUTED: usize = 10_000_000;
 
 /// An airplane on its flight alone.

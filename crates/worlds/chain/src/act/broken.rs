@@ -64,6 +64,7 @@ impl<const D: usize> Acting<'_, D> {
             last: *connectors.end() as u32,
             speed_m_s: 0.0,
             goals_m: Vec::new(),
+            waited: 0,
         });
     }
 
@@ -76,7 +77,7 @@ impl<const D: usize> Acting<'_, D> {
             Reformed::Whole { double_passes } => {
                 if let Some(scattered) = &mut self.body.scattered {
                     (scattered.goals_m, scattered.speed_m_s) = (flat(&whole), speed_m_s);
-                    self.body.tally.reform_waits = 0;
+                    scattered.waited = 0;
                 }
                 (EventKind::Reforming, double_passes as f64)
             }

@@ -4,6 +4,7 @@ use super::Acting;
 use crate::driver::errand::Errand;
 use crate::driver::{Driver, Targets, Task, Wander, wander};
 use crate::events::EventKind;
+use crate::metrics::GivenUp;
 use crate::notes::Wanted;
 use crate::rods::geometry::{Point, along, distance, in_dimensions, towards};
 use crate::script::Motion;
@@ -69,10 +70,14 @@ impl<const D: usize> Acting<'_, D> {
 
     /// Returns how a task ends that has come to its end: a list of targets none of which was reached is not done.
     fn ending(&self, task: &Task<D>) -> EventKind {
-        let Driver::Targets(targets) = &task.driver else { return EventKind::Done };
-        let now = self.body.driving.task;
-        let given_up = self.body.tally.given_up.iter().filter(|what| what.task == now).count();
-        if given_up == targets.places.len() { EventKind::GivenUp } else { EventKind::Done }
+        if !matches!(task.driver, Driver::Targets(_)) {
+            return EventKind::Done;
+        }
+        let driving = &self.body.driving;
+        let is_of_now = |what: &&GivenUp| what.task == driving.task;
+        let given_up = self.body.tally.given_up.iter().filter(is_of_now).count();
+        // Targets that time has cut off are neither.
+        if driving.next as usize > given_up { EventKind::Done } else { EventKind::GivenUp }
     }
 
     /// Returns a wish in words.

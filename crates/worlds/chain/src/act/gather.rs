@@ -53,7 +53,6 @@ impl<const D: usize> Acting<'_, D> {
     fn is_whole_again(&mut self, first: usize) {
         self.body.scattered = None;
         self.body.tally.reformed += 1;
-        self.body.tally.reform_waits = 0;
         self.tell(EventKind::Reformed, first, 0.0);
     }
 
@@ -106,19 +105,13 @@ impl<const D: usize> Acting<'_, D> {
 
     /// Counts the time in which nothing went on, and gives up after too much of it.
     fn wait_for(&mut self, first: usize, tried: &Tried) {
-        let tally = &mut self.body.tally;
-        if tried.has_moved {
-            tally.reform_waits = 0;
+        let Some(scattered) = &mut self.body.scattered else { return };
+        scattered.waited = if tried.has_moved { 0 } else { scattered.waited.saturating_add(1) };
+        if self.world.starts_s(scattered.waited) <= PATIENCE_S {
             return;
         }
-        tally.reform_waits += 1;
-        if self.world.starts_s(tally.reform_waits) <= PATIENCE_S {
-            return;
-        }
-        (tally.reform_waits, tally.not_reformed) = (0, tally.not_reformed + 1);
-        if let Some(scattered) = &mut self.body.scattered {
-            (scattered.speed_m_s, scattered.goals_m) = (0.0, Vec::new());
-        }
+        (scattered.speed_m_s, scattered.goals_m, scattered.waited) = (0.0, Vec::new(), 0);
+        self.body.tally.not_reformed += 1;
         let off_m = self.body.chain.max_rod_violation_m();
         let event = self.event(EventKind::NotReformed, first, off_m);
         self.scratch.events.push(Event { obstacle: tried.blocked_by, ..event });

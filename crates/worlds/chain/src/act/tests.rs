@@ -1,10 +1,13 @@
 //! Whole runs of small scenarios: what chains do to each other, and what is told of it.
 
 use crate::events::EventKind;
+use crate::metrics::Tally;
 use crate::rods::geometry::distance;
 use crate::scenario::Compiled;
+use crate::state::Snapshot;
 use crate::{
-    Chain, ChainRun, Connector, Mode, Motion, Obstacle, Obstacles, Propagator, Request, Rod, Source,
+    Chain, ChainRun, ChainState, Connector, Mode, Motion, Obstacle, Obstacles, Propagator, Request,
+    Rod, Source,
 };
 use sidestep_kernel::Simulation;
 use sidestep_kernel::interrupt::Interrupt;
@@ -93,6 +96,42 @@ fn a_task_none_of_whose_targets_was_reached_is_given_up_and_not_done() {
     assert!(some.is_over() && tally.done == 2 && count(&events, "done") == 1, "{events:?}");
 }
 
+/// One target is given up after a second; the time of the task ends before another one could be.
+#[test]
+fn a_task_whose_time_ends_before_it_reached_a_target_is_given_up_and_not_done() {
+    let cases = [
+        ("[[10.0, 0.0]]", 0.5, 0, "given-up"),
+        ("[[10.0, 0.0], [0.0, 10.0]]", 1.5, 0, "given-up"),
+        ("[[-0.5, 0.5], [10.0, 0.0]]", 2.3, 1, "done"),
+        ("[[10.0, 0.0], [-0.5, 0.5], [0.0, 10.0]]", 3.3, 1, "done"),
+    ];
+    for (targets_m, lasts_s, reached, ends) in cases {
+        let text =
+            held(targets_m).replace("patience_s", &format!("lasts_s = {lasts_s}, patience_s"));
+        let mut run = run(&text);
+        let events = told(&mut run, 2000);
+        assert_eq!(count(&events, "target"), reached, "{targets_m}: {events:?}");
+        assert_eq!(events.last(), Some(&(ends.to_owned(), 0.0)), "{targets_m}: {events:?}");
+        let tally = run.world().metrics_of(run.state(), 0).tally;
+        let is_done = usize::from(ends == "done");
+        assert_eq!(tally.done as usize, reached + is_done, "{targets_m}: {events:?}");
+    }
+}
+
+/// A corridor that ends where it begins.
+#[test]
+fn a_navigator_goes_round_a_corridor_that_comes_back_to_its_start() {
+    let legs = "{ straight_m = 10 }, { radius_m = 3, turn_deg = 180 }";
+    let mut run = run(&format!(
+        "seed = 1\ncycles = 500\n[ground]\ncorridor = {{ width_m = 2.0, legs = [{legs}, {legs}] }}\n\
+         [[chains]]\nconnectors = 1\nat_m = [-0.2, 0.0]\nrod_m = 0.5\ntasks = [{{ kind = \"navigate\" }}]\n"
+    ));
+    let events = told(&mut run, 500);
+    assert!(!run.is_over() && count(&events, "done") == 0, "{events:?}");
+    let (progress, at) = (run.metrics().progress, run.state().body(0).chain.points()[0]);
+    assert!(at[0] > 1.0 && (0.02..0.5).contains(&progress), "{progress} at {at:?}");
+}
+
 /// A chain that breaks, and is to be joined again, with more in the way.
 fn broken(joins_s: &str, by_m: f64, more: &str) -> String {
     format!(
@@ -169,6 +208,41 @@ fn parts_that_something_keeps_from_coming_back_are_told_with_what_it_is() {
             *told as u64 == *counted && (*told == 0) == *is_over
         })
     );
+}
+
+/// Nothing but the wait goes on, so it alone tells two of these states apart.
+#[test]
+fn the_time_for_which_scattered_parts_have_waited_is_a_part_of_the_state() {
+    let box_ = "[[obstacles]]\ncorners_m = [[-1.5, 0.3], [-0.5, 0.3], [-0.5, 0.5], [-1.5, 0.5]]\n";
+    let stuck = |seed: u32| {
+        let text = broken("1.5", 2.0, box_).replace("seed = 3", &format!("seed = {seed}"));
+        let events = told(&mut run(&text), 1500);
+        let is_stuck = ["reforming", "not-reformed"].iter().all(|kind| count(&events, kind) == 1);
+        is_stuck.then_some(text)
+    };
+    let text = (1..=12).find_map(stuck).expect("a chain that something keeps from coming together");
+    let mut whole = run(&text);
+    while whole.metrics().not_reformed == 0 {
+        whole.advance(1);
+    }
+    let ends = whole.cycle();
+    let mut run = run(&text);
+    run.advance(ends - 100);
+    let [before, after] = [0, 1].map(|cycles| {
+        run.advance(cycles);
+        Snapshot { cycle: 0, ..run.state().snapshot(0) }
+    });
+    assert_eq!(before.chains[0].points_m, after.chains[0].points_m, "nothing moves");
+    assert_ne!(before.digest(), after.digest());
+
+    // Also without its counts a chain that is restored gives up when it would have.
+    let world = run.world();
+    let state = ChainState::restore(world, &after, vec![Tally::default()]).expect("its own state");
+    let waited = |state: &ChainState<2>| state.body(0).scattered.as_ref().map(|s| s.waited);
+    assert!(waited(&state).is_some_and(|cycles| cycles > 100), "{:?}", waited(&state));
+    assert_eq!(waited(&state), waited(run.state()));
+    let told = run.agent_metrics().to_string();
+    assert!(told.contains("\"not_reformed\"") && !told.contains("reform_waits"), "{told}");
 }
 
 #[test]

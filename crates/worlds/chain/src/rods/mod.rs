@@ -15,7 +15,7 @@
 mod candidates;
 pub(crate) mod chain;
 pub mod geometry;
-mod grid;
+pub(crate) mod grid;
 mod interval;
 mod leeway;
 pub(crate) mod obstacle;

@@ -252,7 +252,7 @@ impl<const D: usize> Compiler<'_, D> {
     ) -> Result<Vec<Change<D>>, InputError> {
         let changes = s.changes.0.iter().map(|change| self.change(change, start, dt_s));
         let mut changes = changes.collect::<Result<Vec<_>, _>>()?;
-        // What breaks in a cycle can be joined in it, wherever the file says so.
+        // A chain may break and be joined in the same cycle, in either order in the file.
         let joins = |change: &Change<D>| matches!(change.what, What::Reform { .. });
         changes.sort_by_key(|change| (change.cycle, joins(change)));
         let breaks = changes.iter().filter(|change| matches!(change.what, What::Scatter { .. }));

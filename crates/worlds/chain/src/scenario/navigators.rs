@@ -180,8 +180,8 @@ impl<const D: usize> Compiler<'_, D> {
             let tolerance_m = s.tolerance_m.map_or(0.5, f64::from);
             return Ok(Some(Goal::Target { at: at.get(), tolerance_m }));
         }
-        let line = self.corridor_line(LINE_STEP_M)?;
-        Ok(line.map(Goal::EndOf))
+        let middle = self.corridor_middle(LINE_STEP_M)?;
+        Ok(middle.map(|(line, width_m)| Goal::EndOf { line, width_m }))
     }
 
     /// Returns the robots of a swarm whose leader drives with `speed_m_s`.

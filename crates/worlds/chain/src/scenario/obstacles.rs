@@ -226,13 +226,17 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(())
     }
 
-    /// Returns the middle of the corridor, if the scenario has one.
-    pub(super) fn corridor_line(&self, step_m: f64) -> Result<Option<Vec<Point<2>>>, InputError> {
+    /// Returns the middle of the corridor, and its width in meters, if the scenario has one.
+    pub(super) fn corridor_middle(
+        &self,
+        step_m: f64,
+    ) -> Result<Option<(Vec<Point<2>>, f64)>, InputError> {
         let section =
             self.file.ground.as_ref().and_then(|ground| ground.get_ref().corridor.as_ref());
-        let line = |given| self.corridor(given).map(|corridor| corridor.line(step_m));
-        let line = section.map(line).transpose()?;
-        Ok(line.map(|line| line.iter().map(|pose| pose.at).collect()))
+        let corridor = section.map(|given| self.corridor(given)).transpose()?;
+        let middle =
+            |corridor: &Corridor| corridor.line(step_m).iter().map(|pose| pose.at).collect();
+        Ok(corridor.map(|corridor| (middle(&corridor), corridor.width_m())))
     }
 
     fn corridor(&self, given: &Spanned<CorridorSection>) -> Result<Corridor, InputError> {

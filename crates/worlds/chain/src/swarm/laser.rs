@@ -276,7 +276,7 @@ impl Laser {
         let n = self.directions.len() as isize;
         let sees_all = 2 * side + 1 >= n && last.saturating_sub(first) < n;
         let is_seen = sees_all || (-side <= first && last <= side);
-        // What is no number would become beam 0.
+        // NaN would become beam 0.
         (from_rad <= to_rad && first <= last && is_seen).then_some(first..=last)
     }
 }
