@@ -57,7 +57,10 @@ pub(crate) fn restore(error: &RestoreError) -> PyErr {
     match error {
         RestoreError::Record(error) => record(error),
         RestoreError::Stored { .. } => CheckpointError::new_err(format!(
-            "{error}\n  help: restore it in a copy (`sim.copy()`), or in a new Simulation with a folder of its own"
+            "{error}\n  help: restore it in a copy (`sim.copy()`), or in a new Simulation without a folder"
+        )),
+        RestoreError::Astray { .. } => CheckpointError::new_err(format!(
+            "{error}\n  help: take these rows before (`sim.tables()`), or restore it in a copy (`sim.copy()`)"
         )),
         _ => CheckpointError::new_err(error.to_string()),
     }

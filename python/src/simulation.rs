@@ -454,8 +454,9 @@ impl Simulation {
     /// Goes on from a checkpoint of the same scenario. Rows that are kept in memory lose those of its cycle and of later ones:
     /// `tables` gives what a run has that never went there. What `tables` gave before is yours.
     ///
-    /// Raises CheckpointError when it is damaged, or belongs to another scenario or version; also where the rows go to a folder
-    /// (`out`), which holds one past, unless it is the present state: restore it in a `copy`, or in a new Simulation.
+    /// Raises CheckpointError when it is damaged, or belongs to another scenario or version. What is recorded has one past: it is
+    /// also raised where rows of earlier cycles are kept and this simulation did not make the checkpoint on its way, and where rows
+    /// go to a folder (`out`) and it is not the present state: restore it in a `copy`, or in a new Simulation without a folder.
     ///
     /// >>> before = sim.checkpoint()
     /// >>> sim.step(5)

@@ -28,6 +28,18 @@ pub struct Header {
     pub cycle: Cycle,
 }
 
+impl Header {
+    /// Checks that it is of the same program version, world and scenario as `expected`; formats and cycles are not compared.
+    ///
+    /// # Errors
+    /// When it is not; the error names the first difference.
+    pub fn check_origin(&self, expected: &Self) -> Result<(), CheckpointError> {
+        belongs("version", &self.program_version, &expected.program_version)?;
+        belongs("world", &self.world, &expected.world)?;
+        belongs("scenario", &hex(&self.scenario), &hex(&expected.scenario))
+    }
+}
+
 /// A reason why a checkpoint cannot be continued.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -87,9 +99,7 @@ pub fn decode<S: DeserializeOwned>(
     expected: &Header,
 ) -> Result<(Cycle, S), CheckpointError> {
     let (header, rest) = split(bytes)?;
-    belongs("version", &header.program_version, &expected.program_version)?;
-    belongs("world", &header.world, &expected.world)?;
-    belongs("scenario", &hex(&header.scenario), &hex(&expected.scenario))?;
+    header.check_origin(expected)?;
     let state = postcard::from_bytes(rest).map_err(|_| CheckpointError::Damaged)?;
     Ok((header.cycle, state))
 }

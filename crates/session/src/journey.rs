@@ -240,7 +240,8 @@ impl Journey {
             return Err(InputError::new("frames", "0 cycles cannot lie between frames", remedy));
         }
         self.run.begin_recording();
-        self.rows = Some(Rows::new(&self.run.schemas(), wanted.tables.as_deref())?);
+        let (schemas, from) = (self.run.schemas(), self.run.cycle());
+        self.rows = Some(Rows::new(&schemas, wanted.tables.as_deref(), from)?);
         self.frames = wanted.frames.map(FrameRows::new);
         Ok(())
     }
@@ -258,7 +259,7 @@ impl Journey {
         let Some(rows) = &mut self.rows else { return Ok(Vec::new()) };
         self.run.record(rows)?;
         let frames = self.frames.as_mut().map(FrameRows::take);
-        Ok(rows.take().into_iter().chain(frames).collect())
+        Ok(rows.take(self.run.cycle()).into_iter().chain(frames).collect())
     }
 
     /// Drives the run to its end, or until the watcher asks to stop, and stores everything.

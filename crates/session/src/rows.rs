@@ -1,7 +1,6 @@
 //! Rows of a run that are kept in memory: of all tables, or of some.
 
-use sidestep::kernel::ports::recorder::check_block;
-use sidestep::kernel::ports::{RecordError, Recorder, TableSchema, Values};
+use sidestep::kernel::ports::{MemoryRecorder, RecordError, Recorder, TableSchema, Values};
 use sidestep::kernel::{Cycle, Digest, InputError};
 use std::collections::BTreeMap;
 
@@ -14,26 +13,32 @@ pub struct Wanted {
     pub frames: Option<Cycle>,
 }
 
-/// A table with its columns.
-type Kept = (TableSchema, Vec<Values>);
+/// A checkpoint by which rows are known: its cycle and its digest.
+type Mark = (Cycle, [u8; 16]);
 
-/// Rows of tables that are wanted; those of others are dropped as they come.
+/// Rows that come with a checkpoint, each block with the number of its table.
+type Ahead = Vec<(usize, Vec<Values>)>;
+
+/// Rows of tables that are wanted, of one past; those of other tables are dropped as they come.
 pub(crate) struct Rows {
-    tables: Vec<Kept>,
+    tables: MemoryRecorder,
     /// The place of each of the run's tables among those that are kept.
     places: Vec<Option<usize>>,
-    /// By the digest of a checkpoint, the rows of the cycle that it begins with: of orders that waited then.
-    marks: BTreeMap<[u8; 16], Vec<Kept>>,
+    /// The cycle from which on rows are kept: those of earlier ones were taken, or there never were any.
+    begin: Cycle,
+    /// The checkpoints of this past, with the rows of the cycle that each begins with: of orders that waited then.
+    known: BTreeMap<Mark, Ahead>,
 }
 
 impl Rows {
-    /// Returns the place for rows of a run with these tables.
+    /// Returns the place for rows of a run with these tables, from cycle `begin` on.
     ///
     /// # Errors
     /// When one that is wanted is none of them.
     pub(crate) fn new(
         schemas: &[TableSchema],
         wanted: Option<&[String]>,
+        begin: Cycle,
     ) -> Result<Self, InputError> {
         let is_known = |name: &&String| schemas.iter().any(|schema| schema.name == **name);
         if let Some(unknown) = wanted.into_iter().flatten().find(|name| !is_known(name)) {
@@ -50,83 +55,153 @@ impl Rows {
         for schema in schemas {
             places.push(is_wanted(schema).then_some(tables.len()));
             if is_wanted(schema) {
-                tables.push((schema.clone(), empty(schema)));
+                tables.push(schema.clone());
             }
         }
-        Ok(Self { tables, places, marks: BTreeMap::new() })
+        let tables = MemoryRecorder::new(&tables);
+        Ok(Self { tables, places, begin, known: BTreeMap::new() })
     }
 
-    /// Takes all rows out, by table.
-    pub(crate) fn take(&mut self) -> Vec<Kept> {
-        let take = |(schema, columns): &mut Kept| {
-            (schema.clone(), std::mem::replace(columns, empty(schema)))
+    /// The cycle from which on rows are kept.
+    pub(crate) fn begin(&self) -> Cycle {
+        self.begin
+    }
+
+    /// Takes all rows out, by table, of a run that stands at cycle `now`. What comes then may have another past, and
+    /// rows of orders that were handed over come no second time: no checkpoint need be known any more.
+    pub(crate) fn take(&mut self, now: Cycle) -> Vec<(TableSchema, Vec<Values>)> {
+        self.begin = now;
+        self.known.clear();
+        self.tables.take()
+    }
+
+    /// Notes a checkpoint of cycle `now`, the present one. Rows of this cycle that are there already come back with it.
+    pub(crate) fn note(&mut self, checkpoint: &[u8], now: Cycle) {
+        let ahead = |(table, (schema, columns)): (usize, (&TableSchema, &[Values]))| {
+            // Rows of the present cycle come after all others, whatever the order of those.
+            let cycles = cycles_of(schema, columns)?;
+            let count = cycles.iter().rev().take_while(|&&cycle| cycle >= now).count();
+            let rows: Vec<_> = (cycles.len() - count..cycles.len()).collect();
+            let picked = || columns.iter().map(|column| column.pick(&rows)).collect();
+            (count > 0).then(|| (table, picked()))
         };
-        self.tables.iter_mut().map(take).collect()
+        let ahead = self.tables.tables().enumerate().filter_map(ahead).collect();
+        self.known.insert(mark_of(checkpoint, now), ahead);
     }
 
-    /// Notes the rows of cycle `now`, before which a checkpoint was made: they come back with it.
-    pub(crate) fn mark(&mut self, checkpoint: &[u8], now: Cycle) {
-        let ahead = |(schema, columns): &Kept| {
-            let rows = rows_where(schema, columns, |cycle| cycle >= now)?;
-            let columns = columns.iter().map(|column| column.pick(&rows)).collect();
-            (!rows.is_empty()).then(|| (schema.clone(), columns))
-        };
-        let ahead: Vec<_> = self.tables.iter().filter_map(ahead).collect();
-        if !ahead.is_empty() {
-            self.marks.insert(*Digest::of(checkpoint).as_bytes(), ahead);
-        }
+    /// Whether all rows that stay are of the past of this checkpoint of cycle `of`, where the run stands at cycle `now`.
+    pub(crate) fn fits(&self, checkpoint: &[u8], of: Cycle, now: Cycle) -> bool {
+        let none_stay = of <= self.begin || now == self.begin;
+        none_stay || self.known.contains_key(&mark_of(checkpoint, of))
     }
 
-    /// Drops the rows of cycle `now` and of later ones, but for those that came before this checkpoint of `now`; returns
-    /// whether there are such rows.
-    pub(crate) fn rewind(&mut self, checkpoint: &[u8], now: Cycle) -> bool {
-        for (schema, columns) in &mut self.tables {
-            let rows = rows_where(schema, columns, |cycle| cycle < now);
-            let count = columns.first().map_or(0, Values::len);
-            if let Some(rows) = rows.filter(|rows| rows.len() < count) {
-                columns.iter_mut().for_each(|column| *column = column.pick(&rows));
-            }
-        }
-        let marked = self.marks.get(Digest::of(checkpoint).as_bytes());
-        for (schema, more) in marked.into_iter().flatten() {
-            let table = self.tables.iter_mut().find(|(own, _)| own.name == schema.name);
-            let columns = table.map(|(_, columns)| columns).into_iter().flatten();
-            columns.zip(more).for_each(|(column, more)| column.append(more));
-        }
-        marked.is_some()
+    /// Drops the rows of cycle `now` and of later ones, but for those that came before this checkpoint of `now`, which
+    /// [fits](Self::fits); returns whether there are such rows.
+    ///
+    /// # Errors
+    /// None: rows go back to the tables that they are from.
+    pub(crate) fn rewind(&mut self, checkpoint: &[u8], now: Cycle) -> Result<bool, RecordError> {
+        let mark = mark_of(checkpoint, now);
+        let is_known = self.known.contains_key(&mark);
+        self.begin = if is_known { self.begin.min(now) } else { now };
+        let kept = self.begin..now;
+        self.tables.retain_rows(|schema, columns| {
+            let cycles = cycles_of(schema, columns)?;
+            Some(cycles.iter().map(|cycle| kept.contains(cycle)).collect())
+        });
+        // Later ones are of a past that is left now.
+        self.known.retain(|(cycle, _), _| *cycle <= now);
+        let ahead = self.known.get(&mark).map(Vec::as_slice).unwrap_or_default();
+        ahead.iter().try_for_each(|(table, block)| self.tables.append(*table, block))?;
+        Ok(!ahead.is_empty())
     }
 }
 
-/// Returns the columns of a table without rows.
-fn empty(schema: &TableSchema) -> Vec<Values> {
-    schema.columns.iter().map(|column| Values::empty(column.ty)).collect()
+fn mark_of(checkpoint: &[u8], cycle: Cycle) -> Mark {
+    (cycle, *Digest::of(checkpoint).as_bytes())
 }
 
-/// Returns the numbers of the rows of such cycles; `None` for a table without cycles.
-fn rows_where(
-    schema: &TableSchema,
-    columns: &[Values],
-    is_such: impl Fn(Cycle) -> bool,
-) -> Option<Vec<usize>> {
+/// Returns the cycles of the rows of a table; `None` for a table without cycles.
+fn cycles_of<'a>(schema: &TableSchema, columns: &'a [Values]) -> Option<&'a [Cycle]> {
     let place = schema.columns.iter().position(|column| column.name == "cycle")?;
     let Some(Values::U64(cycles)) = columns.get(place) else { return None };
-    let rows = cycles.iter().enumerate().filter(|(_, cycle)| is_such(**cycle));
-    Some(rows.map(|(row, _)| row).collect())
+    Some(cycles)
 }
 
 impl Recorder for Rows {
     fn append(&mut self, table: usize, block: &[Values]) -> Result<(), RecordError> {
         let place =
             self.places.get(table).ok_or_else(|| RecordError::new(table, "no such table"))?;
-        let Some((schema, columns)) = place.and_then(|place| self.tables.get_mut(place)) else {
-            return Ok(());
-        };
-        check_block(schema, block)?;
-        columns.iter_mut().zip(block).for_each(|(column, values)| column.append(values));
-        Ok(())
+        place.map_or(Ok(()), |place| self.tables.append(place, block))
     }
 
     fn finish(&mut self) -> Result<(), RecordError> {
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep::kernel::ports::{ColumnSpec, ColumnType};
+
+    /// Rows of three tables of cycles, the second of which is not wanted.
+    fn rows() -> Rows {
+        let cycle = || ColumnSpec::new("cycle", ColumnType::U64, "its cycle");
+        let schemas = ["a", "b", "c"].map(|name| TableSchema::new(name, vec![cycle()]));
+        Rows::new(&schemas, Some(&["a".into(), "c".into()]), 0).expect("they are there")
+    }
+
+    fn append(rows: &mut Rows, table: usize, cycles: &[Cycle]) {
+        rows.append(table, &[Values::U64(cycles.to_vec().into())]).expect("it fits");
+    }
+
+    /// The cycles of the rows of both tables.
+    fn cycles(rows: &Rows) -> [Vec<Cycle>; 2] {
+        let cycles = |table| match rows.tables.column(table, "cycle") {
+            Some(Values::U64(cycles)) => cycles.to_vec(),
+            other => panic!("{other:?}"),
+        };
+        ["a", "c"].map(cycles)
+    }
+
+    #[test]
+    fn rows_of_a_cycle_come_back_with_the_checkpoint_that_they_were_there_for() {
+        let mut rows = rows();
+        // Poses come by body within a block.
+        append(&mut rows, 0, &[0, 1, 2, 0, 1, 2]);
+        append(&mut rows, 1, &[7]);
+        append(&mut rows, 2, &[1, 3]);
+        rows.note(b"ordered", 3);
+        append(&mut rows, 2, &[3]);
+        rows.note(b"ordered twice", 3);
+        append(&mut rows, 0, &[3, 4, 3, 4]);
+        assert!(rows.rewind(b"ordered", 3).expect("they fit"));
+        assert_eq!(cycles(&rows), [vec![0, 1, 2, 0, 1, 2], vec![1, 3]]);
+        assert!(rows.rewind(b"ordered twice", 3).expect("they fit"));
+        assert_eq!(cycles(&rows), [vec![0, 1, 2, 0, 1, 2], vec![1, 3, 3]]);
+        assert!(rows.append(3, &[]).is_err(), "a table that does not exist");
+    }
+
+    #[test]
+    fn checkpoints_are_known_while_rows_of_their_past_are_kept() {
+        let mut rows = rows();
+        for number in 0..100_u8 {
+            let now = Cycle::from(number);
+            append(&mut rows, 2, &[now]);
+            // A state that is saved twice is known by one checkpoint.
+            (0..2).for_each(|_| rows.note(&[number], now));
+        }
+        assert_eq!(rows.known.len(), 100);
+        assert!(rows.fits(&[60], 60, 100) && !rows.fits(&[61], 60, 100));
+        assert!(rows.rewind(&[60], 60).expect("they fit"));
+        assert_eq!(rows.known.len(), 61, "those of later cycles are of a past that was left");
+        assert!(!rows.fits(&[61], 61, 62));
+        assert_eq!(rows.take(60).len(), 2);
+        assert!(rows.known.is_empty(), "nothing is left that could have two pasts");
+        assert!(!rows.rewind(&[60], 60).expect("it fits"), "its rows were handed over");
+        assert!(rows.fits(&[7], 7, 80) && rows.fits(&[99], 99, 60) && !rows.fits(&[99], 99, 80));
+        assert!(!rows.rewind(&[99], 99).expect("they fit"));
+        assert_eq!((rows.begin(), cycles(&rows)), (99, [vec![], vec![]]));
     }
 }

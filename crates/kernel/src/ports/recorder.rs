@@ -78,6 +78,11 @@ impl MemoryRecorder {
         Some((&self.schemas[t], &self.tables[t]))
     }
 
+    /// Returns the schema and the columns of every table, in their order.
+    pub fn tables(&self) -> impl Iterator<Item = (&TableSchema, &[Values])> {
+        self.schemas.iter().zip(self.tables.iter().map(Vec::as_slice))
+    }
+
     /// Returns the column `name` of table `table`, if both exist.
     pub fn column(&self, table: &str, name: &str) -> Option<&Values> {
         let (schema, columns) = self.table(table)?;
@@ -95,6 +100,15 @@ impl MemoryRecorder {
         let empty = Self::new(&self.schemas);
         let tables = std::mem::replace(&mut self.tables, empty.tables);
         self.schemas.iter().cloned().zip(tables).collect()
+    }
+
+    /// Drops rows: `keep` tells for every row of a table whether it stays, or `None` where all do.
+    pub fn retain_rows(&mut self, keep: impl Fn(&TableSchema, &[Values]) -> Option<Vec<bool>>) {
+        for (schema, columns) in self.schemas.iter().zip(&mut self.tables) {
+            if let Some(kept) = keep(schema, columns).filter(|kept| kept.contains(&false)) {
+                columns.iter_mut().for_each(|column| column.retain_rows(&kept));
+            }
+        }
     }
 
     /// Whether [`Recorder::finish`] was called.
@@ -257,6 +271,24 @@ mod tests {
         let block = |label| [Values::Label([None, label].into_iter().collect())];
         check_block(&schema, &block(None)).expect("no label is named");
         assert!(check_block(&schema, &block(Some(0))).is_err());
+    }
+
+    #[test]
+    fn the_memory_recorder_drops_rows_of_tables_for_which_that_is_told() {
+        let mut recorder = MemoryRecorder::new(&conformance_schemas());
+        recorder.append(0, &first_block(5)).expect("it fits");
+        recorder.append(1, &second_block()).expect("it fits");
+        recorder.retain_rows(|schema, columns| {
+            let Values::U64(cycles) = &columns[0] else { return None };
+            assert_eq!(schema.name, "first");
+            Some(cycles.iter().map(|cycle| *cycle != 6).collect())
+        });
+        assert_eq!(
+            recorder.column("first", "entity"),
+            Some(&Values::U32(vec![0, u32::MAX].into()))
+        );
+        let tables: Vec<_> = recorder.tables().map(|(schema, _)| schema.name.as_str()).collect();
+        assert_eq!((tables, recorder.rows("second")), (vec!["first", "second"], 3));
     }
 
     #[test]

@@ -6,6 +6,7 @@ use sidestep::kernel::ports::table::label_of;
 use sidestep::kernel::ports::{Table, TableSchema, Values};
 use sidestep::kernel::view::{Body, Condition, Frame, Kind, Look};
 use sidestep::kernel::{Cycle, Simulation};
+use std::ops::Range;
 
 /// Name of the table.
 const FRAMES: &str = "frames";
@@ -40,10 +41,10 @@ impl FrameRows {
         (table.schema(), table.block(&rows))
     }
 
-    /// Drops the frames of cycle `now` and of later ones: the run stands there again.
-    pub(crate) fn rewind(&mut self, now: Cycle) {
-        self.rows.retain(|row| row.cycle < now);
-        self.first = self.first.filter(|&first| first < now);
+    /// Keeps the frames of these cycles alone: the run stands at their end again.
+    pub(crate) fn rewind(&mut self, kept: Range<Cycle>) {
+        self.rows.retain(|row| kept.contains(&row.cycle));
+        self.first = self.first.filter(|&first| first < kept.end);
         // Any frame before serves: none is taken twice.
         self.last = self.first;
     }

@@ -28,6 +28,19 @@ pub enum RestoreError {
         /// The cycle of the checkpoint, in words.
         state: String,
     },
+    /// Rows that are kept in memory have another past than the checkpoint.
+    #[error(
+        "rows are kept from cycle {from} on, of one past: the run stands at cycle {now}, and the checkpoint of cycle {of} \
+         is not known to be of this past"
+    )]
+    Astray {
+        /// The cycle from which on rows are kept.
+        from: Cycle,
+        /// The cycle at which the run stands.
+        now: Cycle,
+        /// The cycle of the checkpoint.
+        of: Cycle,
+    },
 }
 
 impl Journey {
@@ -46,59 +59,82 @@ impl Journey {
     /// # Errors
     /// When rows that wait cannot be handed over.
     pub fn checkpoint(&mut self) -> Result<Vec<u8>, RecordError> {
-        let (bytes, now) = (self.run.checkpoint(), self.run.cycle());
-        // Orders that wait have their rows already, and both come back together.
-        if let Some(rows) = self.rows.as_mut().filter(|_| self.ordered_at == Some(now)) {
-            self.run.record(rows)?;
-            rows.mark(&bytes, now);
-        }
+        let bytes = self.run.checkpoint();
+        self.note(&bytes)?;
         Ok(bytes)
     }
 
+    /// Notes a checkpoint of the present state: rows that are kept in memory may go back to it.
+    fn note(&mut self, checkpoint: &[u8]) -> Result<(), RecordError> {
+        let Some(rows) = &mut self.rows else { return Ok(()) };
+        let now = self.run.cycle();
+        if self.ordered_at == Some(now) {
+            // Orders that wait have their rows already, and both come back together.
+            self.run.record(rows)?;
+        }
+        rows.note(checkpoint, now);
+        Ok(())
+    }
+
     /// Goes on from a checkpoint of the same scenario. Rows and frames that are kept in memory lose those of its cycle and
-    /// of later ones, as if the run had never gone there; those that were taken before are the caller's.
+    /// of later ones, as if the run had never gone there; those that were taken before are the caller's. While there are
+    /// some of earlier cycles, it must be a checkpoint that this run made on its way, or the present state.
     ///
     /// # Errors
-    /// When the checkpoint is damaged or belongs to another world, scenario or version, or when the run is stored in a
-    /// folder or file and the checkpoint is not its present state. The run stays as it is then.
+    /// When the checkpoint is damaged or belongs to another world, scenario or version; when rows are kept of another past;
+    /// when the run is stored in a folder or file and the checkpoint is not its present state. The run stays as it is then.
     pub fn restore(&mut self, checkpoint: &[u8]) -> Result<(), RestoreError> {
-        let is_kept = self.rows.is_some() || self.recording.is_some() || self.film.is_some();
-        if is_kept && self.run.checkpoint() == checkpoint {
-            return Ok(());
+        if self.rows.is_some() || self.recording.is_some() || self.film.is_some() {
+            let present = self.run.checkpoint();
+            if present == checkpoint {
+                return Ok(self.note(checkpoint)?);
+            }
+            let header = decode_header(checkpoint)?;
+            header.check_origin(&decode_header(&present)?)?;
+            self.check_is_free(header.cycle)?;
+            self.check_is_of_this_past(checkpoint, header.cycle)?;
         }
-        self.check_is_free(checkpoint)?;
         if let Some(rows) = &mut self.rows {
             // Rows that wait belong to the cycles that are over.
             self.run.record(rows)?;
         }
         self.run.restore(checkpoint)?;
-        self.forget(checkpoint);
-        Ok(())
+        Ok(self.forget(checkpoint)?)
     }
 
     /// Refuses another state of a run that is stored: it would be stored after what followed it.
-    fn check_is_free(&self, checkpoint: &[u8]) -> Result<(), RestoreError> {
+    fn check_is_free(&self, of: Cycle) -> Result<(), RestoreError> {
         let folder = self.recording.as_ref();
         let folder = folder.map(|it| format!("the folder {}", it.folder().path().display()));
         let film = self.film.as_ref().map(|_| "an MCAP file".to_string());
         let Some(place) = folder.or(film) else { return Ok(()) };
-        let (now, its) = (self.run.cycle(), decode_header(checkpoint)?.cycle);
-        let state = match its == now {
+        let now = self.run.cycle();
+        let state = match of == now {
             true => "another state there".to_string(),
-            false => format!("cycle {its}"),
+            false => format!("cycle {of}"),
         };
         Err(RestoreError::Stored { place, now, state })
     }
 
+    /// Refuses a checkpoint of another past than the rows that are kept: they would tell of two.
+    fn check_is_of_this_past(&self, checkpoint: &[u8], of: Cycle) -> Result<(), RestoreError> {
+        let Some(rows) = &self.rows else { return Ok(()) };
+        let (from, now) = (rows.begin(), self.run.cycle());
+        match rows.fits(checkpoint, of, now) {
+            true => Ok(()),
+            false => Err(RestoreError::Astray { from, now, of }),
+        }
+    }
+
     /// Drops the rows and frames from the present cycle on, after a checkpoint was restored.
-    fn forget(&mut self, checkpoint: &[u8]) {
+    fn forget(&mut self, checkpoint: &[u8]) -> Result<(), RecordError> {
+        let Some(rows) = &mut self.rows else { return Ok(()) };
         let now = self.run.cycle();
-        if let Some(rows) = &mut self.rows {
-            let has_orders = rows.rewind(checkpoint, now);
-            self.ordered_at = has_orders.then_some(now);
-        }
+        let has_orders = rows.rewind(checkpoint, now)?;
+        self.ordered_at = has_orders.then_some(now);
         if let Some(frames) = &mut self.frames {
-            frames.rewind(now);
+            frames.rewind(rows.begin()..now);
         }
+        Ok(())
     }
 }

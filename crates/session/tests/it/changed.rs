@@ -62,7 +62,7 @@ fn a_plan_that_does_not_fit_together_is_refused_by_all_who_read_it() {
         ("variants", one, "its plan has 1 variants, and there are 2 scenarios"),
         ("replicates", json!(0), "with 0 runs each"),
         ("replicates", json!(u32::MAX), "are too many"),
-        ("first_seed", json!(u64::MAX), "run over"),
+        ("first_seed", json!(u64::MAX), "exceed 2^63 - 1"),
         ("parameters", json!([]), "which is no parameter"),
         ("baseline", baseline, "variant 7 is a baseline"),
     ] {

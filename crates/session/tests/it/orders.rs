@@ -1,9 +1,12 @@
 //! Promise D1, D2: a run that was decided from outside is computed again from its orders.
 
 use sidestep::kernel::control::Orders;
+use sidestep::kernel::ports::Values;
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
-use sidestep_session::{Journey, Keep, Recorded, Unwatched, replay_all, replay_to};
+use sidestep_session::{
+    Journey, Keep, Recorded, RestoreError, Unwatched, Wanted, replay_all, replay_to,
+};
 use std::path::Path;
 
 const SCENARIO: &str = "format = 1\nworld = \"robots\"\ncycles = 200\n\
@@ -11,12 +14,15 @@ const SCENARIO: &str = "format = 1\nworld = \"robots\"\ncycles = 200\n\
     [record]\ncheckpoint_every = 50\n\
     [[robots]]\ncount = 4\neffector = \"nomad\"\nbehaviour.kind = \"external\"\n";
 
-/// Records a run to cycle `until` in which a caller orders turns and steps; returns its digest.
-fn recorded(folder: &Path, until: u64) -> String {
+fn started(keep: Keep<'_>) -> Journey {
     let source = Source::new("s.toml", SCENARIO, "");
     let compiled = WORLDS.compile(&source).expect("valid");
-    let keep = Keep { folder: Some(folder), ..Keep::default() };
-    let mut journey = Journey::start(compiled.as_ref(), &source, 1, keep, None).expect("vacant");
+    Journey::start(compiled.as_ref(), &source, 1, keep, None).expect("vacant")
+}
+
+/// Records a run to cycle `until` in which a caller orders turns and steps; returns its digest.
+fn recorded(folder: &Path, until: u64) -> String {
+    let mut journey = started(Keep { folder: Some(folder), ..Keep::default() });
     while journey.cycle() < until {
         let now = journey.cycle();
         let values = [0, 1, 2, 3].map(|k| ((now / 3 + k * k) % 3) as f64);
@@ -53,4 +59,56 @@ fn a_run_that_lost_its_deciders_is_not_resumed_without_them() {
     assert!(words.contains("its agents were decided from outside up to cycle 120"), "{words}");
     let again = Recorded::open(WORLDS, &folder).expect("a run");
     replay_to(&again, 119, 1, &Unwatched).expect("what was recorded can be looked at");
+}
+
+/// Returns the cycles of the poses that are kept, each once, and takes all rows.
+fn taken(journey: &mut Journey) -> Vec<u64> {
+    let tables = journey.take_rows().expect("rows");
+    let poses = tables.iter().find(|(schema, _)| schema.name == "trajectories").expect("poses");
+    let Values::U64(cycles) = &poses.1[0] else { panic!("cycles come first") };
+    let mut cycles = cycles.to_vec();
+    cycles.sort_unstable();
+    cycles.dedup();
+    cycles
+}
+
+#[test]
+fn rows_in_memory_never_tell_of_two_pasts_and_have_no_hole() {
+    let mut journey = started(Keep::default());
+    journey.keep_rows(&Wanted::default()).expect("kept");
+    let advance = |journey: &mut Journey, until| journey.advance_to(until, &Unwatched).expect("ok");
+    advance(&mut journey, 20);
+    let at_20 = journey.checkpoint().expect("saved");
+    advance(&mut journey, 33);
+    let at_33 = journey.checkpoint().expect("saved");
+    journey.restore(&at_20).expect("its own");
+    let turn = Orders { order: "action", agents: &[0], values: &[1.0] };
+    journey.order(&turn).expect("right");
+    advance(&mut journey, 25);
+    let digest = journey.simulation().digest();
+    let refused = journey.restore(&at_33).expect_err("of the way that it left");
+    assert!(matches!(refused, RestoreError::Astray { from: 0, now: 25, of: 33 }), "{refused}");
+    assert_eq!((journey.cycle(), journey.simulation().digest()), (25, digest));
+    assert_eq!(taken(&mut journey), (0..25).collect::<Vec<_>>());
+    // Nothing is kept of another past any more.
+    journey.restore(&at_33).expect("of the same scenario");
+    advance(&mut journey, 38);
+    assert_eq!(taken(&mut journey), (33..38).collect::<Vec<_>>());
+}
+
+#[test]
+fn another_scenario_is_told_as_such_also_where_rows_are_kept() {
+    let source = Source::new("s.toml", format!("seed = 9\n{SCENARIO}"), "");
+    let compiled = WORLDS.compile(&source).expect("valid");
+    let other = compiled.start(&source, 1).checkpoint();
+    let dir = tempfile::tempdir().expect("a folder");
+    let folder = dir.path().join("run");
+    for keep in [Keep::default(), Keep { folder: Some(&folder), ..Keep::default() }] {
+        let mut journey = started(keep);
+        if keep.folder.is_none() {
+            journey.keep_rows(&Wanted::default()).expect("kept");
+        }
+        let told = journey.restore(&other).expect_err("another seed").to_string();
+        assert!(told.contains("belongs to scenario"), "{told}");
+    }
 }

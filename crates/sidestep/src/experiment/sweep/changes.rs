@@ -34,7 +34,7 @@ impl Sweep {
     ///
     /// # Errors
     /// When a largest number of runs is given, and no precision ends the sweep; when something is varied that
-    /// no sweep can vary; when a key is set that the sweep varies.
+    /// no sweep can vary; when a key is set that every variant sets.
     pub fn changed(mut self, changes: Changes) -> Result<Self, InputError> {
         self.design.factors.extend(changes.factors);
         changes.fixed.iter().try_for_each(|setting| self.check_fixed(setting))?;
@@ -63,9 +63,9 @@ impl Sweep {
         Ok(self)
     }
 
-    /// Refuses a setting for all variants of a key that variants set for themselves: it would have no effect on them.
+    /// Refuses a setting for all variants of a key that each of them sets for itself: it would have no effect.
     fn check_fixed(&self, Setting { key, value }: &Setting) -> Result<(), InputError> {
-        let Some(varied) = self.design.keys().find(|varied| is_within(key, varied)) else {
+        let Some(varied) = self.design.key_of_each(|varied| is_within(key, varied)) else {
             return Ok(());
         };
         let remedy = "leave it out, or take the key out of the sweep: what a variant says counts";
@@ -100,9 +100,9 @@ mod tests {
     use crate::scenario::Source;
 
     #[test]
-    fn a_key_that_the_sweep_varies_is_not_set_for_all_variants() {
+    fn a_key_is_set_for_all_variants_unless_each_of_them_sets_it() {
         let text = "format = 1\nscenario = \"s.toml\"\n[set]\nregime = \"both\"\n\
-                    [vary]\na.b = [1, 2]\n[[variant]]\nc = 3\n[[variant]]\nname = \"plain\"\n\
+                    [vary]\na.b = [1, 2]\n[[variant]]\nc = 3\nf = 3\n[[variant]]\nf = 4\nname = \"plain\"\n\
                     [latin_hypercube]\nsamples = 2\nrange.d.e = { low = 1, high = 2 }\n";
         let sweep = Sweep::parse(&Source::new("sweep.toml", text, "dir")).expect("valid");
         let fixed = |text: &str| Changes {
@@ -113,7 +113,7 @@ mod tests {
             ("a.b=3", "a.b"),
             ("a.b.x=3", "a.b"),
             ("a.0.b=3", "a.b"),
-            ("c=4", "c"),
+            ("f=5", "f"),
             ("d.e=1.5", "d.e"),
         ] {
             let error = sweep.clone().changed(fixed(setting)).expect_err(setting);
@@ -122,6 +122,8 @@ mod tests {
         for setting in ["a.bc=3", "a.c=3", "regime=\"sensors\"", "cycles=7"] {
             sweep.clone().changed(fixed(setting)).expect(setting);
         }
+        let changed = sweep.clone().changed(fixed("c=4")).expect("`plain` does not set it");
+        assert!(changed.fixed.contains(&Setting::parse("c=4").expect("a setting")));
         let both = Changes {
             factors: vec![Factor::parse("cycles=1,2").expect("a factor")],
             ..fixed("cycles=7")

@@ -196,9 +196,22 @@ impl Design {
 impl Design {
     /// Returns all keys that variants set, some of them more than once.
     pub(super) fn keys(&self) -> impl Iterator<Item = &str> {
-        let listed = self.list.iter().flat_map(|v| &v.settings).map(|s| &s.key);
+        self.list.iter().flat_map(Variant::keys).chain(self.shared_keys())
+    }
+
+    /// Returns the keys that every variant sets, whatever the entry of the list.
+    fn shared_keys(&self) -> impl Iterator<Item = &str> {
         let ranges = self.hypercube.iter().flat_map(|h| &h.ranges).map(|r| &r.key);
-        listed.chain(ranges).chain(self.factors.iter().map(|f| &f.key)).map(String::as_str)
+        ranges.chain(self.factors.iter().map(|f| &f.key)).map(String::as_str)
+    }
+
+    /// Returns a key of this kind that variants set, if every variant sets one.
+    pub(super) fn key_of_each(&self, is_such: impl Fn(&str) -> bool) -> Option<&str> {
+        self.shared_keys().find(|key| is_such(key)).or_else(|| {
+            // Every variant has the settings of one entry of the list.
+            let keys = self.list.iter().map(|entry| entry.keys().find(|key| is_such(key)));
+            keys.collect::<Option<Vec<_>>>()?.first().copied()
+        })
     }
 
     /// Checks that nothing is requested twice. Samples of a hypercube may coincide, because whole

@@ -122,7 +122,7 @@ impl Plan {
     /// Checks that the parts of the plan fit together, as they do in every plan that [`Plan::new`] makes.
     ///
     /// # Errors
-    /// What does not fit, in words.
+    /// The cause, in words.
     pub fn check(&self) -> Result<(), String> {
         let (variants, replicates) = (self.variants.len(), u64::from(self.replicates));
         if variants == 0 || replicates == 0 {
@@ -229,11 +229,11 @@ impl Plan {
 /// Checks that runs with seeds from `first` on have seeds that scenarios can have, up to 2^63 - 1.
 ///
 /// # Errors
-/// What is wrong, in words.
+/// The cause, in words.
 pub fn check_seeds(first: u64, runs: u64) -> Result<(), String> {
     match first.checked_add(runs.saturating_sub(1)).is_some_and(|last| last <= i64::MAX as u64) {
         true => Ok(()),
-        false => Err(format!("{runs} seeds from {first} on run over")),
+        false => Err(format!("{runs} seeds from {first} on exceed 2^63 - 1")),
     }
 }
 

@@ -103,6 +103,11 @@ impl Variant {
         }
     }
 
+    /// Returns the keys that it sets.
+    pub(super) fn keys(&self) -> impl Iterator<Item = &str> {
+        self.settings.iter().map(|setting| setting.key.as_str())
+    }
+
     /// Returns the value of a parameter, if this variant sets it.
     pub fn value(&self, key: &str) -> Option<&Value> {
         self.settings.iter().find(|s| s.key == key).map(|s| &s.value)

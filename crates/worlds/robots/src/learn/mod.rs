@@ -28,7 +28,7 @@ use serde::Serialize;
 
 use sidestep_kernel::InputError;
 
-/// Greatest number that is added to a count: beside a larger one no count counts, and sums of rows run over.
+/// Greatest number that is added to a count: beside a larger one no count counts, and sums of rows overflow.
 pub const MOST_ALPHA: f64 = 1e9;
 
 /// The rule by which counts become probabilities.
