@@ -42,6 +42,7 @@ impl<const D: usize> Acting<'_, D> {
         let Some(task) = self.task() else { return };
         let is_late = self.world.starts_s(self.body.driving.cycles + 1) >= task.lasts_s;
         self.body.driving.cycles += 1;
+        let present = self.body.driving.task;
         let wish = self.wish(task);
         self.look_ahead(task, wish);
         let wanted = self.wanted(task, wish);
@@ -63,7 +64,8 @@ impl<const D: usize> Acting<'_, D> {
             Wish::Obey(errand) => self.obey(task, errand),
             Wish::Done => return self.next_task(self.ending(task)),
         }
-        if is_late {
+        // One that was given up in this cycle has ended already, and the next one has just begun.
+        if is_late && self.body.driving.task == present {
             self.next_task(self.ending(task));
         }
     }
