@@ -140,6 +140,11 @@ fn check(target: &Target, old: &Old, is_own: bool) -> Result<(), Problem> {
         let remedy = "allow to write it, or save it under another name";
         return Err(Problem::new(place, "may only be read", remedy));
     }
+    // A recording keeps the scenario that was run.
+    if ["run.json", "sweep.json"].iter().any(|name| target.real.with_file_name(name).is_file()) {
+        let remedy = "save it outside of the recording's folder";
+        return Err(Problem::new(place, "belongs to a recording", remedy));
+    }
     let values = Source::new(place.as_str(), old.text.as_str(), "").parse::<Value>();
     let is_scenario = values.is_ok_and(|values| values["world"].is_string());
     match is_own || is_scenario || old.text.trim().is_empty() {

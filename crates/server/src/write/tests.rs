@@ -125,7 +125,11 @@ fn what_cannot_be_replaced_stays_as_it_is() {
     let mut permissions = fs::metadata(inside.join("a.toml")).expect("there").permissions();
     permissions.set_readonly(true);
     fs::set_permissions(inside.join("a.toml"), permissions).expect("set");
+    fs::create_dir(inside.join("run")).expect("made");
+    fs::write(inside.join("run/run.json"), "{}").expect("written");
+    fs::write(inside.join("run/scenario.toml"), SCENARIO).expect("written");
     for (name, is_own, cause) in [
+        ("run/scenario.toml", true, "a recording"),
         ("packed.toml", true, "packed"),
         ("bytes.toml", true, "UTF-8"),
         ("a.toml", true, "only be read"),
