@@ -67,9 +67,9 @@ pub(super) fn writable(files: &Files, worlds: &Worlds, source: &Source) -> Resul
     let Ok(values) = source.parse::<Value>() else { return Ok(()) };
     files.check_text(source)?;
     // Also over a scenario: in two saves, a page could otherwise make any file out of one.
-    match values["world"].is_string() {
-        true => Ok(()),
-        false => {
+    match values["world"].is_null() {
+        false => Ok(()),
+        true => {
             let worlds = worlds.names().join(", ");
             let remedy = format!("begin it with world = \"...\", one of {worlds}");
             Err(Problem::new(
