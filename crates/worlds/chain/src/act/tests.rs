@@ -118,6 +118,35 @@ fn a_task_whose_time_ends_before_it_reached_a_target_is_given_up_and_not_done() 
     }
 }
 
+/// The first task leads out of reach, and its time ends in the cycle in which it is given up.
+#[test]
+fn a_task_that_is_given_up_as_its_time_ends_leaves_the_next_one_its_own_time() {
+    let text = |lasts: &str| {
+        let script = "script = \"\"\"forward 10\"\"\"";
+        held("[[0.0, 0.0]]").replace(
+            "tasks = [",
+            &format!(
+                "tasks = [{{ kind = \"script\", {script}, patience_s = 1.0{lasts} }}, {{ kind = \"rest\", lasts_s = 1.0 }},"
+            ),
+        )
+    };
+    let given_up = |lasts: &str| {
+        let mut run = run(&text(lasts));
+        while run.state().body(0).driving.task == 0 {
+            run.advance(1);
+        }
+        let cycles = run.cycle();
+        while run.state().body(0).driving.task == 1 {
+            run.advance(1);
+        }
+        (cycles, run.cycle() - cycles)
+    };
+    let (cycles, rests) = given_up("");
+    assert!(cycles > 50 && rests == 50, "{cycles}, {rests}");
+    let lasts = format!(", lasts_s = {}", 0.02 * (cycles as f64 - 0.5));
+    assert_eq!(given_up(&lasts), (cycles, 50));
+}
+
 /// A corridor that ends where it begins.
 #[test]
 fn a_navigator_goes_round_a_corridor_that_comes_back_to_its_start() {
