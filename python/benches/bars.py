@@ -1,4 +1,4 @@
-"""What Python costs: figures beside the bars that the package is held to. Ratios are of one run.
+"""The cost of Python: figures beside the bars that the package is held to. Ratios are of one run.
 
     python python/benches/bars.py
 

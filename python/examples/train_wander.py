@@ -40,7 +40,7 @@ HALL = """
 """
 #: Contacts cost as much as this way brings.
 CONTACT_M = 1.5
-#: The numbers of the beams in a mirror: they are counted counter-clockwise from ahead.
+#: The numbers of the beams in a mirror: they are counted counterclockwise from ahead.
 MIRROR = [0, 7, 6, 5, 4, 3, 2, 1]
 FORWARD, LEFT, RIGHT = 0, 1, 2
 
@@ -63,7 +63,7 @@ def features(observed: dict[str, NDArray[Any]], state: dict[str, Any]) -> list[N
     """Returns what a policy sees, of the shape (robots, features): as it is, and in a mirror."""
     n = len(observed["contact"])
     nearness = np.eye(4)[observed["sonar-8_class"]]
-    # What moves by itself, near and at a medium distance.
+    # Bodies that move by themselves, near and at a medium distance.
     moving = (observed["sonar-8_report"] >= 3)[:, :, None] * nearness[:, :, :2]
     before = state.get("nearness", nearness)
     last = np.eye(3)[state.get("action", np.zeros(n, dtype=int))]

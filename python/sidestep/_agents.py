@@ -13,7 +13,7 @@ from ._native import Team
 
 
 class Agent(Protocol):
-    """What decides for one agent."""
+    """A function that decides for one agent."""
 
     def decide(self, observed: dict[str, Any]) -> Any:
         """Returns the orders of the agent: a dict by name, or the only or first one.

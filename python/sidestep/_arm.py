@@ -46,7 +46,7 @@ class Reached(NamedTuple):
     iterations: NDArray[np.int64]
     #: Postures that the search started from, of the shape (n,).
     starts: NDArray[np.int64]
-    #: Why a target is not reached; None where it is.
+    #: Reason why a target is not reached; None where it is.
     reasons: list[str | None]
     #: Further postures that reach the target, of the shape (found, joints) each; with ``solutions`` above 1 alone.
     others: list[_Floats]

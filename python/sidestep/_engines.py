@@ -21,7 +21,7 @@ from typing import Any, Literal, TypeAlias
 from ._errors import EngineError, SidestepError, wrong
 from ._native import run_task
 
-#: What runs the cells of a sweep.
+#: Engines that run the cells of a sweep.
 Engine: TypeAlias = Literal["local", "ray"] | Executor | Callable[[], Executor]
 #: Number, variant, replicate and seed of a cell.
 Cell: TypeAlias = tuple[int, int, int, int]

@@ -1,4 +1,4 @@
-"""What cells of notebooks show: small HTML without scripts, which every front end takes."""
+"""Output of notebook cells: small HTML without scripts, which every front end takes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a sweep is that others work on."""
+"""Progress of a sweep that others work on."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from . import _native, _notebook
 
 @dataclass(frozen=True)
 class SweepStatus:
-    """How far a sweep is, as :func:`sweep_status` returns it."""
+    """Progress of a sweep, as :func:`sweep_status` returns it."""
 
     #: Whether the table of all runs is there.
     is_complete: bool

@@ -22,9 +22,9 @@ class Sweep:
 
     #: One row per run: cell, variant, replicate, seed, parameters, metrics and the digest of the last state.
     results: Table
-    #: What a clock measured of each run, in seconds; it differs when the runs are made again.
+    #: Times that a clock measured of each run, in seconds; it differs when the runs are made again.
     timings: Table
-    #: What ``sidestep sweep --json`` prints: ``summary`` has every metric with intervals and comparisons.
+    #: The output of ``sidestep sweep --json``: ``summary`` has every metric with intervals and comparisons.
     told: dict[str, Any]
 
     @property

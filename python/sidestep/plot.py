@@ -28,12 +28,12 @@ from ._native import Simulation, Table, read
 
 __all__ = ["Places", "groups", "places", "separation", "tracks"]
 
-#: Where a run's rows are.
+#: The source of a run's rows.
 Rows = str | os.PathLike[str] | Mapping[str, Table] | Table
 
 
 class Places(NamedTuple):
-    """Where agents were, one row per agent and cycle, in the order of the cycles: arrays of the shape (rows,)."""
+    """Places of agents, one row per agent and cycle, in the order of the cycles: arrays of the shape (rows,)."""
 
     #: The cycle at whose start it was there.
     cycle: NDArray[np.int64]

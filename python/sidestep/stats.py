@@ -132,7 +132,7 @@ class Next(NamedTuple):
 
     #: Number of runs to have in all; of those there are, if they are enough, the first so many are the result.
     runs: int
-    #: Why they are enough; None if they are not.
+    #: Reason why they are enough; None if they are not.
     reason: str | None
 
 

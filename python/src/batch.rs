@@ -210,7 +210,7 @@ impl Batch {
         Ok(self.with(py, |batch| batch.cycles())?.to_pyarray(py))
     }
 
-    /// Whether nothing can happen anymore, of each world (bool).
+    /// Returns whether nothing can happen anymore, of each world (bool).
     #[getter]
     fn is_over<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
         Ok(self.with(py, |batch| batch.is_over())?.to_pyarray(py))

@@ -1,4 +1,4 @@
-//! From the errors of Rust to the exceptions of `sidestep/_errors.py`.
+//! Conversion of the errors of Rust to the exceptions of `sidestep/_errors.py`.
 
 use pyo3::prelude::*;
 use sidestep::kernel;

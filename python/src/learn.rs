@@ -23,7 +23,7 @@ enum Model {
 
 #[pymethods]
 impl Learned {
-    /// Whether it is a sensor or an effector.
+    /// Returns whether it is a sensor or an effector.
     #[getter]
     fn kind(&self) -> &'static str {
         match self.0 {

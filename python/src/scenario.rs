@@ -47,7 +47,7 @@ pub(crate) struct Made {
 enum Text {
     /// One that was read or written.
     Own(Source),
-    /// That of another scenario with this seed. It is written when somebody asks: to write a text anew takes longer than
+    /// Another scenario with this seed. It is written when somebody asks: to write a text anew takes longer than
     /// to start a small world.
     Reseeded { of: Arc<Made>, seed: u64, source: OnceLock<Result<Source, InputError>> },
 }

@@ -126,7 +126,7 @@ impl Simulation {
         }
     }
 
-    /// Advances towards a goal for a little while.
+    /// Advances toward a goal for a little while.
     ///
     /// The cycle is read by who then advances, with no other thread in between: of two threads that step at once, each
     /// adds its own step.
@@ -216,7 +216,7 @@ impl Simulation {
 /// The cycle that somebody advances to.
 #[derive(Clone, Copy)]
 enum Goal {
-    /// That many cycles after the present one.
+    /// So many cycles after the present one.
     Further(u64),
     /// This one.
     Until(Cycle),
@@ -366,7 +366,7 @@ impl Simulation {
         self.ask(py, |run| run.cycle())
     }
 
-    /// Whether nothing can happen anymore, e.g. because everybody has arrived.
+    /// Returns whether nothing can happen anymore, e.g. because everybody has arrived.
     #[getter]
     fn is_over(&self, py: Python<'_>) -> PyResult<bool> {
         self.ask(py, |run| run.is_over())

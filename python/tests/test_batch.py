@@ -73,7 +73,7 @@ def test_worlds_that_a_mask_leaves_out_stand_still(make):
     batch.step(3, mask=mask)
     assert batch.cycles.tolist() == [3, 0, 3, 0, 3]
     assert [a == b for a, b in zip(before, batch.digests, strict=True)] == (~mask).tolist()
-    # What those were ordered that did not step is dropped.
+    # Orders for those that did not step are dropped.
     batch.step(1, mask=~mask)
     assert batch.digests[1] == make_idle(batch, 1)
 

@@ -21,7 +21,7 @@ def test_the_code_of_a_page_runs_from_its_top_to_its_end(page, root, monkeypatch
         exec(compile(block, page, "exec"), names)
 
 
-#: What is written in Python, and no part of a module of its own.
+#: Names written in Python that belong to no module of their own.
 OF_PYTHON = (
     "Agent",
     "Compared",
@@ -69,7 +69,7 @@ def documented():
 
 
 def environments():
-    """What is documented of environments, where they are installed."""
+    """Names that are documented of environments, where they are installed."""
     if importlib.util.find_spec("pettingzoo"):
         for name in ("envs", "envs.robots_v0", "envs.chain_v0", "envs.airspace_v0"):
             module = importlib.import_module(f"sidestep.{name}")

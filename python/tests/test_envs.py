@@ -81,7 +81,7 @@ def test_progress_is_what_an_agent_has_come_on(make):
 
 
 def test_an_airplane_that_has_landed_earns_nothing_for_it():
-    """What is observed of it is padding."""
+    """Its observation is padding."""
     env = parallel_env(AIRPLANES, rewards={"progress": 1.0, "delay": -1.0}, orders=["velocity_m_s"], max_cycles=500)
     env.reset(seed=5)
     most, has_landed = 0.0, False

@@ -1,4 +1,4 @@
-"""What cells of notebooks show, and the notebooks that are shipped, run as they stand."""
+"""Output of notebook cells, and the notebooks that are shipped, run as they stand."""
 
 import ast
 import json
@@ -83,7 +83,7 @@ def test_sweeps_and_comparisons_show_themselves(tmp_path):
 
 
 def shown(value):
-    """What a front end shows of the last value of a cell."""
+    """Returns what a front end shows of the last value of a cell."""
     for name in ("_repr_html_", "_repr_png_", "__repr__"):
         if hasattr(value, name):
             return getattr(value, name)()

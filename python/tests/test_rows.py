@@ -60,7 +60,7 @@ def test_a_long_run_takes_the_memory_of_one_block():
     sim, rows, most = sidestep.Simulation(floor), 0, None
     for tables in sim.blocks(1000):
         rows += len(tables["trajectories"])
-        # What the allocator and the first blocks take comes once.
+        # Memory for the allocator and the first blocks comes once.
         first = most = most or resident()
         most = max(most, resident())
     assert rows == 120_000

@@ -3,7 +3,7 @@
 import { waitBefore_ms } from "./backoff";
 import type { Answer, Call, Notice, Problem, Reply } from "./protocol";
 
-/** What a connection needs of a WebSocket. */
+/** The part of a WebSocket that a connection needs. */
 export interface Socket {
   binaryType: string;
   onopen: ((event: never) => void) | null;
@@ -13,7 +13,7 @@ export interface Socket {
   close(): void;
 }
 
-/** What happens on a connection. */
+/** Callbacks for all that happens on a connection. */
 export interface Listener {
   notice(notice: Notice): void;
   frame(bytes: ArrayBuffer): void;
@@ -71,7 +71,7 @@ export class Connection {
     this.#surroundings = surroundings;
   }
 
-  /** Whether requests can be sent. */
+  /** Returns whether requests can be sent. */
   get isReady(): boolean {
     return this.#isReady;
   }

@@ -7,7 +7,7 @@ export const MAGIC = 0x46545353;
 /** Bytes before the columns. */
 export const HEADER_BYTES = 56;
 
-/** What moved, at one cycle. Columns are in the order of the cast. */
+/** The bodies that moved, at one cycle. Columns are in the order of the cast. */
 export interface Frame {
   session: number;
   cast: number;

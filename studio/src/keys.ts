@@ -1,4 +1,4 @@
-/** What keys do, in one table that the help shows too. */
+/** The actions of keys, in one table that the help shows too. */
 
 export type Action =
   | "play" | "play-back" | "next" | "back" | "next-ten" | "back-ten" | "slower" | "faster"
@@ -7,7 +7,7 @@ export type Action =
 
 interface Key {
   action: Action;
-  /** As `KeyboardEvent.key` tells them. */
+  /** Keys as `KeyboardEvent.key` tells them. */
   keys: readonly string[];
   shift?: boolean;
   shown: readonly string[];
@@ -41,7 +41,7 @@ export const KEYS: readonly Key[] = [
   { action: "help", keys: ["?"], shown: ["?"], words: "this help" },
 ];
 
-/** What a pressed key means, if anything. */
+/** Returns the action of a pressed key, if it has one. */
 export function actionOf(event: Pick<KeyboardEvent, "key" | "shiftKey" | "ctrlKey" | "metaKey" | "altKey">): Action | null {
   if (event.ctrlKey || event.metaKey || event.altKey) return null;
   const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
@@ -58,7 +58,7 @@ const OWN_KEYS: Record<string, RegExp> = {
   BUTTON: /^( |Enter)$/,
 };
 
-/** Whether the focused element takes this key itself. */
+/** Returns whether the focused element takes this key itself. */
 export function isTaken(target: EventTarget | null, key: string): boolean {
   if (!(target instanceof HTMLElement)) return false;
   if (target.isContentEditable || target.closest("dialog, .cm-editor, [data-editor]")) return true;

@@ -1,4 +1,4 @@
-/** What the actions of keys do. */
+/** Performs the actions of keys. */
 
 import type { Action } from "./keys";
 import { page } from "./state/page.svelte";

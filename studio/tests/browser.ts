@@ -2,7 +2,7 @@
 
 import { chromium, type Browser, type Page } from "playwright-core";
 
-/** On a busy machine software rendering is slow; nothing waits for luck. */
+/** Longest wait: on a busy machine software rendering is slow; nothing waits for luck. */
 export const WAIT_MS = Number(process.env.WAIT_MS ?? 60_000);
 
 export function launch(): Promise<Browser> {

@@ -9,7 +9,7 @@ export class Hand {
     this.#page = page;
   }
 
-  /** Where a place of the world is on the screen. */
+  /** Returns the point of the screen where a place of the world is. */
   async at(x_m: number, y_m: number): Promise<[number, number]> {
     const layer = this.#page.locator("canvas.layer");
     await this.#page.waitForFunction(() => document.querySelector<HTMLElement>("canvas.layer")?.dataset.eye !== undefined);

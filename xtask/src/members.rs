@@ -86,7 +86,7 @@ fn step(root: &Path, folder: &Path, part: &str) -> Vec<PathBuf> {
     names.filter(|name| fits(part, name)).map(|name| folder.join(name)).collect()
 }
 
-/// Whether a name fits a pattern in which `*` stands for any letters.
+/// Returns whether a name fits a pattern in which `*` stands for any letters.
 fn fits(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,

@@ -11,7 +11,7 @@ use crate::arguments;
 use crate::measures::{circles, functions};
 use crate::members::{self, Member};
 use crate::paths;
-use crate::source::Role;
+use crate::source::{self, Role};
 
 /// Circles that are known, in the format of `cargo xtask shape --circles`.
 const KNOWN: &str = include_str!("../circles.txt");
@@ -184,7 +184,7 @@ fn compiled_in(line: &str) -> impl Iterator<Item = &str> {
     rests.filter_map(|rest| rest.split('"').next())
 }
 
-/// Whether a path beside a folder of the crate stays within the crate.
+/// Returns whether a path beside a folder of the crate stays within the crate.
 fn lies_within(folder: &Path, file: &str) -> bool {
     let mut depth = folder.components().count();
     Path::new(file).components().all(|part| match part {
@@ -197,34 +197,72 @@ fn lies_within(folder: &Path, file: &str) -> bool {
     })
 }
 
-/// Question words, with which no documentation begins: they make a clause without a head.
-const HEADLESS: [&str; 8] = ["What", "Who", "Whom", "Whose", "Where", "Which", "How", "Why"];
+/// Words with which no documentation begins: they make a clause without a head.
+const HEADLESS: [&str; 13] = [
+    "What", "Who", "Whom", "Whose", "Where", "Which", "How", "Why", "When", "That", "If", "As",
+    "Of",
+];
 
-/// Returns documentation that begins with a question word, in place of a noun phrase or a verb.
+/// Folders of the page and of the Python package.
+const OTHER_LANGUAGES: [&str; 6] = [
+    "studio/src",
+    "studio/tests",
+    "python/sidestep",
+    "python/tests",
+    "python/examples",
+    "python/benches",
+];
+
+/// Endings of the names of their sources.
+const ENDINGS: [&str; 4] = ["ts", "svelte", "py", "pyi"];
+
+/// Returns documentation that begins with a clause without a head, in place of a noun phrase or a verb.
 fn headless(members: &[Member]) -> Vec<String> {
     let mut wrong = Vec::new();
     for member in members {
         for source in &member.sources {
-            let mut before = None;
-            for (number, line) in (1..).zip(&source.lines) {
-                let documented = documentation(&line.text);
-                let begins = documented.filter(|_| before.is_none());
-                before = documented;
-                let word = begins.and_then(|words| words.split_whitespace().next());
-                if word.is_some_and(|word| HEADLESS.contains(&word)) {
-                    let path = member.folder.join(&source.path);
-                    wrong.push(format!("{}:{number} begins with a question", path.display()));
-                }
-            }
+            let lines: Vec<&str> = source.lines.iter().map(|line| line.text.as_str()).collect();
+            wrong.extend(headless_lines(&member.folder.join(&source.path), &lines));
         }
     }
     wrong
 }
 
-/// Returns the words of a line of documentation.
+/// Returns the same of what is not written in Rust, below the root of the repository.
+fn headless_elsewhere(root: &Path) -> Vec<String> {
+    let mut paths = Vec::new();
+    for folder in OTHER_LANGUAGES {
+        source::collect(&root.join(folder), &ENDINGS, &mut paths).unwrap();
+    }
+    paths.sort();
+    let wrong = paths.iter().flat_map(|path| {
+        let text = std::fs::read_to_string(path).unwrap();
+        headless_lines(path.strip_prefix(root).unwrap_or(path), &Vec::from_iter(text.lines()))
+    });
+    wrong.collect()
+}
+
+/// Returns such documentation of one file.
+fn headless_lines(path: &Path, lines: &[&str]) -> Vec<String> {
+    let mut wrong = Vec::new();
+    let mut is_inside = false;
+    for (number, line) in (1..).zip(lines) {
+        let documented = documentation(line);
+        let begins = documented.filter(|_| !is_inside);
+        // The page's comments may open with a line that has no words yet.
+        is_inside = documented.is_some() && line.trim() != "/**";
+        let word = begins.and_then(|words| words.split_whitespace().next());
+        if word.is_some_and(|word| HEADLESS.contains(&word)) {
+            wrong.push(format!("{}:{number} begins with a clause without a head", path.display()));
+        }
+    }
+    wrong
+}
+
+/// Returns the words of a line of documentation, in any of our languages.
 fn documentation(line: &str) -> Option<&str> {
     let line = line.trim_start();
-    line.strip_prefix("///").or_else(|| line.strip_prefix("//!"))
+    ["///", "//!", "/**", "* ", "\"\"\"", "#:"].iter().find_map(|start| line.strip_prefix(start))
 }
 
 fn std_thread() -> [String; 2] {
@@ -260,6 +298,7 @@ fn the_rules_of_the_house_hold() {
         names_worlds(&members),
         reaches_out(&members),
         headless(&members),
+        headless_elsewhere(&arguments::house()),
         differing(&circles::listed(&members), KNOWN),
     ]
     .concat();
@@ -341,11 +380,23 @@ mod small {
     }
 
     #[test]
-    fn documentation_begins_with_no_question_but_may_go_on_with_one() {
+    fn documentation_begins_with_no_clause_without_a_head_but_may_go_on_with_one() {
         let text = "//! What it is.\n\n/// Whether it is.\n/// What it may be.\nfn f() {}\n\n    /// Who asks.\nfn g() {}";
         let wrong = headless(&[member("crates/a", "", text)]);
-        let at = |line: usize| format!("crates/a/src/lib.rs:{line} begins with a question");
+        let at =
+            |line: usize| format!("crates/a/src/lib.rs:{line} begins with a clause without a head");
         assert_eq!(wrong, [at(1), at(7)]);
+    }
+
+    #[test]
+    fn the_same_holds_for_documentation_in_other_languages() {
+        let text = "/** Whether it is. */\n/** How it is. */\n/**\n * Where it is.\n * What else.\n */\n/**\n * A thing.\n */";
+        let wrong = headless_lines(Path::new("a.ts"), &Vec::from_iter(text.lines()));
+        let at = |line: usize| format!("a.ts:{line} begins with a clause without a head");
+        assert_eq!(wrong, [at(2), at(4)]);
+        let text = "\"\"\"What it is.\"\"\"\n#: A number.\n#: What counts.\n\n#: Why it is so.\n";
+        let wrong = headless_lines(Path::new("a.ts"), &Vec::from_iter(text.lines()));
+        assert_eq!(wrong, [at(1), at(5)]);
     }
 
     #[test]

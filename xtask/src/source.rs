@@ -127,7 +127,7 @@ fn take_test_methods(items: &mut [Item], lines: &mut [Line]) {
     }
 }
 
-/// Whether attributes say that something is built for tests only.
+/// Returns whether attributes say that something is built for tests only.
 pub(crate) fn is_test(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|attribute| match &attribute.meta {
         Meta::Path(path) => path.is_ident("test"),
@@ -161,12 +161,12 @@ pub(crate) fn attributes(item: &Item) -> &[Attribute] {
 pub(crate) fn read_all(root: &Path, folder: &Path) -> Result<Vec<Source>, String> {
     let base = root.join(folder);
     let mut paths = Vec::new();
-    collect(&base, &base, &mut paths).map_err(|e| format!("{}: {e}", base.display()))?;
+    collect(&base, &["rs"], &mut paths).map_err(|e| format!("{}: {e}", base.display()))?;
     paths.sort();
     let mut sources = Vec::new();
-    for path in paths {
-        let text = fs::read_to_string(base.join(&path))
-            .map_err(|e| format!("{}: {e}", base.join(&path).display()))?;
+    for full in paths {
+        let text = fs::read_to_string(&full).map_err(|e| format!("{}: {e}", full.display()))?;
+        let path = full.strip_prefix(&base).unwrap_or(&full).to_path_buf();
         let role = role(&folder.join(&path));
         let source = Source::new(path, role, &text)
             .map_err(|message| format!("{}/{message}", folder.display()))?;
@@ -175,15 +175,22 @@ pub(crate) fn read_all(root: &Path, folder: &Path) -> Result<Vec<Source>, String
     Ok(sources)
 }
 
-/// Collects Rust files below a folder, but not those of other packages or of builds.
-fn collect(base: &Path, folder: &Path, paths: &mut Vec<PathBuf>) -> std::io::Result<()> {
+/// Collects the files below a folder whose names end so, but not those of other packages or of builds.
+pub(crate) fn collect(
+    folder: &Path,
+    endings: &[&str],
+    paths: &mut Vec<PathBuf>,
+) -> std::io::Result<()> {
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
         let is_foreign = path.join("Cargo.toml").exists() || path.ends_with("target");
         if path.is_dir() && !is_foreign {
-            collect(base, &path, paths)?;
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            paths.extend(path.strip_prefix(base).map(Path::to_path_buf));
+            collect(&path, endings, paths)?;
+        } else if path
+            .extension()
+            .is_some_and(|found| endings.iter().any(|ending| found == *ending))
+        {
+            paths.push(path);
         }
     }
     Ok(())

@@ -26,7 +26,7 @@ impl Console {
         Self { json, quiet }
     }
 
-    /// Whether progress may be shown: not with `json` or `quiet`.
+    /// Returns whether progress may be shown: not with `json` or `quiet`.
     pub(crate) fn shows_progress(self) -> bool {
         !self.quiet && std::io::stderr().is_terminal()
     }

@@ -112,7 +112,7 @@ fn waits(now: &FleetNow) -> String {
     }
 }
 
-/// Whether nothing is heard of a node that was there.
+/// Returns whether nothing is heard of a node that was there.
 fn is_missed(node: &NodeNow) -> bool {
     ["gone", "silent"].contains(&&*node.state)
 }

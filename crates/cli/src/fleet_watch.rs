@@ -18,7 +18,7 @@ const PATIENCE_S: f64 = 10.0;
 /// shows its last view for a second.
 const AGAIN: Duration = Duration::from_secs(2);
 
-/// Whether the command line names a fleet's endpoint here, e.g. `tcp/127.0.0.1:7600`, rather than a file.
+/// Returns whether the command line names a fleet's endpoint here, e.g. `tcp/127.0.0.1:7600`, rather than a file.
 pub(crate) fn is_endpoint(named: &Path) -> bool {
     let is_one = named.to_str().and_then(|text| {
         let address = ["tcp/", "tls/"].iter().find_map(|protocol| text.strip_prefix(protocol))?;

@@ -58,7 +58,7 @@ fn catch(handler: impl FnMut() + Send + 'static) -> Result<(), Failure> {
     })
 }
 
-/// Whether the run was asked to stop.
+/// Returns whether the run was asked to stop.
 pub(crate) fn requested() -> bool {
     REQUESTED.load(Ordering::Relaxed)
 }

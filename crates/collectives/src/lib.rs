@@ -11,7 +11,7 @@
 //! L_i(q_i, T) = sum_x q_i(x) E[G | x_i = x]  -  T S(q_i)
 //! ```
 //!
-//! with the entropy `S` (eq. 4). A round estimates `E[G | x_i]`, moves every `q_i` towards the
+//! with the entropy `S` (eq. 4). A round estimates `E[G | x_i]`, moves every `q_i` toward the
 //! minimum of its `L_i`, and lowers `T`; as `T` falls the distributions settle on strategies.
 //!
 //! ```text
@@ -27,7 +27,7 @@
 //! a sum over pairs ([`PairwiseGame`]); it is the limit of infinitely many samples.
 //!
 //! **Two updates.** [`Update::NearestNewton`] steps along the natural gradient of `L_i`;
-//! [`Update::Brouwer`] moves towards the distribution that would be the minimum if nobody else
+//! [`Update::Brouwer`] moves toward the distribution that would be the minimum if nobody else
 //! moved, `q_i ~ exp(-E[G | x_i] / T)`.
 
 mod game;

@@ -10,14 +10,14 @@ use sidestep_kernel::interrupt;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", tag = "kind")]
 pub enum Estimator {
-    /// From blocks of joint samples, as in the paper.
+    /// Estimates from blocks of joint samples, as in the paper.
     Sampled {
         /// Samples per block, `N_SB`.
         block: usize,
         /// The factor on a block's weight after each further block, in [0, 1].
         ageing: f64,
     },
-    /// In closed form, for games that are sums over pairs.
+    /// Closed form, for games that are sums over pairs.
     Exact,
 }
 

@@ -9,7 +9,7 @@ const LEAST: f64 = 1e-9;
 /// The lowest temperature, as a share of the costs' scale.
 const COLDEST: f64 = 1e-12;
 
-/// The step of a distribution towards the minimum of eq. 7.
+/// The step of a distribution toward the minimum of eq. 7.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", tag = "kind")]
 pub enum Update {
@@ -176,8 +176,8 @@ impl Player {
     fn brouwer(&mut self, step: f64, t: f64, low: f64) -> f64 {
         let weights: Vec<f64> = self.expected.iter().map(|e| math::exp((low - e) / t)).collect();
         let sum: f64 = weights.iter().sum();
-        let towards = |(q, w): (&f64, &f64)| ((1.0 - step) * q + step * w / sum).max(LEAST);
-        let new: Vec<f64> = self.q.iter().zip(&weights).map(towards).collect();
+        let toward = |(q, w): (&f64, &f64)| ((1.0 - step) * q + step * w / sum).max(LEAST);
+        let new: Vec<f64> = self.q.iter().zip(&weights).map(toward).collect();
         self.settle(&new)
     }
 

@@ -75,12 +75,12 @@ impl Estimate {
         Some(if value > 0.0 { mean_p_value(logarithms, self.n, value.ln()) } else { 0.0 })
     }
 
-    /// Whether the whole interval lies above `value`.
+    /// Returns whether the whole interval lies above `value`.
     pub fn is_above(&self, value: f64) -> bool {
         self.interval.is_some_and(|i| i.low > value)
     }
 
-    /// Whether the whole interval lies below `value`.
+    /// Returns whether the whole interval lies below `value`.
     pub fn is_below(&self, value: f64) -> bool {
         self.interval.is_some_and(|i| i.high < value)
     }

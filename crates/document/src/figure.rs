@@ -70,7 +70,7 @@ pub struct Point {
 }
 
 impl Figure {
-    /// Whether any point has an interval.
+    /// Returns whether any point has an interval.
     pub fn has_intervals(&self) -> bool {
         self.series.iter().flat_map(|s| &s.points).any(|p| p.interval.is_some())
     }

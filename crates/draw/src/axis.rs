@@ -49,7 +49,7 @@ impl Axis {
         &self.label
     }
 
-    /// Whether a value has a place on this axis at all.
+    /// Returns whether a value has a place on this axis at all.
     pub(crate) fn holds(&self, value: f64) -> bool {
         value.abs() <= MOST && (!self.log || value >= 1.0 / MOST)
     }

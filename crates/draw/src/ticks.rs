@@ -65,7 +65,7 @@ impl Spacing {
         Self { free_from: f64::NEG_INFINITY }
     }
 
-    /// Whether a label `length_px` long around `center_px` has room; if so, that room is taken.
+    /// Returns whether a label `length_px` long around `center_px` has room; if so, that room is taken.
     /// Labels come in rising order.
     pub(crate) fn admits(&mut self, center_px: f64, length_px: f64) -> bool {
         let fits = center_px - length_px / 2.0 >= self.free_from;

@@ -56,7 +56,7 @@ pub enum CheckpointError {
         /// The format that was found.
         found: u32,
     },
-    /// From another program version, world or scenario.
+    /// The checkpoint is of another program version, world or scenario.
     #[error("the checkpoint belongs to {what} `{found}`, not `{expected}`")]
     Foreign {
         /// The property that differs.

@@ -132,7 +132,7 @@ impl<T: Word> Column<T> {
         self.0.len()
     }
 
-    /// Whether there are no slots.
+    /// Returns whether there are no slots.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

@@ -15,7 +15,7 @@ const NONE: Slot = Slot::MAX;
 /// The conflict groups of one cycle over slots `0..n`.
 #[derive(Debug)]
 pub struct Groups {
-    /// Towards the leader; a leader points at itself.
+    /// Toward the leader; a leader points at itself.
     parent: Column<Slot>,
     /// Last slot that became a child of this one.
     first_child: Column<Slot>,
@@ -74,13 +74,13 @@ impl Groups {
         }
     }
 
-    /// Whether a slot leads its group; valid after the barrier that ends joining.
+    /// Returns whether a slot leads its group; valid after the barrier that ends joining.
     #[inline]
     pub fn is_leader(&self, slot: Slot) -> bool {
         self.parent.get(slot as usize) == slot
     }
 
-    /// Whether a leader is the only member of its group.
+    /// Returns whether a leader is the only member of its group.
     #[inline]
     pub fn is_alone(&self, slot: Slot) -> bool {
         self.first_child.get(slot as usize) == NONE && self.is_leader(slot)

@@ -64,7 +64,7 @@ impl Chance {
         Self((p.clamp(0.0, 1.0) * (1u64 << 32) as f64).round() as u64)
     }
 
-    /// Whether the event happens for the uniform word `u`.
+    /// Returns whether the event happens for the uniform word `u`.
     #[inline]
     pub fn happens(self, u: u32) -> bool {
         u64::from(u) < self.0

@@ -13,7 +13,7 @@ use std::ops::Range;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InputError {
     place: String,
-    /// In a box, like the key, because errors travel in results by value.
+    /// The position, in a box like the key, because errors travel in results by value.
     position: Option<Box<Position>>,
     key: Option<Box<str>>,
     cause: String,

@@ -66,7 +66,7 @@ pub fn distance<const D: usize>(a: Point<D>, b: Point<D>) -> f64 {
     norm(sub(a, b))
 }
 
-/// Whether every coordinate is a finite number.
+/// Returns whether every coordinate is a finite number.
 pub fn is_finite<const D: usize>(a: &Point<D>) -> bool {
     a.iter().all(|x| x.is_finite())
 }
@@ -84,8 +84,8 @@ pub fn across<const D: usize>(a: Point<D>, axis: Point<D>) -> Point<D> {
     sub(a, scaled(axis, dot(a, axis)))
 }
 
-/// The point reached from `from` towards `to` after at most `step_m` meters.
-pub fn towards<const D: usize>(from: Point<D>, to: Point<D>, step_m: f64) -> Point<D> {
+/// The point reached from `from` toward `to` after at most `step_m` meters.
+pub fn toward<const D: usize>(from: Point<D>, to: Point<D>, step_m: f64) -> Point<D> {
     let far_m = distance(from, to);
     if far_m <= step_m { to } else { along(from, sub(to, from), step_m / far_m) }
 }
@@ -161,9 +161,9 @@ mod tests {
 
     #[test]
     fn a_step_never_goes_beyond_its_goal() {
-        assert_eq!(towards([0.0, 0.0], [3.0, 4.0], 10.0), [3.0, 4.0]);
-        assert_eq!(towards([0.0, 0.0], [3.0, 4.0], 2.5), [1.5, 2.0]);
-        assert_eq!(towards([1.0], [1.0], 0.0), [1.0]);
+        assert_eq!(toward([0.0, 0.0], [3.0, 4.0], 10.0), [3.0, 4.0]);
+        assert_eq!(toward([0.0, 0.0], [3.0, 4.0], 2.5), [1.5, 2.0]);
+        assert_eq!(toward([1.0], [1.0], 0.0), [1.0]);
     }
 
     #[test]

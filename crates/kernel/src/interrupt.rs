@@ -105,7 +105,7 @@ impl Drop for Heeded {
     }
 }
 
-/// Unwinds a worker that would wait for another one for ever, without a message: the other one has
+/// Unwinds a worker that would wait for another one forever, without a message: the other one has
 /// printed the reason, if there is anything to print.
 pub(crate) fn desert() -> ! {
     resume_unwind(Box::new(Deserted))

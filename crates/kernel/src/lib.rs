@@ -7,7 +7,7 @@
 //!   join  : claims -> conflict groups │ barrier │   conflict.rs
 //!   act   : groups act                │ barrier │   workers.rs knows the threads
 //!
-//! Run<World>: the one simulation; Simulation: its face towards all other crates
+//! Run<World>: the one simulation; Simulation: its face toward all other crates
 //! ```
 //!
 //! Guarantees of the modules:

@@ -34,7 +34,7 @@ pub trait Simulation: Any + Send {
     /// Number of entities that act (robots, connectors of chains, airplanes).
     fn agents(&self) -> usize;
 
-    /// Whether nothing can happen anymore, e.g. because everybody has arrived; the run is then
+    /// Returns whether nothing can happen anymore, e.g. because everybody has arrived; the run is then
     /// complete before its planned number of cycles.
     fn is_over(&self) -> bool;
 

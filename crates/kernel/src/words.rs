@@ -8,9 +8,9 @@ pub type Lines = Vec<(String, String)>;
 /// A statement about a state: as JSON, and in words.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Said {
-    /// For machines.
+    /// The form for machines.
     pub json: Value,
-    /// For people; every line ends in a line feed.
+    /// The form for people; every line ends in a line feed.
     pub text: String,
 }
 

@@ -136,7 +136,7 @@ pub trait World: Phases<State: Send> + Send + 'static {
     /// Keeps rows of the state at the start of a cycle, if they are recorded.
     fn before_cycle(&self, _: &Self::State, _: &mut Self::Books, _: Cycle) {}
 
-    /// Whether nothing can happen anymore, e.g. because everybody has arrived; the run is then
+    /// Returns whether nothing can happen anymore, e.g. because everybody has arrived; the run is then
     /// complete before its planned number of cycles.
     fn is_over(&self, _: &Self::State) -> bool {
         false
@@ -239,7 +239,7 @@ pub trait World: Phases<State: Send> + Send + 'static {
         Err(OrderError::NobodyOutside { cause })
     }
 
-    /// Whether a recorded run keeps what is handed over.
+    /// Returns whether a recorded run keeps what is handed over.
     fn keeps_controls(&self, _: &Self::Books) -> bool {
         false
     }

@@ -18,14 +18,14 @@ pub trait Deployed: Send + Sync {
     /// Duration of a cycle, in seconds of the scenario.
     fn cycle_s(&self) -> f64;
 
-    /// Whether packets may be lost, delayed or doubled.
+    /// Returns whether packets may be lost, delayed or doubled.
     fn has_faults(&self) -> bool;
 
-    /// Returns the change of the scenario, as `key=value`, with which agents do not wait for ever for one that is gone
+    /// Returns the change of the scenario, as `key=value`, with which agents do not wait forever for one that is gone
     /// where time passes so many times as fast; none where they do not anyway.
     fn patience(&self, speed: f64) -> Option<String>;
 
-    /// Whether a fleet in lockstep waits for a node that is gone. Otherwise it ends.
+    /// Returns whether a fleet in lockstep waits for a node that is gone. Otherwise it ends.
     fn waits_for_lost(&self) -> bool {
         false
     }
@@ -39,7 +39,7 @@ pub trait Deployed: Send + Sync {
         0
     }
 
-    /// Whether the control of an agent counts that had come before its node was lost.
+    /// Returns whether the control of an agent counts that had come before its node was lost.
     fn heeds_lost(&self) -> bool {
         true
     }

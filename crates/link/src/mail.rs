@@ -80,7 +80,7 @@ impl Mail {
         &self.counts
     }
 
-    /// Whether all letters to another party have come, or it was not met.
+    /// Returns whether all letters to another party have come, or it was not met.
     pub fn has_delivered_to(&self, other: Party) -> bool {
         self.others.get(&other).is_none_or(|other| other.post.has_delivered())
     }
@@ -109,8 +109,8 @@ impl Mail {
         Some(self.now().saturating_sub(heard))
     }
 
-    /// Whether the straight way to another node is deaf: no letter comes there, and its end has left questions unanswered for
-    /// some time.
+    /// Returns whether the straight way to another node is deaf: no letter comes there, and its end has left
+    /// questions unanswered for some time.
     pub fn is_deaf(&mut self, member: &Member, within: Duration) -> bool {
         let other = self.others.get(&Party::Node(member.agent));
         let since = other.and_then(|other| other.post.waits_since());
@@ -126,7 +126,7 @@ impl Mail {
         self.wire.reopen()
     }
 
-    /// Whether all letters to all others have come.
+    /// Returns whether all letters to all others have come.
     pub fn has_delivered(&self) -> bool {
         self.others.values().all(|other| other.post.has_delivered())
     }

@@ -69,7 +69,7 @@ pub trait Program: Send {
     /// Takes the packets that it sends.
     fn take_packets(&mut self) -> Vec<Outgoing>;
 
-    /// Whether its control is there.
+    /// Returns whether its control is there.
     fn is_done(&self) -> bool;
 
     /// Returns its control, once it is there.

@@ -78,7 +78,7 @@ impl Post {
         self.next
     }
 
-    /// Whether a letter of the other is the next one: then it is taken.
+    /// Returns whether a letter of the other is the next one: then it is taken.
     pub(crate) fn takes(&mut self, number: u64, now: Duration) -> bool {
         let is_next = number == self.next;
         self.next += u64::from(is_next);
@@ -127,7 +127,7 @@ impl Post {
         self.again_at.into_iter().chain(self.acknowledge_at).min()
     }
 
-    /// Whether all letters have come.
+    /// Returns whether all letters have come.
     pub(crate) fn has_delivered(&self) -> bool {
         self.waiting.is_empty()
     }

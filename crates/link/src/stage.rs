@@ -56,7 +56,7 @@ impl Stage {
         self.journey.cycle()
     }
 
-    /// Whether there is no further cycle.
+    /// Returns whether there is no further cycle.
     pub fn is_over(&self) -> bool {
         self.run().is_over() || self.run().cycle() >= self.run().plan().cycles
     }

@@ -87,7 +87,7 @@ pub struct Rect {
 }
 
 impl Rect {
-    /// Whether the box in column `col` and row `row` is inside this rectangle.
+    /// Returns whether the box in column `col` and row `row` is inside this rectangle.
     pub fn contains(&self, col: u32, row: u32) -> bool {
         let inside = |at: u32, start: u32, length: u32| at >= start && at - start < length;
         inside(col, self.col, self.width) && inside(row, self.row, self.height)

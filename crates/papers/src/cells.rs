@@ -45,7 +45,7 @@ impl Run<'_> {
         100.0 * self.or_zero(metric) / self.or_zero("steps")
     }
 
-    /// Whether a metric is true, or above 0.
+    /// Returns whether a metric is true, or above 0.
     pub(crate) fn is(&self, metric: &str) -> bool {
         self.or_zero(metric) > 0.0
     }
@@ -318,12 +318,12 @@ impl Cell {
         }
     }
 
-    /// Whether the value is true.
+    /// Returns whether the value is true.
     pub(crate) fn is(&self, name: &str) -> bool {
         *self.value(name) == Value::Yes(true)
     }
 
-    /// Whether the value is this word.
+    /// Returns whether the value is this word.
     pub(crate) fn says(&self, name: &str, word: &str) -> bool {
         matches!(self.value(name), Value::Word(own) if own == word)
     }
@@ -336,7 +336,7 @@ impl Cell {
         }
     }
 
-    /// Whether it is true in all runs, of which there is at least one.
+    /// Returns whether it is true in all runs, of which there is at least one.
     pub(crate) fn in_all(&self, name: &str) -> bool {
         self.share(name).is_all()
     }
@@ -461,7 +461,7 @@ impl Share {
         Self { hits, n, interval: clopper_pearson(hits, n) }
     }
 
-    /// Whether it is all of one or more.
+    /// Returns whether it is all of one or more.
     pub(crate) fn is_all(&self) -> bool {
         self.n > 0 && self.hits == self.n
     }

@@ -231,7 +231,7 @@ fn resume_point(checkpoint: &Path) -> Result<ResumePoint, InputError> {
     read(checkpoint, |p| fs::read(p)).map(ResumePoint::Checkpoint)
 }
 
-/// Whether a folder holds a run, even if its manifest is damaged.
+/// Returns whether a folder holds a run, even if its manifest is damaged.
 fn is_run(path: &Path) -> bool {
     path.join(MANIFEST).is_file()
 }

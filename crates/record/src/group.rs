@@ -36,12 +36,12 @@ impl RowGroup {
         Ok(end)
     }
 
-    /// Whether the group must be written before it can take more rows.
+    /// Returns whether the group must be written before it can take more rows.
     pub(crate) fn is_full(&self) -> bool {
         self.rows == ROWS
     }
 
-    /// Whether the group has no rows.
+    /// Returns whether the group has no rows.
     pub(crate) fn is_empty(&self) -> bool {
         self.rows == 0
     }

@@ -17,7 +17,7 @@ pub(crate) const OF_SWEEP: &str = "sweep.json";
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// In progress, or its process was killed and could not record that.
+    /// The run is in progress, or its process was killed and could not record that.
     Running,
     /// Finished; every table is complete.
     Complete,

@@ -226,7 +226,7 @@ fn check_sealed(growing: &Path, cycle: u64) -> Result<(), RecordError> {
     Err(RecordError::new(last.display(), cause))
 }
 
-/// Whether a file is a part that is incomplete or starts at `cycle` or later. Other files are not
+/// Returns whether a file is a part that is incomplete or starts at `cycle` or later. Other files are not
 /// ours.
 fn is_stale(path: &Path, cycle: u64) -> bool {
     let Some(name) = path.file_name().and_then(|n| n.to_str()) else { return false };

@@ -182,7 +182,7 @@ impl Cycles {
         (self.from, self.to).contains(&cycle)
     }
 
-    /// Whether a cycle from `least` to `most` is in the range.
+    /// Returns whether a cycle from `least` to `most` is in the range.
     fn overlaps(self, least: u64, most: u64) -> bool {
         let starts_in_time = match self.from {
             Bound::Included(from) => most >= from,

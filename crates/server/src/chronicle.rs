@@ -16,7 +16,7 @@ const MOST_IN_FRAME: usize = 100;
 /// The events of one run.
 #[derive(Debug, Default)]
 pub(crate) struct Chronicle {
-    /// As the kernel tells them: most are never asked for, and those that are get their words then.
+    /// Entries as the kernel tells them: most are never asked for, and those that are get their words then.
     kept: Vec<Entry>,
     /// The cycle from which on nothing was computed yet.
     frontier: Cycle,

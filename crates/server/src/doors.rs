@@ -38,7 +38,7 @@ impl Doors {
         Some(Place { doors: self.clone(), peer })
     }
 
-    /// Whether there is no connection.
+    /// Returns whether there is no connection.
     pub(crate) fn is_empty(&self) -> bool {
         self.inside().is_empty()
     }

@@ -30,7 +30,7 @@ pub(crate) struct Files {
 /// A folder or a file that was named at start.
 #[derive(Debug)]
 struct Root {
-    /// As it was named.
+    /// The path as it was named.
     path: PathBuf,
     /// Its real place, links resolved.
     real: PathBuf,
@@ -99,14 +99,14 @@ impl Files {
     pub(crate) fn find(&self, path: &str) -> Result<PathBuf, Problem> {
         let found = PathBuf::from(path);
         // What is not there and what may not be read is told alike: a page learns nothing about the rest of the disk.
-        // A pipe or a device might keep whoever reads it waiting for ever.
+        // A pipe or a device might keep whoever reads it waiting forever.
         let is_plain = |real: &Path| real.is_file() || real.is_dir();
         let is_allowed =
             found.canonicalize().is_ok_and(|real| self.holds(&real) && is_plain(&real));
         if is_allowed { Ok(found) } else { Err(elsewhere(path)) }
     }
 
-    /// Whether a path without links is below the folders, or is named by a scenario that was named at start.
+    /// Returns whether a path without links is below the folders, or is named by a scenario that was named at start.
     pub(crate) fn holds(&self, real: &Path) -> bool {
         self.below_root(real).is_some() || self.granted.contains(real)
     }

@@ -126,7 +126,7 @@ impl Guard {
         format!("{COOKIE_NAME}{}", self.port)
     }
 
-    /// Whether a host may be this machine: a number, which nobody can bind anew, `localhost`, the name that was
+    /// Returns whether a host may be this machine: a number, which nobody can bind anew, `localhost`, the name that was
     /// given, or any name where a token is needed besides. Any port will do, as one may be forwarded.
     fn is_ours(&self, host: &str) -> bool {
         let name = match host.strip_prefix('[') {

@@ -84,7 +84,7 @@ impl House {
         self.sockets.clone().try_acquire_owned().ok()
     }
 
-    /// Whether there is no place for another socket.
+    /// Returns whether there is no place for another socket.
     pub(crate) fn is_full(&self) -> bool {
         self.sockets.available_permits() == 0
     }
@@ -99,7 +99,7 @@ impl House {
         ended(self.ending()).await;
     }
 
-    /// Waits until all sessions have ended, but not for ever.
+    /// Waits until all sessions have ended, but not forever.
     pub(crate) async fn emptied(&self) {
         let all = self.sessions.acquire_many(MOST_SESSIONS);
         let _ = tokio::time::timeout(PATIENCE, all).await;

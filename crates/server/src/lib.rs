@@ -160,17 +160,17 @@ impl Studio {
         if ip.is_unspecified() { listen::own_address(ip) } else { Some(ip) }
     }
 
-    /// Whether its address names this machine in a way that others cannot use.
+    /// Returns whether its address names this machine in a way that others cannot use.
     pub fn is_named_for_itself(&self) -> bool {
         self.ip().is_none_or(|ip| ip.is_loopback())
     }
 
-    /// Whether others than this machine can reach it.
+    /// Returns whether others than this machine can reach it.
     pub fn is_open_to_others(&self) -> bool {
         self.token.is_some()
     }
 
-    /// Whether it has ended by itself, which is a bug.
+    /// Returns whether it has ended by itself, which is a bug.
     pub fn has_ended(&self) -> bool {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }

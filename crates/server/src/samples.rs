@@ -20,7 +20,7 @@ pub(crate) struct Samples {
     meanings: &'static [Meaning],
     names: Vec<MetricName>,
     cycles: Vec<Cycle>,
-    /// For each metric, its value in each sample.
+    /// Values in each sample, metric by metric.
     values: Vec<Vec<Option<f64>>>,
     thinned: u32,
     spacing: Duration,
@@ -41,13 +41,13 @@ impl Samples {
         }
     }
 
-    /// Whether a sample of a cycle is wanted so long after the last one.
+    /// Returns whether a sample of a cycle is wanted so long after the last one.
     pub(crate) fn is_due(&self, cycle: Cycle, since: Duration) -> bool {
         let Some(&last) = self.cycles.last() else { return true };
         cycle > last && since >= self.spacing.max(self.took.saturating_mul(COST))
     }
 
-    /// Whether a cycle comes after all samples.
+    /// Returns whether a cycle comes after all samples.
     pub(crate) fn is_new(&self, cycle: Cycle) -> bool {
         self.cycles.last().is_none_or(|&last| cycle > last)
     }

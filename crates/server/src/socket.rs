@@ -84,7 +84,7 @@ async fn talk(socket: &mut WebSocket, mut desk: Desk, outbox: &Outbox) {
     }
 }
 
-/// Whether a further request may be taken in.
+/// Returns whether a further request may be taken in.
 fn has_room(outbox: &Outbox) -> bool {
     outbox.backlog() < MOST_BACKLOG && outbox.long_bytes() < MOST_LONG_BYTES
 }

@@ -6,7 +6,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use std::io::Write;
 
-/// Whether a browser takes gzip.
+/// Returns whether a browser takes gzip.
 pub(crate) fn is_taken(headers: &HeaderMap) -> bool {
     let said = headers.get_all(ACCEPT_ENCODING).iter().filter_map(|value| value.to_str().ok());
     let mut parts = said.flat_map(|all| all.split(','));

@@ -192,9 +192,9 @@ pub enum Told {
     Listens(Vec<String>),
     /// The fleet as it is now.
     Fleet(FleetNow),
-    /// To watchers: all that stays as it is.
+    /// The scenery for watchers: all that stays as it is.
     Scene(Box<Staged>),
-    /// To watchers: the world and the fleet as they are now.
+    /// The world and the fleet as they are now, for watchers.
     Seen(Box<Seen>),
     /// The fleet has come to its end, or was stopped.
     Ended {

@@ -99,7 +99,7 @@ impl Keep<'_> {
         Ok((recording(run)?, film))
     }
 
-    /// Whether the MCAP file is to be in the folder.
+    /// Returns whether the MCAP file is to be in the folder.
     fn is_film_in_folder(&self) -> bool {
         self.mcap.zip(self.folder).is_some_and(|((file, _), folder)| {
             whereabouts_of(file).starts_with(whereabouts_of(folder))
@@ -246,7 +246,7 @@ impl Journey {
         Ok(())
     }
 
-    /// Whether rows are kept in memory.
+    /// Returns whether rows are kept in memory.
     pub fn keeps_rows(&self) -> bool {
         self.rows.is_some()
     }

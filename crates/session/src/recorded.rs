@@ -65,7 +65,7 @@ fn as_csv(table: &Table) -> String {
     text
 }
 
-/// Whether some part of the table is complete: a run that was killed early has none.
+/// Returns whether some part of the table is complete: a run that was killed early has none.
 pub(crate) fn has_rows(folder: &Path, table: &str) -> bool {
     let is_part = |name: &std::ffi::OsStr| Path::new(name).extension() == Some("parquet".as_ref());
     [table.to_string(), format!("{table}.partial")].iter().any(|table| {

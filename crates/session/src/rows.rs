@@ -89,7 +89,8 @@ impl Rows {
         self.known.insert(mark_of(checkpoint, now), ahead);
     }
 
-    /// Whether all rows that stay are of the past of this checkpoint of cycle `of`, where the run stands at cycle `now`.
+    /// Returns whether all rows that stay are of the past of this checkpoint of cycle `of`, where the run stands at
+    /// cycle `now`.
     pub(crate) fn fits(&self, checkpoint: &[u8], of: Cycle, now: Cycle) -> bool {
         let none_stay = of <= self.begin || now == self.begin;
         none_stay || self.known.contains_key(&mark_of(checkpoint, of))

@@ -129,7 +129,7 @@ fn keep_apart(obstacles: &mut Obstacles<2>) {
             let Some(u) = unit(sub(to, from)) else { continue };
             let (va, vb) = (dot(discs[a].velocity_m_s, u), dot(discs[b].velocity_m_s, u));
             if apart_m < APART_M && va > vb {
-                // Each disc keeps its speed: the component towards the other is reversed.
+                // Each disc keeps its speed: the component toward the other is reversed.
                 if va > 0.0 {
                     discs[a].velocity_m_s = along(discs[a].velocity_m_s, u, -2.0 * va);
                 }

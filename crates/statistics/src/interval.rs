@@ -19,7 +19,7 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// Whether `value` lies inside or on an end.
+    /// Returns whether `value` lies inside or on an end.
     pub fn contains(&self, value: f64) -> bool {
         self.low <= value && value <= self.high
     }

@@ -60,7 +60,7 @@ pub(super) fn sum(terms: impl IntoIterator<Item = f64>) -> f64 {
     if lost.is_finite() { total + lost } else { total }
 }
 
-/// Whether all values are equal; true without values.
+/// Returns whether all values are equal; true without values.
 pub(super) fn is_constant(values: &[f64]) -> bool {
     values.windows(2).all(|pair| pair[0] == pair[1])
 }

@@ -7,7 +7,7 @@ use sidestep_kernel::math;
 /// A correlation with its 95 % confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Correlation {
-    /// From -1 to 1.
+    /// The correlation, from -1 to 1.
     pub value: f64,
     /// Its interval, by Fisher's transformation with the variance of Bonett and Wright (2000); absent
     /// with fewer than four pairs, or where the order is perfect.

@@ -7,7 +7,7 @@
 //! The interval then contains the true value a little less often than 95 % (Anscombe 1953; Chow and
 //! Robbins 1965: the loss vanishes as the target gets narrower, not before). Three rules keep it
 //! small: no look before [`StoppingRule::min_runs`], looks only at the ends of rounds, and rounds
-//! that grow by at least a half and at most double the number of runs, towards the number that the
+//! that grow by at least a half and at most double the number of runs, toward the number that the
 //! present spread predicts, so that there are few looks. Measured by the tests of this module over
 //! 4,000 sweeps each (standard error 0.4 %), nominal 95 %:
 //!

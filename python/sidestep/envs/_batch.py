@@ -93,7 +93,7 @@ class Batch:
         self._shape = (worlds, len(its))
         self._copy = copy
         self._reals = [space.name for space in its.observed if space.dtype == "float64"]
-        # What was observed before and after a step, in turns; and the same as it is returned.
+        # Observations before and after a step, in turns; and the same as they are returned.
         self._raw = [self.worlds.observe(self._number) for _ in range(2)]
         self._cast = [
             {name: np.zeros(raw[name].shape, np.float32) for name in self._reals} for raw in self._raw

@@ -43,7 +43,7 @@ def _done(before: Arrays, after: Arrays) -> NDArray[Any]:
 
 def _nearer(before: Arrays, after: Arrays) -> NDArray[Any]:
     was_m, is_m = (np.linalg.norm(seen["way_point_m"], axis=1) for seen in (before, after))
-    # Who has reached a way-point looks at the next one, which is as far as it happens to be.
+    # An airplane that has reached a way-point looks at the next one, which is as far as it happens to be.
     is_there = after["way_points_left"] < before["way_points_left"]
     # No way-point lies as far: an airplane that keeps a heading says so.
     has_one = (was_m < NO_WAY_POINT_M) & (is_m < NO_WAY_POINT_M) & _flies(before, after)
@@ -69,7 +69,7 @@ def _flies(before: Arrays, after: Arrays) -> NDArray[Any]:
 class Term:
     """A named term of a reward."""
 
-    #: What it counts.
+    #: The quantity that it counts.
     meaning: str
     #: Functions with the observations that each needs: the first counts for which there are all.
     forms: tuple[tuple[Reward, frozenset[str]], ...]

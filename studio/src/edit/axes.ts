@@ -9,7 +9,7 @@ export const AXIS_NAMES = ["x", "y", "z"] as const;
 
 /** Length of a handle where it lies across the view. */
 const LENGTH_PX = 60;
-/** How near its tip is taken hold of. */
+/** Greatest distance from its tip at which an axis is taken hold of. */
 const NEAR_PX = 11;
 /** An axis that points at the viewer has no length to drag along. */
 const LEAST_PX = 10;
@@ -44,7 +44,7 @@ export function axisAt(eye: Eye, at: Place, x_px: number, y_px: number): Axis | 
   return found?.axis ?? null;
 }
 
-/** How far a place goes along an axis when the pointer goes by so many pixels. */
+/** Returns the place to which one goes along an axis when the pointer goes by so many pixels. */
 export function along(eye: Eye, at: Place, axis: Axis, dx_px: number, dy_px: number): Place {
   const handle = handlesAt(eye, at).find((one) => one.axis === axis);
   const by: Place = [0, 0, 0];

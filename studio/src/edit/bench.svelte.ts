@@ -48,7 +48,7 @@ export class Bench {
     const has = (path: Path): boolean => valueAt(model, path) !== undefined;
     return obstacleTo(this.session.scene, this.board, { file: has(["map", "file"]), office: has(["map", "office"]), airplanes: has(["airplanes"]) });
   });
-  /** Whether the map of the picture can become a drawn one. */
+  /** Returns whether the map of the picture can become a drawn one. */
   readonly canTakeMap = $derived.by(() => {
     const { world, floor } = this.session.scene;
     return world === "robots" && this.board === null && this.draft.model !== null && floor !== null && floor.width * floor.height <= MOST_BOXES;
@@ -144,7 +144,7 @@ export class Bench {
     if (item) this.draft.open = item.path;
   }
 
-  /** What has become of an item by the changes before. */
+  /** Returns the item as the changes before have left it. */
   #now(item: Item): Item | undefined {
     return this.items.find(({ path }) => isSame(path, item.path));
   }
@@ -212,7 +212,7 @@ export class Bench {
     return bySize;
   }
 
-  /** What is at a place, in words. */
+  /** Describes a place in words. */
   wordsAt(to: Place): string {
     const { ground, board } = this;
     const meters = (axis: string, value: number): string => `${axis} ${value.toPrecision(4)} m`;

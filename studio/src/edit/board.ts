@@ -57,7 +57,7 @@ export class Board {
   }
 }
 
-/** How boxes of the scenario lie in the world. */
+/** The placement of a scenario's boxes in the world. */
 export interface Ground {
   box_m: number;
   width: number;

@@ -1,4 +1,4 @@
-/** What can be written at a place of a text: keys of its section, or values of its key. */
+/** Completions at a place of a text: keys of its section, or values of its key. */
 
 import { keyOf, partsOf, valueAt, isTable, type Path, type Table } from "./keypath";
 import { wordsOf, defaultOf, type World } from "./schema";
@@ -6,7 +6,7 @@ import { wordsOf, defaultOf, type World } from "./schema";
 export interface Option {
   label: string;
   words: string;
-  /** What stands after a key that is chosen. */
+  /** The kind of completion, which decides what is written after it. */
   kind: "key" | "value" | "section";
 }
 
@@ -44,7 +44,7 @@ function opened(line: string): Within {
   return { path: [...partsOf(key[1]!), ...inner.path], rest: inner.rest, isValue: inner.isValue };
 }
 
-/** Of a value that is not finished: the way into its innermost open table. */
+/** Returns the way into the innermost open table of a value that is not finished. */
 function inValue(value: string): Within {
   const ways: { path: string[]; from: number }[] = [];
   let quote = false;
@@ -65,7 +65,7 @@ function inValue(value: string): Within {
   return deeper ? { path: [...path, deeper[1]!], rest: deeper[2]!, isValue: true } : { path, rest: rest.trimStart(), isValue: false };
 }
 
-/** Where the innermost bracket that is still open stands. */
+/** Returns the offset of the innermost bracket that is still open. */
 function lastOpen(value: string): number {
   const open: number[] = [];
   [...value].forEach((letter, i) => {
@@ -75,7 +75,7 @@ function lastOpen(value: string): number {
   return open.at(-1) ?? -1;
 }
 
-/** What can stand at a place of the text. */
+/** Returns the completions at a place of the text. */
 export function completionAt(text: string, at: number, world: World, model: Table | null): Completion | null {
   const start = text.lastIndexOf("\n", at - 1) + 1;
   const line = text.slice(start, at);

@@ -8,7 +8,7 @@ export interface DiffLine {
 /** Beyond so many pairs of lines that may match, the middle is told as replaced in whole. */
 const MOST_PAIRS = 4_000_000;
 
-/** What both texts have, what only the first, and what only the second. */
+/** Returns the lines that both texts have, those of only the first, and those of only the second. */
 export function differences(mine: string, theirs: string): DiffLine[] {
   const [a, b] = [mine.split("\n"), theirs.split("\n")];
   let head = 0;

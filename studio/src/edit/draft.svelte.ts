@@ -20,7 +20,7 @@ export class Draft {
   place = $state("");
   isLocked = $state(false);
   phase = $state<Phase>("loading");
-  /** Why nothing could be asked, if so. */
+  /** The reason why nothing could be asked, if so. */
   failure = $state.raw<Problem | null>(null);
   problems = $state.raw<Problem[]>([]);
   /** The tables of the last text that could be read. */
@@ -28,7 +28,7 @@ export class Draft {
   world = $state.raw<World | null>(null);
   canUndo = $state(false);
   canRedo = $state(false);
-  /** What is chosen on the canvas and shown in the forms. */
+  /** The item chosen on the canvas and shown in the forms. */
   chosen = $state.raw<Path | null>(null);
   /** The text of the file, where it was changed by somebody else. */
   theirs = $state<string | null>(null);
@@ -44,9 +44,9 @@ export class Draft {
   #asked = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #queue: Promise<unknown> = Promise.resolve();
-  /** Where it was saved, if elsewhere than where it came from. */
+  /** The file that it was saved to, if not the one that it came from. */
   #file: string | null = null;
-  /** Where it was to be saved when the file there was found to be another's. */
+  /** The file that it was to be saved to when that was found to be another's. */
   #wanted: string | null = null;
   /** The text that runs now. */
   #running = "";
@@ -64,7 +64,7 @@ export class Draft {
     return this.problems.filter((problem) => !problem.is_warning);
   }
 
-  /** Whether another text runs than this one. */
+  /** Returns whether another text runs than this one. */
   get differsFromRun(): boolean {
     return this.text !== this.#running;
   }

@@ -21,7 +21,7 @@ export function folderOf(place: string, first: string): string {
   return place.includes("/") ? place.replace(/\/[^/]*$/, "") || "/" : first;
 }
 
-/** Whether a scenario of a world can name a file. */
+/** Returns whether a scenario of a world can name a file. */
 export function isNameable(world: string, { kind, name }: FileEntry): boolean {
   if (world === "robots") return kind === "profile" || (kind === "map" && !name.endsWith(".world"));
   return world === "chain" && kind === "map" && /\.(yaml|yml|world)$/i.test(name);

@@ -57,7 +57,7 @@ export function settled(model: Json | undefined, key: string): string[] {
   return kept;
 }
 
-/** Whether a path lies at or below another. */
+/** Returns whether a path lies at or below another. */
 export function isWithin(path: Path, of: Path): boolean {
   return path.length >= of.length && of.every((part, i) => String(part) === String(path[i]));
 }

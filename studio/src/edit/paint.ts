@@ -24,12 +24,12 @@ export interface Sketch {
   /** Boxes that a stroke would draw, and with what. */
   cells: readonly Cell[];
   mark: Mark | null;
-  /** From press to release, where that is more than boxes. */
+  /** The stroke from press to release, where it is more than boxes. */
   stroke: readonly [Place, Place] | null;
   shape: "circle" | "line" | "box" | null;
-  /** Where the dragged item would come to stand. */
+  /** The dragged item, and how far it would be moved. */
   shifted: { item: Item; by: Place } | null;
-  /** Where the handles of the axes stand, in space. */
+  /** The place of the handles of the axes, in space. */
   axesAt: Place | null;
   cursor: Place | null;
 }
@@ -263,7 +263,7 @@ function holds(corners: readonly [number, number][], x: number, y: number): bool
   return isInside;
 }
 
-/** Whether a point lies on a line, within a few pixels. */
+/** Returns whether a point lies on a line, within a few pixels. */
 function isBeside(points: readonly [number, number][], isClosed: boolean, x: number, y: number): boolean {
   return points.some(([x1, y1], i) => {
     if (i === 0 && !isClosed) return false;

@@ -1,4 +1,4 @@
-/** What a world's schema says of a key: its type, limits, unit, choices and meaning. */
+/** A world's schema of a key: its type, limits, unit, choices and meaning. */
 
 import { isTable, valueAt, type Json, type Path, type Table } from "./keypath";
 
@@ -10,7 +10,7 @@ export interface Choice {
   words: string;
 }
 
-/** What can stand at a key. */
+/** The kinds of values that a key can have. */
 export type Shape =
   | { kind: "number"; isWhole: boolean; least: number | null; most: number | null }
   | { kind: "choice"; choices: Choice[] }
@@ -103,7 +103,7 @@ export class World {
     return [...new Set(all)];
   }
 
-  /** What a table has under names of one's own, if it may have any. */
+  /** Returns the schema of a table's members under names of one's own, if it may have any. */
   namedOf(schema: Schema): Schema | null {
     for (const one of this.#alternatives(this.resolved(schema))) {
       if (isTable(one["additionalProperties"])) return this.resolved(one["additionalProperties"]);
@@ -111,7 +111,7 @@ export class World {
     return null;
   }
 
-  /** What can stand there; between alternatives the present value decides. */
+  /** Returns the shape of values that can stand there; between alternatives the present value decides. */
   shapeOf(given: Schema, value: Json | undefined): Shape {
     const schema = this.resolved(given);
     const choices = choicesOf(schema);

@@ -1,4 +1,4 @@
-/** From what stands in a field to the value of a key, and to the edits that make it so. */
+/** Conversion of a field's text to the value of a key, and to the edits that make it so. */
 
 import type { Edit } from "../protocol";
 import { isTable, keyOf, valueAt, type Json, type Path, type Table } from "./keypath";
@@ -37,7 +37,7 @@ export function readAny(text: string): Read {
   }
 }
 
-/** How a value stands in a field. */
+/** Returns a value as a field shows it. */
 export function shownValue(value: Json | undefined, shape: Shape): string {
   if (value === undefined || value === null) return "";
   if (typeof value === "string" && shape.kind !== "any") return value;
@@ -82,7 +82,7 @@ export function sumOf(values: readonly number[]): number {
   return Number(values.reduce((sum, value) => sum + value, 0).toPrecision(12));
 }
 
-/** Whether a row counts as one that sums to 1. */
+/** Returns whether a row counts as one that sums to 1. */
 export function isWhole(sum: number): boolean {
   return Math.abs(sum - 1) < 1e-9;
 }
@@ -105,7 +105,7 @@ function usualColumns(path: Path, count: number): string[] | null {
   return /_m(_s)?$/.test(key) && count <= 3 ? ["x", "y", "z"].slice(0, count) : null;
 }
 
-/** What the columns of a row stand for, as its neighbors in the section tell. */
+/** Returns the meanings of the columns of a row, as its neighbors in the section tell. */
 export function columnsOf(model: Table | null, path: Path, count: number): string[] {
   const usual = usualColumns(path, count);
   if (usual) return usual;
@@ -117,7 +117,7 @@ export function columnsOf(model: Table | null, path: Path, count: number): strin
   return Array.from({ length: count }, (_, i) => String(i + 1));
 }
 
-/** Whether the rows at a path are probabilities. */
+/** Returns whether the rows at a path are probabilities. */
 export function areShares(path: Path): boolean {
   return path.some((part) => /confusion|transitions/.test(String(part)));
 }

@@ -42,7 +42,7 @@ export interface EditorHooks {
   changed(text: string): void;
   undo(): void;
   redo(): void;
-  /** What is known of the world's keys, once it is. */
+  /** The world's keys, once they are known. */
   knows(): { world: World; model: Table | null } | null;
 }
 
@@ -137,7 +137,7 @@ export class Editor {
     this.#view.dispatch(setDiagnostics(this.#view.state, found));
   }
 
-  /** Where a line and a column are; both count from 1, columns in letters. */
+  /** Returns the offset of a line and a column; both count from 1, columns in letters. */
   #offset(line: number, column: number): number {
     const { doc } = this.#view.state;
     const at = doc.line(Math.min(doc.lines, Math.max(1, line)));

@@ -1,4 +1,4 @@
-/** Who hears whom in a fleet. */
+/** Links of a fleet: pairs that hear each other. */
 
 import { whoKey } from "../format";
 import type { Fleet, Node, Who } from "../protocol";
@@ -30,7 +30,7 @@ export function linksOf(fleet: Fleet, selected: number | null): Link[] {
   return links;
 }
 
-/** What people call the state of a node: it is there, late, or not. */
+/** People's words for the state of a node: it is there, late, or not. */
 export type Health = "well" | "late" | "away";
 
 /** Seconds without a sign of a node after which it is told as late. */

@@ -2,7 +2,7 @@
 
 import type { Fact, Table } from "../protocol";
 
-/** What is the same in every row, as facts, and the table without it. A table of one row stays as it is. */
+/** Returns columns of one value as facts, and the table without them. A table of one row stays as it is. */
 export function lifted({ columns, rows }: Table): Table & { same: Fact[] } {
   const [first, ...others] = rows;
   if (!first || others.length === 0) return { same: [], columns, rows };

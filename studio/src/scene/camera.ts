@@ -25,7 +25,7 @@ export interface Eye {
   readonly middle: Place;
   /** The place at a point of the canvas; in space that one of them which is as far away as another place. */
   under(x_px: number, y_px: number, as: Place): Place;
-  /** Where a place appears: x and y in pixels, and whether in front. */
+  /** Returns the x and y in pixels at which a place appears, and whether it is in front. */
   project(x: number, y: number, z: number): [number, number, boolean];
 }
 

@@ -15,7 +15,7 @@ const CLICK_PX = 4;
 
 export function attach(canvas: HTMLElement, hand: Hand): () => void {
   const fingers = new Map<number, [number, number]>();
-  let travelled = 0;
+  let traveled = 0;
   const at = (event: MouseEvent): [number, number] => {
     const box = canvas.getBoundingClientRect();
     return [event.clientX - box.left, event.clientY - box.top];
@@ -23,7 +23,7 @@ export function attach(canvas: HTMLElement, hand: Hand): () => void {
 
   const down = (event: PointerEvent): void => {
     canvas.setPointerCapture(event.pointerId);
-    if (fingers.size === 0) travelled = 0;
+    if (fingers.size === 0) traveled = 0;
     fingers.set(event.pointerId, at(event));
   };
   const move = (event: PointerEvent): void => {
@@ -31,9 +31,9 @@ export function attach(canvas: HTMLElement, hand: Hand): () => void {
     const before = fingers.get(event.pointerId);
     if (!before) return hand.hover(...now);
     const [dx, dy] = [now[0] - before[0], now[1] - before[1]];
-    travelled += Math.hypot(dx, dy);
+    traveled += Math.hypot(dx, dy);
     if (fingers.size === 2) pinch(event.pointerId, before, now);
-    else if (travelled >= CLICK_PX) drag(event, dx, dy);
+    else if (traveled >= CLICK_PX) drag(event, dx, dy);
     fingers.set(event.pointerId, now);
   };
   const drag = (event: PointerEvent, dx: number, dy: number): void => {
@@ -55,7 +55,7 @@ export function attach(canvas: HTMLElement, hand: Hand): () => void {
   };
   const up = (event: PointerEvent): void => {
     const wasDown = fingers.delete(event.pointerId);
-    if (wasDown && event.type === "pointerup" && travelled < CLICK_PX && event.button === 0) hand.click(...at(event));
+    if (wasDown && event.type === "pointerup" && traveled < CLICK_PX && event.button === 0) hand.click(...at(event));
   };
   const wheel = (event: WheelEvent): void => {
     event.preventDefault();

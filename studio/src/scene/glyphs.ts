@@ -4,7 +4,7 @@ import { material } from "./material";
 import type { Palette } from "./palette";
 import { CORNER, Quads } from "./quads";
 
-/** What a quad shows. */
+/** Shapes of a quad. */
 export const DISC = 0;
 export const BOX = 1;
 export const DART = 2;
@@ -74,7 +74,7 @@ void main() {
   if (inside <= 0.0) discard;
   float least = min(extent.x, extent.y);
   vec3 body = ink.rgb;
-  // A rim where there is room for one, and a tick towards the front of agents.
+  // A rim where there is room for one, and a tick toward the front of agents.
   float rim = clamp(d + 1.6, 0.0, 1.0) * smoothstep(3.0, 5.0, least);
   body = mix(body, edge, rim * 0.6);
   if (agent > 0.5 && kind < 1.5) {

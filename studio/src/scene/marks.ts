@@ -1,4 +1,4 @@
-/** What is drawn over the scene for the selected body: marks of its inspection, and its beams. */
+/** Drawings over the scene for the selected body: marks of its inspection, and its beams. */
 
 import { BufferGeometry, DoubleSide, Float32BufferAttribute, Mesh, ShapeUtils, Vector2 } from "three";
 import type { Mark, Place, Role, Scan } from "../protocol";
@@ -6,7 +6,7 @@ import { material } from "./material";
 import { ROLES, visible, word, type Palette, type Rgb } from "./palette";
 import type { Strokes } from "./strokes";
 
-/** How opaque a mark of this weight is. */
+/** Returns the opacity of a mark of this weight. */
 function alphaOf(weight: number): number {
   return 0.25 + 0.7 * Math.min(1, Math.max(0, weight));
 }

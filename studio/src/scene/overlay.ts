@@ -8,7 +8,7 @@ import { css, type Palette } from "./palette";
 export interface Label {
   x_px: number;
   y_px: number;
-  /** Of the body, so that the words stand beside it. */
+  /** Radius of the body, so that the words stand beside it. */
   radius_px: number;
   words: string;
   /** Selected and hovered bodies are ringed. */

@@ -4,7 +4,7 @@ import type { Look, Role } from "../protocol";
 
 export type Rgb = [number, number, number];
 
-/** What the canvas takes from the page's theme. */
+/** Colors that the canvas takes from the page's theme. */
 export interface Palette {
   isDark: boolean;
   background: Rgb;
@@ -76,7 +76,7 @@ export function word([r, g, b]: Rgb, alpha: number): number {
   return ((Math.round(alpha * 255) << 24) | (b << 16) | (g << 8) | r) >>> 0;
 }
 
-/** How a mark of each role is drawn. Colors are Okabe and Ito's; roles that share one differ by dashes. */
+/** The look of a mark of each role. Colors are Okabe and Ito's; roles that share one differ by dashes. */
 export const ROLES: Record<Role, { words: string; color: Rgb; dashed: boolean }> = {
   true: { words: "as it is", color: [0, 158, 115], dashed: false },
   reported: { words: "as reported", color: [230, 159, 0], dashed: true },

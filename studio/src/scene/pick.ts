@@ -1,4 +1,4 @@
-/** Which agent is under the pointer. */
+/** Search for the agent under the pointer. */
 
 import type { Frame } from "../decode";
 import type { Bodies } from "../state/cast";

@@ -6,7 +6,7 @@
 import { BufferAttribute, BufferGeometry, DynamicDrawUsage, Mesh, type RawShaderMaterial } from "three";
 import type { Column } from "./instances";
 
-/** For vertex shaders: the corner of the quad, from -0.5 to 0.5 each way. */
+/** Source for vertex shaders: the corner of the quad, from -0.5 to 0.5 each way. */
 export const CORNER = `
 vec2 corner() { return vec2(float(gl_VertexID & 1), float((gl_VertexID >> 1) & 1)) - 0.5; }
 `;

@@ -29,13 +29,13 @@ export interface Painter {
   dispose(): void;
 }
 
-/** What the page chose to see. */
+/** Choices of the page: what it shows. */
 export interface Choices {
   selected: Who | null;
   inspection: Inspection | null;
   trails: TrailChoice;
   widthIsTrue: boolean;
-  /** Who hears whom, in a fleet; by the bodies' indices. */
+  /** Pairs that hear each other in a fleet, by the bodies' indices. */
   links: readonly Link[];
 }
 
@@ -50,13 +50,13 @@ function rendererOf(canvas: HTMLCanvasElement, isSpace: boolean): WebGLRenderer 
   return new WebGLRenderer({ canvas, context, ...wanted });
 }
 
-/** What draws a scene's bodies, and its floor. */
+/** Returns the painter of a scene's bodies, and its floor. */
 function layersOf(scene: Scene): [Painter, FloorLayer | null] {
   const painter = scene.dimensions === 2 ? new PlanePainter(scene) : new SpacePainter(scene);
   return [painter, scene.floor ? new FloorLayer(scene.floor) : null];
 }
 
-/** Whether two scenes can be looked at from the same place. */
+/** Returns whether two scenes can be looked at from the same place. */
 function isAlike(a: Scene, b: Scene): boolean {
   const measure = ({ world, floor }: Scene): string => JSON.stringify([world, floor?.width, floor?.height, floor?.box_m, floor?.origin_m]);
   return measure(a) === measure(b);
@@ -213,7 +213,7 @@ export class Stage {
     this.changed();
   }
 
-  /** Whether the camera stands where somebody has put it. */
+  /** Returns whether the camera stands where somebody has put it. */
   get isMoved(): boolean {
     return this.#isFitted && !this.#isWhole;
   }
@@ -249,7 +249,7 @@ export class Stage {
     return new Promise((then) => canvas.toBlob(then, "image/png"));
   }
 
-  /** Where a body appears, for tests and for keeping it in sight. */
+  /** Returns the place where a body appears, for tests and for keeping it in sight. */
   placeOf(index: number): Place | null {
     const frame = this.#frame;
     if (!frame) return null;
@@ -331,7 +331,7 @@ export class Stage {
     return this.#choices.trails === "selected" && index !== undefined ? [index] : [];
   }
 
-  /** A trail fades towards its old end. */
+  /** A trail fades toward its old end. */
   #drawTrail(bodies: Bodies, trails: Trails, index: number): void {
     const { cast } = bodies;
     const way = trails.of(index);

@@ -1,4 +1,4 @@
-/** Where bodies have been: a ring of places for each, kept by the page. */
+/** Trails of bodies: a ring of past places for each, kept by the page. */
 
 /** Places that are kept of all bodies together, and of one. */
 const MOST_PLACES = 240_000;

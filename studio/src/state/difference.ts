@@ -1,4 +1,4 @@
-/** Where two runs part: the first cycle in which their states differ, and the bodies of which the frames tell it. */
+/** The difference of two runs: the first cycle in which their states differ, and the bodies that differ then. */
 
 import type { Frame } from "../decode";
 import type { Who } from "../protocol";

@@ -18,7 +18,7 @@ function keyOf(event: Event): string {
 }
 
 export class Events {
-  /** In the order of cycles. */
+  /** Events in the order of cycles. */
   list = $state.raw<Event[]>([]);
   /** Kinds that have occurred, with how often. */
   kinds = $state.raw<Map<string, number>>(new Map());

@@ -7,7 +7,7 @@ export class Metrics {
   /** Cycles of the samples, and a column for each metric; replaced when samples come. */
   cycles = $state.raw<number[]>([]);
   columns = $state.raw<(number | null)[][]>([]);
-  /** How often the server halved the number of samples, which renumbers them. */
+  /** The number of times that the server halved the number of samples, which renumbers them. */
   #thinned = 0;
   #isAsking = false;
   #age = 0;

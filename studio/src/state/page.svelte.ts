@@ -1,4 +1,4 @@
-/** What the page as such chose: theme, width, open panels. */
+/** Choices of the page as such: theme, width, open panels. */
 
 import type { Center } from "./center";
 
@@ -36,7 +36,7 @@ class Page {
   inspector_px = $state(Math.min(720, Math.max(220, Number(kept("inspector") ?? 330))));
   /** The panel below the canvas on narrow screens. */
   tab = $state<"agents" | "events" | "inspector" | "charts">("agents");
-  /** What the center is to show, of sessions that have it (`centerOf`). */
+  /** The view that the center is to show, of sessions that have it (`centerOf`). */
   center = $state<Center>("view");
   /** Whether the picture is drawn upon. */
   edits = $state(false);

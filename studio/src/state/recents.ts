@@ -1,4 +1,4 @@
-/** What was opened before, kept by the browser. */
+/** Subjects opened before, kept by the browser. */
 
 import type { Subject } from "../protocol";
 

@@ -18,7 +18,7 @@ type DistributiveOmit<T, K extends PropertyKey> = T extends unknown ? Omit<T, K>
 /** A call to a session, which adds its own number. */
 type OwnCall = DistributiveOmit<Extract<Call, { session: number }>, "session">;
 
-/** How the session talks to its surroundings. */
+/** The session's line to its surroundings. */
 export interface Line {
   ask(call: Call): Promise<Answer>;
   problem(problem: Problem): void;
@@ -46,7 +46,7 @@ export class Session {
   scene = $state.raw<Scene>() as Scene;
   status = $state.raw<Status>() as Status;
   bodies = $state.raw<Bodies | null>(null);
-  /** How fast it plays, when it plays. */
+  /** Its speed when it plays. */
   speed = $state.raw<Speed>({ times: 1 });
   /** Cycle, time and count of left-out frames of what is shown. */
   shown = $state.raw({ cycle: 0, time_s: 0, leftOut: 0 });
@@ -83,10 +83,10 @@ export class Session {
   readonly #missed = new Missed();
   /** Counts what the page asked of the run: a way that was given up for something newer is no problem. */
   #orders = 0;
-  /** Who waits for a state or a frame. */
+  /** Promises that wait for a state or a frame. */
   readonly #waiting = new Waiting();
   #regrantTimer: ReturnType<typeof setTimeout> | null = null;
-  /** Where it was when the connection was lost, until it is there again. */
+  /** The state at which the connection was lost, until it is there again. */
   #kept: { cycle: number; isPlaying: boolean; seed: number | null } | null = null;
 
   constructor(subject: Subject, line: Line) {
@@ -143,7 +143,7 @@ export class Session {
     this.starts++;
   }
 
-  /** Whether it is a fleet that flies elsewhere: it is watched, and nothing is asked of it. */
+  /** Returns whether it is a fleet that flies elsewhere: it is watched, and nothing is asked of it. */
   get isFleet(): boolean {
     return this.subject.kind === "fleet";
   }
@@ -163,7 +163,7 @@ export class Session {
     return this.status.state === "playing";
   }
 
-  /** Whether it goes on or back by itself. */
+  /** Returns whether it goes on or back by itself. */
   get isMoving(): boolean {
     return this.isPlaying || this.#rewind.isOn;
   }
@@ -178,7 +178,7 @@ export class Session {
     return Number.isFinite(planned) && planned !== null && planned > 0 ? planned : Math.max(100, this.status.cycle);
   }
 
-  /** Who hears whom in a fleet, by the indices of bodies; of the selected agent alone where one is. */
+  /** Pairs that hear each other in a fleet, by the indices of bodies; of the selected agent alone where one is. */
   get links(): Link[] {
     const { bodies, selected } = this;
     const { fleet } = this.status;

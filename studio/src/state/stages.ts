@@ -6,7 +6,7 @@ import type { Stage } from "../scene/stage";
 
 export const stages = new Map<number, Stage>();
 
-/** Where each session was looked at from last, so that a new start or a visit to another tab changes no view. */
+/** The last viewpoint of each session, so that a new start or a visit to another tab changes no view. */
 const eyes = new Map<number, { eye: Eye; of: string }>();
 
 /** Scenes that differ here need another view. */

@@ -19,7 +19,7 @@ export interface Banner {
   isBad: boolean;
 }
 
-/** What a studio needs besides sockets: how it stands with the server. */
+/** The surroundings that a studio needs besides sockets: its standing with the server. */
 export interface Around extends Surroundings {
   standing(): Promise<Standing>;
 }
@@ -298,7 +298,7 @@ export class Studio {
     });
   }
 
-  /** How the page stood with the server when it was asked last. */
+  /** The page's standing with the server when it was asked last. */
   #standing: Standing = "silent";
 
   /** Opens all sessions again, brings each to the cycle where it was, and plays those that played. */

@@ -1,4 +1,4 @@
-/** Who waits for something to be so: told whenever it may be, and let go when it cannot come any more. */
+/** Promises that wait for something to be so: told whenever it may be, and let go when it cannot come any more. */
 
 export class Waiting {
   /** Each says whether it has what it waits for. */

@@ -21,7 +21,7 @@ function server_mb(): number {
   return Number(/VmRSS:\s+(\d+) kB/.exec(status)![1]) / 1e3;
 }
 
-/** What is in use of the page's heap, garbage aside. */
+/** Returns how much of the page's heap is in use, garbage aside. */
 async function page_mb(client: CDPSession): Promise<number> {
   await client.send("HeapProfiler.collectGarbage");
   const { metrics } = await client.send("Performance.getMetrics");

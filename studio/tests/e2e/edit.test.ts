@@ -137,7 +137,7 @@ describe("the canvas", () => {
     expect(await edited(3)).toEqual({ op: "remove", key: "robots.0" });
   });
 
-  /** Where the chosen thing and the tips of its axes are on the screen, once that is not what it was before. */
+  /** Returns the points of the chosen thing and of the tips of its axes, once they are not what they were before. */
   async function axes(before = ""): Promise<[number, number][]> {
     const layer = page.locator("canvas.layer");
     await page.waitForFunction((before) => {

@@ -1,4 +1,4 @@
-/** What a person can do with the page, in a real browser, against a server of made-up worlds. */
+/** A person's use of the page, in a real browser, against a server of made-up worlds. */
 
 import { readFileSync } from "node:fs";
 import type { Browser, Page } from "playwright-core";

@@ -5,9 +5,9 @@ import { basename, join } from "node:path";
 import { gzipSync } from "node:zlib";
 import { expect, test } from "vitest";
 
-/** What is fetched before anything is seen. */
+/** Greatest size of all that is fetched before anything is seen. */
 const MOST_FIRST = 300_000;
-/** What the editor adds, with the text view. */
+/** Greatest size of what the editor adds, with the text view. */
 const MOST_LATER = 220_000;
 
 const html = readFileSync("dist/index.html", "utf8");

@@ -1,4 +1,4 @@
-/** What a server does for the editor: a little of it, on tables instead of the text, so comments go. */
+/** A server's part of the editor: a little of it, on tables instead of the text, so comments go. */
 
 import { parse, stringify } from "smol-toml";
 import { isTable, partsOf, type Json, type Table } from "../../src/edit/keypath";

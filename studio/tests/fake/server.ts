@@ -128,11 +128,11 @@ class Run {
 export class FakeServer {
   readonly calls: Call[] = [];
   port = 0;
-  /** What the command line would have asked to open. */
+  /** Subjects that the command line would have asked to open. */
   open: Subject[] = [];
   /** The text that a file would have by now, if somebody else had changed it. */
   theirs: string | null = null;
-  /** What the way in answers; anything but 204 refuses sockets, too. */
+  /** The answer of the way in; anything but 204 refuses sockets, too. */
   entrance = 204;
   readonly #dist: string;
   #http: Server | null = null;

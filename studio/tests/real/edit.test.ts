@@ -1,4 +1,4 @@
-/** What is drawn, filled in and typed is what the program runs and writes. SIDESTEP_BINARY names the program. */
+/** The program runs and writes what is drawn, filled in and typed. SIDESTEP_BINARY names the program. */
 
 import { copyFileSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";

@@ -1,4 +1,4 @@
-/** Who hears whom in a fleet, and how its nodes are. */
+/** Links and health of a fleet's nodes. */
 
 import { describe, expect, test } from "vitest";
 import { fleetWords, healthOf, linksOf, nodeOf } from "../../src/fleet/links";

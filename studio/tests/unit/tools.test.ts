@@ -179,7 +179,7 @@ describe("airplanes", () => {
     expect(items[0]!.turn!()).toEqual([{ op: "set", key: "airplanes.0.heading_deg", value: 90 }]);
   });
 
-  test("fly from where the drag began to where it ended, counter-clockwise from east", () => {
+  test("fly from where the drag began to where it ended, counterclockwise from east", () => {
     expect(headingTo([0, 0, 0], [0, 10, 0])).toBe(90);
     expect(headingTo([0, 0, 0], [-10, 0, 0])).toBe(180);
     expect(putAirplane([0, 0, 0], [0, 3000.4, 0], 20)).toEqual([{ op: "insert", key: "airplanes", at: null, value: { at_m: [0, 0], heading_deg: 90, way_points_m: [[0, 3000]] } }]);

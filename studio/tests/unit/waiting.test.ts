@@ -1,4 +1,4 @@
-/** Who waits is told when it is so, at once if it is so already, and never hangs. */
+/** Waiting promises are told when it is so, at once if it is so already, and never hang. */
 
 import { expect, test } from "vitest";
 import { Waiting } from "../../src/state/waiting";

@@ -58,7 +58,7 @@ fn placed(member: &Member) -> impl Iterator<Item = (&Source, &Place)> {
 struct Graph<'a> {
     /// File of every module, inline modules included.
     files: HashMap<Vec<String>, &'a Path>,
-    /// By module and name: the path that the name stands for.
+    /// The path that each name stands for, by module and name.
     imports: HashMap<(Vec<String>, String), Vec<String>>,
     /// Every path that a file names, with the module that names it.
     named: Vec<(&'a Place, &'a Path, Vec<Named>)>,

@@ -44,7 +44,7 @@ map: /tf:map:base_link. The scanner's place on the robot is read from /tf_static
 CSV columns: true, reported (one word each; `nothing` for no observation), and true_distance_m, \
 reported_distance_m, or true_class, reported_class.";
 
-/// As they would be made, but in lines that fit.
+/// Usage as it would be made, but in lines that fit.
 const SENSOR_USAGE: &str = "\
 sidestep learn sensor [OPTIONS]
            <--mrclam <DIR>|--bag <PATH>|--csv <FILE>|--run <DIR>>";

@@ -42,7 +42,7 @@ pub(crate) struct ManyArgs {
 }
 
 impl ManyArgs {
-    /// Whether an option asks for many runs.
+    /// Returns whether an option asks for many runs.
     pub(crate) fn is_asked(&self) -> bool {
         self.replicate.is_some() || !self.vary.is_empty() || self.until.is_some()
     }

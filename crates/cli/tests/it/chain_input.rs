@@ -44,7 +44,7 @@ fn refused(place: &Place, name: &str, more: &[&str]) -> String {
     told
 }
 
-/// Whether a text starts with `file:LINE:COLUMN: `.
+/// Returns whether a text starts with `file:LINE:COLUMN: `.
 fn has_position(err: &str, file: &str) -> bool {
     let Some((_, rest)) = err.split_once(&format!("{file}:")) else { return false };
     let mut parts = rest.splitn(3, ':');

@@ -10,7 +10,7 @@ use std::process::Child;
 const RING: &str = "format = 1\nworld = \"airspace\"\nseed = 5\ncycles = 12\n[airspace]\n\
     deployment = \"compact-team\"\n[airspace.generator]\nkind = \"superconflict\"\nn = 3\n";
 
-/// Whether the program of fleets is there: the tests of its own crate build it beside `sidestep`.
+/// Returns whether the program of fleets is there: the tests of its own crate build it beside `sidestep`.
 pub(crate) fn is_there() -> bool {
     let beside = Path::new(env!("CARGO_BIN_EXE_sidestep")).with_file_name("sidestep-link");
     if !beside.is_file() {

@@ -78,7 +78,7 @@ fn a_wrong_scenario_is_refused_where_it_is_wrong() {
     }
 }
 
-/// Whether a text starts with `file:LINE:COLUMN: `.
+/// Returns whether a text starts with `file:LINE:COLUMN: `.
 fn has_position(err: &str, file: &str) -> bool {
     let Some((_, rest)) = err.split_once(&format!("{file}:")) else { return false };
     let mut parts = rest.splitn(3, ':');

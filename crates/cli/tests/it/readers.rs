@@ -46,7 +46,7 @@ kind = "superconflict"
 n = 6
 "#;
 
-/// Whether the modules are here; says why not, or fails where they must be.
+/// Returns whether the modules are here; says why not, or fails where they must be.
 pub(crate) fn has(modules: &str) -> bool {
     let tried = Command::new(python()).args(["-c", &format!("import {modules}")]).output();
     let said = match tried {
@@ -90,7 +90,7 @@ fn check(run: &Value, read: &Value, cycles: u64) {
     assert_eq!(metadata["frames"], (cycles + 1).to_string());
     assert_eq!(metadata["seed"], run["seed"].to_string());
     let frames: Vec<u64> = (0..=cycles).collect();
-    assert_eq!(read["cycles"], json!(frames), "a frame for the begin of each cycle, and the end");
+    assert_eq!(read["cycles"], json!(frames), "a frame for the start of each cycle, and the end");
     for (topic, schema) in [("/scene", "SceneUpdate"), ("/tf", "FrameTransforms")] {
         let expected = json!({ "schema": format!("foxglove.{schema}"), "messages": cycles + 1 });
         assert_eq!(read["topics"][topic], expected);

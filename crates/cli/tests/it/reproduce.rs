@@ -69,7 +69,7 @@ fn a_rehearsal_of_the_serpentine_experiments_leaves_a_whole_report() {
     assert!(as_told == again && rising != falling, "a head sorts up, down, and as it was");
 }
 
-/// Whether the program that carries the network is there or not.
+/// Returns whether the program that carries the network is there or not.
 #[test]
 fn a_rehearsal_of_the_airspace_experiments_measures_over_sockets_or_says_how_to() {
     let place = Place::new();

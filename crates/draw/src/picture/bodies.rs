@@ -128,7 +128,7 @@ fn draw_part(
     }
 }
 
-/// Whether a body is an obstacle of which there may be thousands.
+/// Returns whether a body is an obstacle of which there may be thousands.
 fn is_ball(body: &Body) -> bool {
     body.kind == Kind::Obstacle && matches!(body.shape, Shape::Sphere { .. })
 }
@@ -180,7 +180,7 @@ fn fill(scene: &Scene<'_>, canvas: &Canvas, body: &Body) -> (Color, f64) {
 }
 
 impl Scene<'_> {
-    /// Whether others have a trail and this body has none.
+    /// Returns whether others have a trail and this body has none.
     fn is_beside_trails(&self, body: &Body) -> bool {
         !self.trails.is_empty() && self.trails.iter().all(|trail| trail.of.1 != body.number)
     }
@@ -216,7 +216,7 @@ fn rim(canvas: &Canvas, body: &Body, color: Color) -> String {
     }
 }
 
-/// Whether a part of an agent in space is thick enough for a seam.
+/// Returns whether a part of an agent in space is thick enough for a seam.
 fn is_seamed(canvas: &Canvas, body: &Body) -> bool {
     let thickness_m = match body.shape {
         Shape::Sphere { radius_m } => 2.0 * radius_m,
@@ -312,7 +312,7 @@ pub(super) fn draw_marks(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
     }
 }
 
-/// Whether a body leads the others.
+/// Returns whether a body leads the others.
 pub(super) fn leads(body: &Body) -> bool {
     body.state == Condition::Leading
 }

@@ -123,7 +123,7 @@ fn corners(points: &[Point]) -> Vec<Point> {
     kept
 }
 
-/// Whether the way from `a` over `b` to `c` is straight and does not turn back.
+/// Returns whether the way from `a` over `b` to `c` is straight and does not turn back.
 fn goes_on(a: Point, b: Point, c: Point) -> bool {
     let step = |from: Point, to: Point| (i128::from(to.0 - from.0), i128::from(to.1 - from.1));
     let ((ax, ay), (bx, by)) = (step(a, b), step(b, c));

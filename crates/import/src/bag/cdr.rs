@@ -228,7 +228,7 @@ mod tests {
         Sample { flag: 7, value: 0.5, name: "ab".into(), list: vec![1.0, 2.0], pair: [3.0, 4.0] }
     }
 
-    /// As the example of the standard: values begin at multiples of their size.
+    /// The example of the standard: values begin at multiples of their size.
     const LITTLE: [u8; 60] = [
         0, 1, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xe0, 0x3f, 3, 0, 0, 0, b'a', b'b',
         0, 0, 2, 0, 0, 0, 0, 0, 0x80, 0x3f, 0, 0, 0, 0x40, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 8, 0x40,

@@ -493,13 +493,13 @@ fn count(counts: &mut BTreeMap<String, u64>, name: String) {
     *counts.entry(name).or_default() += 1;
 }
 
-/// Whether a command affects the display only: a name of the list, or zooming with `+` and `-`.
+/// Returns whether a command affects the display only: a name of the list, or zooming with `+` and `-`.
 fn is_display(name: &str) -> bool {
     let is_zoom = !name.is_empty() && name.chars().all(|c| "+-=".contains(c));
     is_zoom || DISPLAY_COMMANDS.contains(&name)
 }
 
-/// Whether the first word is a command, not an aircraft.
+/// Returns whether the first word is a command, not an aircraft.
 fn is_command(name: &str) -> bool {
     const OTHERS: [&str; 12] = [
         "ASAS", "CDMETHOD", "CRE", "CREATE", "DEFWPT", "DTLOOK", "NOISE", "RESO", "SYN", "WIND",

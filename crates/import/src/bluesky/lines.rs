@@ -1,4 +1,4 @@
-//! From the text of a scenario to time-stamped commands with their words.
+//! Time-stamped commands with their words, read from the text of a scenario.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -22,7 +22,7 @@ const BLANKS: [char; 2] = [' ', '\t'];
 pub(super) struct Command<'a> {
     /// Seconds since the start of the scenario.
     pub(super) time_s: f64,
-    /// At least one. An argument that is left out is an empty word.
+    /// Words, at least one. An argument that is left out is an empty word.
     pub(super) words: Vec<Word<'a>>,
 }
 
@@ -30,7 +30,7 @@ pub(super) struct Command<'a> {
 #[derive(Debug, Default)]
 pub(super) struct Line<'a> {
     text: Cow<'a, str>,
-    /// For each physical line the index of its first byte in `text` and its number, from 1.
+    /// The index in `text` of the first byte of each physical line, and its number, from 1.
     pieces: Vec<(usize, usize)>,
 }
 

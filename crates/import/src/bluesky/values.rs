@@ -96,7 +96,7 @@ const MAX_MACH: f64 = 20.0;
 /// Separators of degrees, minutes and seconds.
 const DEGREE_SIGNS: [char; 3] = ['\'', '"', '°'];
 
-/// Whether a word is meant as a latitude and not as a name, because names have other letters.
+/// Returns whether a word is meant as a latitude and not as a name, because names have other letters.
 pub(super) fn is_latitude(word: &str) -> bool {
     let is_sign = |c: char| c.is_ascii_digit() || DEGREE_SIGNS.contains(&c) || "+-.".contains(c);
     // The exponent's letter stands between digits, that of the hemisphere at an end.

@@ -102,7 +102,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Whether `value` is in the range, up to the rounding of a printed value.
+    /// Returns whether `value` is in the range, up to the rounding of a printed value.
     pub fn contain(&self, value: f64) -> bool {
         const SLACK: f64 = 1e-9;
         (self.lower - SLACK..=self.upper + SLACK).contains(&value)
@@ -121,7 +121,7 @@ pub struct Mimic {
 }
 
 impl JointKind {
-    /// Whether a single value determines the position of the child.
+    /// Returns whether a single value determines the position of the child.
     pub fn has_one_value(self) -> bool {
         matches!(self, Self::Revolute | Self::Continuous | Self::Prismatic)
     }

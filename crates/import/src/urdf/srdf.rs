@@ -239,7 +239,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Whether a joint exists in the SRDF only, and places the robot in the world.
+    /// Returns whether a joint exists in the SRDF only, and places the robot in the world.
     fn is_virtual(&self, joint: Element<'a>) -> bool {
         let name = |e: Element<'a>| e.attribute("name").map(|value| value.text());
         self.robot.children("virtual_joint").any(|v| name(v).is_some() && name(v) == name(joint))

@@ -27,7 +27,7 @@ impl Names {
     }
 }
 
-/// Whether following the mimicry from `joint` never ends.
+/// Returns whether following the mimicry from `joint` never ends.
 pub(super) fn mimics_in_a_circle(joints: &[Joint], joint: usize) -> bool {
     let mut next = joint;
     for _ in 0..=joints.len() {

@@ -66,7 +66,7 @@ impl OrderBook {
         self.entries.insert(at, Entry { cycle, order: orders.order.into(), agents, values });
     }
 
-    /// Whether it has no orders.
+    /// Returns whether it has no orders.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
@@ -101,7 +101,7 @@ impl OrderBook {
 }
 
 impl Entry {
-    /// Whether further orders can be joined with it: the same one, with as many values an agent.
+    /// Returns whether further orders can be joined with it: the same one, with as many values an agent.
     fn goes_on_with(&self, cycle: Cycle, orders: &Orders<'_>) -> bool {
         let width = |agents: usize, values: usize| values.checked_div(agents);
         let (agents, values) = (self.agents.len(), self.values.len());

@@ -6,7 +6,7 @@ use crate::units::EntityId;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OrderError {
-    /// To an agent that is not there, or a body that is no agent.
+    /// The agent is not there, or the body is no agent.
     #[error("there is no {who} that can be ordered; {}", known(noun, *last))]
     NoAgent {
         /// The agent.
@@ -16,7 +16,7 @@ pub enum OrderError {
         /// The last agent that is there.
         last: Option<EntityId>,
     },
-    /// To an agent that decides for itself.
+    /// The agent decides for itself.
     #[error(
         "{who} decides for itself; let the scenario say that it is decided from outside (`external`)"
     )]

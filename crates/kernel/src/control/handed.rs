@@ -60,7 +60,7 @@ impl ControlBook {
         self.cycles.entry(cycle).or_default().extend(controls);
     }
 
-    /// Whether no cycle in it was decided outside.
+    /// Returns whether no cycle in it was decided outside.
     pub fn is_empty(&self) -> bool {
         self.cycles.is_empty()
     }

@@ -57,7 +57,7 @@ impl Space {
         self.shape.iter().product()
     }
 
-    /// Whether its values are whole numbers.
+    /// Returns whether its values are whole numbers.
     pub fn is_whole(&self) -> bool {
         !matches!(self.bounds, Bounds::Real { .. })
     }
@@ -117,7 +117,7 @@ impl CellsMut<'_> {
         }
     }
 
-    /// Whether there is no room at all.
+    /// Returns whether there is no room at all.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

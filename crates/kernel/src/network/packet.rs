@@ -167,21 +167,21 @@ pub fn open<T: Topic>(bytes: &[u8], fingerprint: u64) -> Result<(Seal<T>, &[u8])
 pub enum Refusal {
     /// Too short, or without the first bytes of a packet.
     NoPacket,
-    /// Of another version of this form.
+    /// The packet is of another version of this form.
     Version,
     /// Its checksum is wrong.
     Damaged,
-    /// Of another scenario or build.
+    /// The packet is of another scenario or build.
     Fingerprint,
     /// Larger than any message of its talk.
     TooLarge,
-    /// From one that is not in the group, or in the name of another one.
+    /// The sender is not in the group, or gives another one's name.
     Sender,
-    /// Of a talk that is over for all.
+    /// The talk is over for all.
     Stale,
-    /// Of a talk with other members.
+    /// The talk has other members.
     OtherGroup,
-    /// Of a talk that comes later, of which nothing more can be kept.
+    /// The talk comes later, and nothing more of it can be kept.
     NoRoom,
     /// Its message cannot be read.
     Unreadable,

@@ -111,7 +111,7 @@ impl MemoryRecorder {
         }
     }
 
-    /// Whether [`Recorder::finish`] was called.
+    /// Returns whether [`Recorder::finish`] was called.
     pub fn is_finished(&self) -> bool {
         self.finished
     }

@@ -62,7 +62,7 @@ pub struct MemoryTransport {
     streams: Streams,
     purpose: Purpose,
     faults: Faults,
-    /// By receiver, then by the cycle of arrival.
+    /// Envelopes by receiver, then by the cycle of arrival.
     waiting: BTreeMap<(EntityId, Cycle), Vec<Envelope>>,
     /// Messages sent.
     pub messages: u64,

@@ -27,7 +27,7 @@ pub trait BoxWord: Word + Eq + BitAnd<Output = Self> {
     fn standing(slot: Slot) -> Self;
     /// Nothing stands here; the body in `slot` claims it.
     fn claimed(slot: Slot) -> Self;
-    /// Whether nothing stands here.
+    /// Returns whether nothing stands here.
     fn is_free(self) -> bool;
     /// The slot of the body that stands here or claims it; an invalid slot for a wall or an
     /// unclaimed box.
@@ -65,9 +65,9 @@ box_word! { u32 }
 /// The boxes of a grid, row by row; match once, then work on one of the columns.
 #[derive(Debug, Clone)]
 pub enum Floor {
-    /// For up to 32,767 bodies.
+    /// Indices of up to 32,767 bodies.
     Narrow(Column<u16>),
-    /// For more bodies.
+    /// Indices of more bodies.
     Wide(Column<u32>),
 }
 

@@ -12,7 +12,7 @@ impl Marks {
         Self((0..boxes.div_ceil(64)).map(|_| AtomicU64::new(0)).collect())
     }
 
-    /// Whether a box is marked.
+    /// Returns whether a box is marked.
     #[inline]
     pub fn contains(&self, index: usize) -> bool {
         self.0[index / 64].load(Relaxed) >> (index % 64) & 1 == 1

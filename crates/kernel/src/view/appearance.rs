@@ -30,7 +30,7 @@ pub const ALERT: Color = [0xD0, 0x10, 0x10];
 pub struct Appearance {
     /// Its color.
     pub color: Color,
-    /// From 0 (fully transparent) to 1 (opaque).
+    /// Opacity, from 0 (fully transparent) to 1 (opaque).
     pub opacity: f64,
     /// The drawing order: seen from above, higher layers cover lower ones.
     pub layer: u8,

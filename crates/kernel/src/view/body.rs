@@ -66,7 +66,7 @@ impl Body {
         Self { velocity_m_s, ..self }
     }
 
-    /// Whether it has a velocity.
+    /// Returns whether it has a velocity.
     pub fn moves(&self) -> bool {
         self.velocity_m_s != [0.0; 3]
     }
@@ -144,7 +144,7 @@ impl Kind {
         }
     }
 
-    /// Whether it is an agent: the subject of a table of trajectories.
+    /// Returns whether it is an agent: the subject of a table of trajectories.
     pub fn is_agent(self) -> bool {
         matches!(self, Self::Robot | Self::Connector | Self::Airplane)
     }
@@ -166,7 +166,7 @@ pub enum Condition {
     Leading,
     /// Open (doors).
     Open,
-    /// In contact with something, or too close to another agent.
+    /// The body touches something, or is too close to another agent.
     Touching,
     /// Out of order.
     Failed,
@@ -219,7 +219,7 @@ pub enum Shape {
     },
     /// An arrowhead along its first axis.
     Dart {
-        /// From tail to tip, in meters.
+        /// Length from tail to tip, in meters.
         length_m: f64,
         /// Width, in meters.
         width_m: f64,

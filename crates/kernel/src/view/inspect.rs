@@ -81,7 +81,7 @@ pub struct Mark {
     pub role: Role,
     /// Words for it.
     pub label: String,
-    /// From 0 to 1: how likely, how strong; 1 where that means nothing.
+    /// Likelihood or strength, from 0 to 1; 1 where that means nothing.
     pub weight: f64,
     /// Its shape.
     pub shape: MarkShape,

@@ -104,7 +104,7 @@ impl Waiting {
             self.crew = None;
         }
         if !is_here && let Some(lost) = self.crew.take() {
-            // The threads belong to the parent: its locks may be held in this copy for ever.
+            // The threads belong to the parent: its locks may be held in this copy forever.
             std::mem::forget(lost);
         }
         let workers = self.workers;

@@ -13,9 +13,9 @@ use std::time::{Duration, Instant};
 enum Time {
     /// None passes: packets arrive as they come, and nobody asks for any again.
     Still,
-    /// In ticks that the server counts.
+    /// Ticks that the server counts.
     Counted,
-    /// By a clock that runs so many times as fast as others.
+    /// A clock that runs so many times as fast as others.
     Running(f64),
 }
 
@@ -127,7 +127,7 @@ impl Turn {
         self.arrived.entry(arrives).or_default().push((from, packet));
     }
 
-    /// Returns how long nothing is to do, unless something comes; none if that may be for ever.
+    /// Returns how long nothing is to do, unless something comes; none if that may be forever.
     pub(super) fn wait(&self, program: &dyn Program) -> Option<Duration> {
         let Time::Running(speed) = self.time else { return None };
         let leaves = self.leaving.keys().next().map(|&(at, ..)| at);

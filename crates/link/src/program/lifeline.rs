@@ -40,7 +40,7 @@ impl Lifeline {
         });
     }
 
-    /// Whether it has ended.
+    /// Returns whether it has ended.
     pub(super) fn has_ended(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }

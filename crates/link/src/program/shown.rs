@@ -27,7 +27,7 @@ impl Shown {
         Self { window, number: 0, frame: None, events: Vec::new() }
     }
 
-    /// Whether somebody watches who has no frame of this cycle.
+    /// Returns whether somebody watches who has no frame of this cycle.
     pub(super) fn wants_frame(&self, cycle: Cycle) -> bool {
         self.frame.as_ref().is_none_or(|frame| frame.cycle != cycle) && self.window.is_watched()
     }
@@ -50,7 +50,7 @@ impl Shown {
         self.window.show(self.number, json(&seen));
     }
 
-    /// Whether somebody watches.
+    /// Returns whether somebody watches.
     pub(super) fn is_watched(&self) -> bool {
         self.window.is_watched()
     }

@@ -32,7 +32,7 @@ impl Server<'_> {
         self.advance()
     }
 
-    /// Whether all of a group have sent their controls, or one is gone: then others may wait for it for ever.
+    /// Returns whether all of a group have sent their controls, or one is gone: then others may wait for it forever.
     pub(super) fn has_decided(&self, group: &Group) -> bool {
         let has_lost = group.iter().any(|&agent| self.is_gone(agent));
         has_lost || group.iter().all(|&agent| self.has_control(agent))

@@ -10,22 +10,22 @@ use std::time::Duration;
 pub const SILENT: Duration = Duration::from_secs(1);
 
 impl Server<'_> {
-    /// Whether nothing was heard of a node that is there for longer than some time.
+    /// Returns whether nothing was heard of a node that is there for longer than some time.
     pub(super) fn is_silent(&self, agent: EntityId, time: Duration) -> bool {
         self.mail.silent_for(Party::Node(agent)).is_some_and(|silent| silent > time)
     }
 
-    /// Whether the node of an agent is gone.
+    /// Returns whether the node of an agent is gone.
     pub(super) fn is_gone(&self, agent: EntityId) -> bool {
         self.seats.get(&agent).is_none_or(|seat| seat.life().is_none())
     }
 
-    /// Whether the fleet is in lockstep.
+    /// Returns whether the fleet is in lockstep.
     fn is_in_lockstep(&self) -> bool {
         self.terms.welcome.clock == Clock::Lockstep
     }
 
-    /// Whether the fleet goes on with a node that is back after all had begun.
+    /// Returns whether the fleet goes on with a node that is back after all had begun.
     pub(super) fn takes_back(&self) -> bool {
         !self.is_in_lockstep() || self.stage.world().waits_for_lost()
     }

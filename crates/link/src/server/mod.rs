@@ -100,7 +100,7 @@ pub trait Attendant {
     /// with its sender.
     fn take_packets(&mut self, _: Vec<(EntityId, Logged)>) {}
 
-    /// Whether somebody watches who has no frame of this cycle yet.
+    /// Returns whether somebody watches who has no frame of this cycle yet.
     fn wants_frame(&self, _: Cycle) -> bool {
         false
     }
@@ -119,7 +119,7 @@ pub struct Tally {
     pub talked: Histogram,
     /// Time in which the world went on by one cycle.
     pub advanced: Histogram,
-    /// In real time: by how much later than due a cycle began.
+    /// Lateness of cycles: the time between when one was due and when it began, in real time.
     pub late: Histogram,
     /// Number of cycles that began later than a tenth of their length.
     pub late_cycles: u64,

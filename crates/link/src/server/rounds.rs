@@ -31,7 +31,7 @@ impl Server<'_> {
         }
     }
 
-    /// Whether an agent has sent its control.
+    /// Returns whether an agent has sent its control.
     pub(super) fn has_control(&self, agent: EntityId) -> bool {
         self.seats.get(&agent).is_some_and(|seat| seat.control.is_some())
     }

@@ -97,7 +97,7 @@ impl Server<'_> {
         while talks.iter().any(|talk| !talk.is_over) {
             self.hear(LOOK)?;
             for talk in &mut talks {
-                // Others may wait for ever for one that is gone.
+                // Others may wait forever for one that is gone.
                 talk.is_over |= talk.courses.keys().any(|&agent| self.is_gone(agent));
             }
             for (agent, report) in std::mem::take(&mut self.ticked) {

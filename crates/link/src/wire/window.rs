@@ -90,7 +90,7 @@ impl Window {
         Ok(Self { pane, _answers: answers, _session: session })
     }
 
-    /// Whether somebody has asked a short while ago.
+    /// Returns whether somebody has asked a short while ago.
     pub fn is_watched(&self) -> bool {
         locked(&self.pane).asked.is_some_and(|asked| asked.elapsed() < WATCHED)
     }

@@ -199,7 +199,7 @@ impl Line {
         put(&self.session, key, frame, None);
     }
 
-    /// Whether there is a link to another node that shows signs of life, whatever else comes through.
+    /// Returns whether there is a link to another node that shows signs of life, whatever else comes through.
     fn is_open_to(&self, member: &Member) -> bool {
         let is_it = |id: zenoh::session::ZenohId| {
             u128::from_le_bytes(id.to_le_bytes()) & NAME == name(member)

@@ -30,7 +30,7 @@ impl FlowField {
     ///
     /// # Panics
     /// When `size` is 0.
-    pub fn towards(free: &FreeSpace, size: u32, goals: &[(u32, u32)]) -> Self {
+    pub fn toward(free: &FreeSpace, size: u32, goals: &[(u32, u32)]) -> Self {
         Self::descending(&Distances::to_nearest(free, size, goals))
     }
 
@@ -65,12 +65,12 @@ impl FlowField {
         Some([0, 1, -1][usize::from((3 + there - here) % 3)])
     }
 
-    /// Whether the box is one of the goals.
+    /// Returns whether the box is one of the goals.
     pub fn is_goal(&self, col: u32, row: u32) -> bool {
         self.code(col, row) == Some(GOAL)
     }
 
-    /// Whether a path leads from the box to a goal; a goal reaches itself.
+    /// Returns whether a path leads from the box to a goal; a goal reaches itself.
     pub fn reaches_goal(&self, col: u32, row: u32) -> bool {
         self.code(col, row).is_some_and(|code| code != UNREACHED)
     }
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn of_equal_ways_the_lowest_direction_is_taken() {
-        let field = FlowField::towards(&open(3, 3), 1, &[(1, 1)]);
+        let field = FlowField::toward(&open(3, 3), 1, &[(1, 1)]);
         let row = |row| [0, 1, 2].map(|col| field.direction(col, row));
         assert_eq!(row(0), [Some(0), Some(1), Some(1)]);
         assert_eq!(row(1), [Some(0), None, Some(2)]);
@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn goals_unreachable_boxes_and_the_outside_have_no_direction() {
         let free = FreeSpace::new(4, 1, |col, _| col != 2);
-        let field = FlowField::towards(&free, 1, &[(1, 0), (2, 0)]);
+        let field = FlowField::toward(&free, 1, &[(1, 0), (2, 0)]);
         assert!(field.is_goal(1, 0) && field.reaches_goal(1, 0) && field.reaches_goal(0, 0));
         assert!(!field.is_goal(2, 0) && !field.reaches_goal(2, 0) && !field.reaches_goal(3, 0));
         let directions = [0, 1, 2, 3, 4].map(|col| field.direction(col, 0));
@@ -160,7 +160,7 @@ mod tests {
             let is_wall = |col, row| walls.iter().all(|w| w.rotate_right(row * 15 + col) & 1 == 1);
             let free = FreeSpace::new(width, height, |col, row| !is_wall(col, row));
             let distances = Distances::to_nearest(&free, size, &goals);
-            let field = FlowField::towards(&free, size, &goals);
+            let field = FlowField::toward(&free, size, &goals);
             let anchors = free.anchors(size);
             for (col, row) in (0..width).flat_map(|col| (0..height).map(move |row| (col, row))) {
                 let (mut at, mut steps) = ((col, row), 0);

@@ -41,7 +41,7 @@ impl FreeSpace {
         self.height
     }
 
-    /// Whether the box is free; a box outside the grid is not.
+    /// Returns whether the box is free; a box outside the grid is not.
     pub fn is_free(&self, col: u32, row: u32) -> bool {
         col < self.width && row < self.height && self.has(self.index(col, row))
     }
@@ -94,7 +94,7 @@ impl FreeSpace {
         self.width as usize * self.height as usize
     }
 
-    /// Whether the box at `index` is free.
+    /// Returns whether the box at `index` is free.
     pub(super) fn has(&self, index: usize) -> bool {
         self.bits[index / 64] >> (index % 64) & 1 == 1
     }

@@ -41,7 +41,7 @@ pub enum Sockets {
         /// The reason, and how to get them.
         reason: String,
     },
-    /// By number of airplanes, and then by deployment.
+    /// Cases by number of airplanes, and then by deployment.
     Measured(Vec<Case>),
 }
 
@@ -52,9 +52,9 @@ pub struct Case {
     pub airplanes: usize,
     /// The deployment.
     pub deployment: &'static str,
-    /// By seed, in one process.
+    /// Runs by seed, in one process.
     pub alone: Vec<Measured>,
-    /// By seed, over sockets.
+    /// Runs by seed, over sockets.
     pub over_sockets: Vec<Measured>,
 }
 

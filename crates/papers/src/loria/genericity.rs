@@ -73,7 +73,7 @@ impl Genericity {
     pub(super) fn table(&self) -> Table {
         let note = format!(
             "Mean [95 % interval] over seeds, runs of {} cycles; sensors and effectors \
-             unreliable, medium floor, behaviour `avoid`. Only `size` and `sensors` of the \
+             unreliable, medium floor, behavior `avoid`. Only `size` and `sensors` of the \
              scenario differ. Trips are those completed: where they are few, long ones are missing. Bodies of 4 and 5 \
              boxes jam in corridors of 12 boxes.",
             self.cycles

@@ -125,7 +125,7 @@ impl Performance {
         })
     }
 
-    /// Whether every number of workers, recorded or not, gives one digest.
+    /// Returns whether every number of workers, recorded or not, gives one digest.
     pub(super) fn is_deterministic(&self) -> bool {
         self.digests.iter().all(|(_, digest)| *digest == self.recorded_digest)
     }
@@ -141,7 +141,7 @@ impl Performance {
         self.timings.iter().filter(move |t| t.workers == most && t.recorded == recorded)
     }
 
-    /// Whether the machine itself gave less than this share of the workers' worth: then other
+    /// Returns whether the machine itself gave less than this share of the workers' worth: then other
     /// processes were using it, and times mean little.
     pub(super) fn was_busy(&self) -> bool {
         const SHARE: f64 = 0.85;

@@ -393,7 +393,7 @@ fn names(key: Key<'_>) -> [String; 3] {
     [key.floor.into(), key.rule.name().into(), key.mind.name().into()]
 }
 
-/// Whether two tables err alike under a regime.
+/// Returns whether two tables err alike under a regime.
 fn same_errors(a: Tables, b: Tables, regime: Regime) -> bool {
     match (a, b, regime) {
         (Tables::Equal(e, _, m), Tables::Equal(f, _, n), Regime::Effectors) => (e, m) == (f, n),

@@ -105,7 +105,7 @@ impl Strategies {
         Self { loads, trials }
     }
 
-    /// Whether every trial has kept the laws and every robot has acted.
+    /// Returns whether every trial has kept the laws and every robot has acted.
     #[cfg(test)]
     pub(super) fn all_valid(&self) -> bool {
         self.trials.iter().all(|trial| trial.valid && trial.complete)

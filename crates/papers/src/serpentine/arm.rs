@@ -101,8 +101,8 @@ fn target(arm: &SerialChain, draws: &mut Draws) -> Point<3> {
     }
 }
 
-/// Whether the arm is clear of itself: connectors of those two and more away, and of rods beyond their neighbors; the
-/// only two of its four rods that may touch are clear of each other with their ends.
+/// Returns whether the arm is clear of itself: connectors of those two and more away, and of rods beyond their
+/// neighbors; the only two of its four rods that may touch are clear of each other with their ends.
 fn is_apart(places: &[Point<3>]) -> bool {
     let away_m = |a: [Point<3>; 2], b: [Point<3>; 2]| between_segments(a, b).distance_m;
     let connector = |c: usize| [places[c]; 2];

@@ -71,7 +71,7 @@ pub(super) const FASTEST: Column =
 pub(super) const ROD_VIOLATION: Column =
     column("rod_violation_m", "", |r| Value::Number(r.most("max_rod_violation_m")));
 
-/// Whether the leader's nearest wall is in the slides' band.
+/// Returns whether the leader's nearest wall is in the slides' band.
 fn is_in_band(run: &dyn Simulation) -> bool {
     let run = known::<ChainRun<2>>(run);
     let leader = run.state().body(0).chain.points()[0];

@@ -29,7 +29,7 @@ const MOTIONS: usize = 400;
 pub(super) struct Initiators {
     /// Motions that every connector of a free chain started, and that were made.
     pub(super) moved: Share,
-    /// Of these, motions of a connector in the middle after which each half is where it would be
+    /// The share of motions of a connector in the middle after which each half is where it would be
     /// as a chain of its own, to the bit.
     pub(super) halves_alike: Share,
     /// Motions of a chain with a fixed base to which the base objected, as fixed.
@@ -135,7 +135,7 @@ fn seen(seed: u64) -> Result<Seen, InputError> {
     Ok(seen)
 }
 
-/// Whether a motion is vetoed by the expected connector, for the expected reason.
+/// Returns whether a motion is vetoed by the expected connector, for the expected reason.
 fn objects(
     chain: &mut Chain<3>,
     (k, to): (usize, Point<3>),

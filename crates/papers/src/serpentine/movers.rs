@@ -43,7 +43,7 @@ const COLUMNS: Columns = Columns {
     ],
 };
 
-/// Whether the leader wanders, or rests.
+/// Returns whether the leader wanders, or rests.
 fn moves(case: &Variant) -> bool {
     let task = case.value("chains.tasks").and_then(|tasks| tasks.get(0));
     task.and_then(|task| task.get("kind")).is_some_and(|kind| kind.as_str() == Some("wander"))

@@ -55,9 +55,9 @@ pub(super) struct Far {
 /// All timings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Scaling {
-    /// By number of connectors.
+    /// Sizes by number of connectors.
     pub(super) sizes: Vec<Size>,
-    /// By number of far balls.
+    /// Runs by number of far balls.
     pub(super) far: Vec<Far>,
 }
 

@@ -77,7 +77,7 @@ fn creeping(plan: &Plan) -> Result<Scene, InputError> {
     })
 }
 
-/// Whether a ball is near to one of these places; always true for other bodies.
+/// Returns whether a ball is near to one of these places; always true for other bodies.
 fn is_near(body: &Body, places: &[Place]) -> bool {
     let (Kind::Obstacle, Shape::Sphere { radius_m }) = (body.kind, &body.shape) else {
         return true;

@@ -115,7 +115,7 @@ impl LiveServer {
         self.handle.as_ref().map_or(0, WebSocketServerHandle::port)
     }
 
-    /// Whether somebody watches.
+    /// Returns whether somebody watches.
     pub fn is_watched(&self) -> bool {
         self.handle.as_ref().is_some_and(|handle| handle.client_count() > 0)
     }

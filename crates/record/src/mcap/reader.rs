@@ -18,7 +18,7 @@ use crate::manifest::Status;
 /// The first bytes of every MCAP file.
 const MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', 0x30, b'\r', b'\n'];
 
-/// Whether a file starts like an MCAP file.
+/// Returns whether a file starts like an MCAP file.
 pub fn is_mcap(path: &Path) -> bool {
     let mut begin = [0; MAGIC.len()];
     File::open(path).and_then(|mut file| file.read_exact(&mut begin)).is_ok() && begin == MAGIC

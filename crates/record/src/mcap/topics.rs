@@ -22,7 +22,7 @@ pub(super) trait Sink {
         message: &T,
     ) -> Result<(), RecordError>;
 
-    /// Whether a message may get lost, so that each has to stand for itself.
+    /// Returns whether a message may get lost, so that each has to stand for itself.
     fn is_lossy(&self) -> bool {
         false
     }

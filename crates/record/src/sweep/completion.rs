@@ -65,7 +65,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         Ok(Completion { timings: table(TIMINGS, timings)?, results: table(RESULTS, results)? })
     }
 
-    /// Whether the table of all runs exists.
+    /// Returns whether the table of all runs exists.
     pub fn is_complete(&self) -> bool {
         self.results_file().is_file()
     }

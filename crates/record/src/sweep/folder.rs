@@ -123,7 +123,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         disk::put(&folder.join(SCENARIO), text.as_bytes())
     }
 
-    /// Whether a folder holds a sweep, even if its manifest is damaged.
+    /// Returns whether a folder holds a sweep, even if its manifest is damaged.
     pub fn is_at(path: &Path) -> bool {
         path.join(MANIFEST).is_file()
     }

@@ -116,7 +116,7 @@ impl Journal {
     }
 }
 
-/// Whether a process writes the journal at `path`; none where the file system has no locks.
+/// Returns whether a process writes the journal at `path`; none where the file system has no locks.
 pub(super) fn is_locked(path: &Path) -> Option<bool> {
     match File::open(path) {
         Err(_) => Some(false),

@@ -114,7 +114,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         Ok(shares.into_iter().map(|share| (share, done.contains(&share))).collect())
     }
 
-    /// Whether a process writes the journal of a share now; none where the file system has no locks.
+    /// Returns whether a process writes the journal of a share now; none where the file system has no locks.
     pub fn is_locked(&self, share: Share) -> Option<bool> {
         is_locked(&self.share_file(share, "journal"))
     }

@@ -86,7 +86,7 @@ pub(super) fn wide(name: &str, inside: Markup) -> Markup {
     html! { div .wide { div .scrolled role="region" tabindex="0" aria-label={ "Table: " (name) } { (inside) } } }
 }
 
-/// Whether every cell that is not empty starts like a number, or like a bound of one: `< 0.0001`.
+/// Returns whether every cell that is not empty starts like a number, or like a bound of one: `< 0.0001`.
 fn holds_numbers(table: &Table, k: usize) -> bool {
     let cells = || table.rows.iter().filter_map(|row| row.get(k));
     let is_number = |cell: &str| {

@@ -91,8 +91,8 @@ fn in_table(
     }
 }
 
-/// Whether a new table becomes a section rather than one in braces: at the top, among other sections, and if it is
-/// large.
+/// Returns whether a new table becomes a section rather than one in braces: at the top, among other sections, and if
+/// it is large.
 fn is_section(
     path: &[Step],
     table: &Table,

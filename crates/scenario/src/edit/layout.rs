@@ -23,7 +23,7 @@ pub(super) struct Statement {
 pub(super) struct Layout<'t> {
     pub(super) text: &'t str,
     document: Document<&'t str>,
-    /// In the order of the text.
+    /// Statements in the order of the text.
     pub(super) statements: Vec<Statement>,
 }
 

@@ -22,7 +22,7 @@ impl Member {
         self.keys.first().map_or(self.end, |key| key.start)
     }
 
-    /// Whether it is at a way or below.
+    /// Returns whether it is at a way or below.
     pub(super) fn is_below(&self, path: &[Step]) -> bool {
         let name = |(step, own): (&Step, &String)| *step == Step::Name(own.clone());
         path.len() <= self.path.len() && path.iter().zip(&self.path).all(name)

@@ -9,13 +9,13 @@ use serde_json::{Map, Value as Json};
 /// A longer table is a section rather than one in braces.
 const MOST_IN_BRACES: usize = 80;
 
-/// Whether a table is better a section than in braces.
+/// Returns whether a table is better a section than in braces.
 pub(super) fn is_large(members: &Map<String, Json>) -> bool {
     let text = text_of(&Json::Object(members.clone()), false);
     text.is_ok_and(|text| text.len() > MOST_IN_BRACES)
 }
 
-/// Whether an array becomes a list of sections.
+/// Returns whether an array becomes a list of sections.
 pub(super) fn are_sections(items: &[Json]) -> bool {
     !items.is_empty() && items.iter().all(Json::is_object)
 }

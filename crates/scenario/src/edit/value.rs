@@ -12,9 +12,9 @@ const MOST_EXACT: f64 = 9_007_199_254_740_992.0;
 /// A value that is set.
 #[derive(Clone, Copy)]
 pub(super) enum New<'v> {
-    /// By its meaning.
+    /// A value by its meaning.
     Json(&'v Json),
-    /// As TOML, to be written as it is.
+    /// A piece of TOML, to be written as it is.
     Toml(&'v str),
 }
 
@@ -29,12 +29,12 @@ impl New<'_> {
     }
 }
 
-/// Whether a text takes the place of a date, and is one.
+/// Returns whether a text takes the place of a date, and is one.
 fn is_date(old: Option<&Value>, text: &str) -> bool {
     old.is_some_and(Value::is_datetime) && text.parse::<Datetime>().is_ok()
 }
 
-/// Whether it is a float, or an array of floats.
+/// Returns whether it is a float, or an array of floats.
 pub(super) fn has_floats(value: &Value) -> bool {
     match value {
         Value::Float(_) => true,
@@ -123,7 +123,7 @@ fn string_text(words: &str) -> String {
     text + "\"\"\""
 }
 
-/// Whether an old value means the same as a new one.
+/// Returns whether an old value means the same as a new one.
 pub(super) fn is_same(old: &Value, new: &Json) -> bool {
     match (old, new) {
         (Value::String(a), Json::String(b)) => a.value() == b,

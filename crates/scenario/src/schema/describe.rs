@@ -62,7 +62,7 @@ fn default_of(one: &Shown, part: &Map<String, Value>) -> Option<Value> {
     is_plain.then(|| value.clone())
 }
 
-/// Whether both are arrays, or both are none.
+/// Returns whether both are arrays, or both are none.
 fn is_like(one: &Value, other: &Value) -> bool {
     one.is_array() == other.is_array()
 }

@@ -49,7 +49,7 @@ impl Troupe {
         troupe
     }
 
-    /// Whether these are its bodies, in their order, with the same shapes.
+    /// Returns whether these are its bodies, in their order, with the same shapes.
     pub(super) fn is_of(&self, bodies: &[Body]) -> bool {
         let is_same = |(member, body): (&Member, &Body)| {
             member.kind == body.kind

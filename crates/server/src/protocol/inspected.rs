@@ -85,7 +85,7 @@ pub struct Mark {
     pub role: Role,
     /// The same in words.
     pub label: String,
-    /// From 0 to 1: how likely, how strong; 1 where that means nothing.
+    /// Likelihood or strength, from 0 to 1; 1 where that means nothing.
     pub weight: f64,
     /// Its shape.
     pub shape: MarkShape,
@@ -96,13 +96,13 @@ pub struct Mark {
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
-    /// As it is.
+    /// The world as it is.
     True,
-    /// As a sensor reported it.
+    /// A sensor's report.
     Reported,
-    /// As it was wanted.
+    /// The agent's wish.
     Wish,
-    /// As it was done.
+    /// The action carried out.
     Done,
     /// A thing that was refused.
     Refused,
@@ -110,7 +110,7 @@ pub enum Role {
     Claim,
     /// Those in conflict.
     Group,
-    /// As it was foreseen.
+    /// A prediction.
     Predicted,
     /// The choice.
     Chosen,

@@ -210,7 +210,7 @@ pub enum Subject {
 pub enum Speed {
     /// Simulated seconds per second, 0.1 to 100.
     Times(f64),
-    /// As fast as it goes.
+    /// The greatest speed that the machine allows.
     Fastest,
 }
 

@@ -92,7 +92,7 @@ pub enum Shape {
     },
     /// An arrowhead along its first axis.
     Dart {
-        /// From tail to tip, in meters.
+        /// Length from tail to tip, in meters.
         length_m: f64,
         /// Width, in meters.
         width_m: f64,
@@ -105,7 +105,7 @@ pub enum Shape {
 pub struct Look {
     /// Red, green and blue.
     pub color: [u8; 3],
-    /// From 0 (fully transparent) to 1 (opaque).
+    /// Opacity, from 0 (fully transparent) to 1 (opaque).
     pub opacity: f64,
     /// Seen from above, higher layers cover lower ones.
     pub layer: u8,
@@ -184,11 +184,11 @@ pub struct Event {
     pub cycle: f64,
     /// `info`, `warning` or `error`.
     pub level: String,
-    /// From the fixed vocabulary of events, e.g. `contact`, `veto`, `trip`; empty where the world does not tell it.
+    /// A word of the fixed vocabulary of events, e.g. `contact`, `veto`, `trip`; empty where the world tells none.
     pub kind: String,
     /// The body that it is about.
     pub who: Option<Who>,
-    /// With whom, or with what.
+    /// The other body or thing that took part, if any.
     pub with: Option<Who>,
     /// Its place, in meters.
     pub at_m: Option<[f64; 3]>,

@@ -60,7 +60,7 @@ pub enum Answer {
         thinned: u32,
         /// The cycle of each sample.
         cycles: Vec<f64>,
-        /// For each metric, its value in each sample.
+        /// Values in each sample, metric by metric.
         values: Vec<Vec<Option<f64>>>,
     },
     /// Events, the oldest first.
@@ -293,9 +293,9 @@ pub struct Status {
     pub seed: String,
     /// Digest of the state, while the run stands still.
     pub digest: Option<String>,
-    /// Of a recording: whether the digest was confirmed, or will be.
+    /// The verdict on a recording: whether its digest was confirmed, or will be.
     pub banner: Option<String>,
-    /// Of a fleet: its nodes.
+    /// The nodes of a fleet.
     pub fleet: Option<Box<Fleet>>,
 }
 

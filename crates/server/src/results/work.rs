@@ -34,7 +34,7 @@ pub(super) struct Client {
 }
 
 impl Client {
-    /// Whether it is gone.
+    /// Returns whether it is gone.
     pub(super) fn is_gone(&self) -> bool {
         self.is_gone.load(Relaxed)
     }

@@ -101,7 +101,7 @@ impl Session {
         self.shown.source()
     }
 
-    /// Whether it has ended.
+    /// Returns whether it has ended.
     pub(crate) fn is_finished(&self) -> bool {
         self.thread.is_finished()
     }

@@ -244,7 +244,7 @@ impl Player {
     }
 
     /// Does what is due, for some milliseconds at most. Returns how long nothing will be, unless there is a
-    /// request; `None` for ever.
+    /// request; `None` forever.
     pub(super) fn turn(&mut self) -> Option<Duration> {
         let now = Instant::now();
         self.memory.keyframes.fit();

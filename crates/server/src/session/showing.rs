@@ -50,7 +50,7 @@ impl Showing {
         Self { showcase, session, due: Instant::now() }
     }
 
-    /// Whether there may be viewers at all.
+    /// Returns whether there may be viewers at all.
     pub(super) fn is_possible(&self) -> bool {
         self.showcase.is_some()
     }

@@ -234,7 +234,7 @@ impl Stage {
         })
     }
 
-    /// Whether its states are computed, so that they have digests.
+    /// Returns whether its states are computed, so that they have digests.
     pub(crate) fn is_computed(&self) -> bool {
         self.recorded.as_ref().is_none_or(|recorded| recorded.other_maker().is_none())
     }
@@ -263,7 +263,7 @@ impl Stage {
         recorded.map_or(Ok(Vec::new()), |recorded| recorded.tables().map_err(|e| problem(&e)))
     }
 
-    /// Whether its text cannot be replaced.
+    /// Returns whether its text cannot be replaced.
     pub(crate) fn is_fixed(&self) -> bool {
         self.means.read_only || self.recorded.is_some()
     }

@@ -118,7 +118,7 @@ impl Viewer {
         self.is_stale && now >= self.frame_due
     }
 
-    /// Whether there is credit for the frame that is due. One that cannot be sent is left out.
+    /// Returns whether there is credit for the frame that is due. One that cannot be sent is left out.
     fn spends(&mut self, now: Instant) -> bool {
         let has_credit = self.credit > 0;
         if has_credit {
@@ -166,7 +166,7 @@ impl Viewer {
         (self.told, self.status_due) = (Some(status), now + STATUS);
     }
 
-    /// Whether the state that was told last is an older one than this.
+    /// Returns whether the state that was told last is an older one than this.
     pub(super) fn has_to_tell(&self, status: &Status) -> bool {
         self.told.as_ref() != Some(status)
     }

@@ -46,7 +46,7 @@ impl ViewersAt {
         self.port
     }
 
-    /// Whether others than this machine can reach it.
+    /// Returns whether others than this machine can reach it.
     pub fn is_open_to_others(&self) -> bool {
         self.resolved().is_ok_and(|ip| !ip.is_loopback())
     }

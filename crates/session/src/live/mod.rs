@@ -93,7 +93,7 @@ impl Viewers {
         })
     }
 
-    /// Whether somebody watches.
+    /// Returns whether somebody watches.
     pub fn are_there(&self) -> bool {
         self.server.is_watched()
     }

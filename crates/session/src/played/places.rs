@@ -151,7 +151,7 @@ impl Places {
     }
 }
 
-/// Whether a body may have rows.
+/// Returns whether a body may have rows.
 fn is_of(rows: &PlaceRows, body: &Body) -> bool {
     let is_kind = body.kind == rows.kind || (rows.kind == Kind::Robot && body.kind == Kind::Person);
     is_kind && body.part.is_some() == rows.part.is_some()

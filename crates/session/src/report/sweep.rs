@@ -283,7 +283,7 @@ fn row_of(table: &RunTable, cell: u64) -> Option<usize> {
     (0..table.runs()).find(|&row| cells.values.number(row) == Some(cell as f64))
 }
 
-/// Whether a run did not fail, and is quickly made again.
+/// Returns whether a run did not fail, and is quickly made again.
 fn is_short(table: &RunTable, row: usize) -> bool {
     let number = |name: &str| table.column(name).and_then(|c| c.values.number(row));
     let failed = table.column("failure").is_some_and(|c| !c.values.text(row).is_empty());

@@ -1,4 +1,4 @@
-//! From a sweep to the table of its runs: in memory, in a folder, or share by share.
+//! The way from a sweep to the table of its runs: in memory, in a folder, or share by share.
 
 use super::crew::Engine;
 use super::effort::Effort;

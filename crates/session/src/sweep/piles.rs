@@ -26,9 +26,9 @@ pub(super) struct Piles<'a> {
 
 /// The place of the piles.
 enum Kept {
-    /// In memory: there is one.
+    /// Rows in memory: there is one pile.
     Here(Rows),
-    /// In files of a folder.
+    /// Files of a folder.
     There(Scratch, Vec<BufWriter<File>>),
 }
 

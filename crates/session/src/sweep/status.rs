@@ -179,12 +179,12 @@ fn left_s(left: u64, runs_per_s: Option<f64>, idle_s: Option<f64>) -> Option<f64
     (!is_long(idle_s, Some(runs_per_s))).then(|| left as f64 / runs_per_s)
 }
 
-/// Whether nobody has finished a run for longer than whoever works on a sweep takes.
+/// Returns whether nobody has finished a run for longer than whoever works on a sweep takes.
 fn is_long(idle_s: f64, runs_per_s: Option<f64>) -> bool {
     idle_s > runs_per_s.map_or(IDLE_S, |runs_per_s| IDLE_S.max(IDLE_RUNS / runs_per_s))
 }
 
-/// Whether somebody works on one of the shares that are begun and not done.
+/// Returns whether somebody works on one of the shares that are begun and not done.
 fn is_worked_on(folder: &Folder, shares: &[ShareStatus], runs_per_s: Option<f64>) -> bool {
     shares.iter().filter(|share| !share.is_done).any(|share| {
         let shard: Option<Shard> = share.share.parse().ok();

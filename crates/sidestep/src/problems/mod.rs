@@ -124,7 +124,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Whether two drafts have the same error, wherever it stands.
+/// Returns whether two drafts have the same error, wherever it stands.
 fn is_same(one: &InputError, other: &InputError) -> bool {
     (one.key(), one.cause()) == (other.key(), other.cause())
 }

@@ -133,7 +133,7 @@ impl Repair {
         draft.with(parts)
     }
 
-    /// Whether an error of the draft with this change may only be there because of it.
+    /// Returns whether an error of the draft with this change may only be there because of it.
     pub(super) fn may_lead_to(&self, next: &InputError) -> bool {
         let guess = Guess::from(self.clone());
         let key = next.key().map(way).unwrap_or_default();
@@ -155,13 +155,13 @@ impl From<Repair> for Guess {
 }
 
 impl Guess {
-    /// Whether a key is in the value that it gives. Where an element was removed, the next one has its
+    /// Returns whether a key is in the value that it gives. Where an element was removed, the next one has its
     /// number.
     fn holds(&self, key: &[String]) -> bool {
         !self.is_removed && key.starts_with(&self.key)
     }
 
-    /// Whether an error may only be there because of this: one in the value, one of a table around it,
+    /// Returns whether an error may only be there because of this: one in the value, one of a table around it,
     /// unless that misses another key, or one elsewhere that names it.
     pub(super) fn may_lead_to(&self, error: &InputError) -> bool {
         let Some(key) = error.key().map(way) else { return true };

@@ -5,7 +5,7 @@ use sidestep::worlds::robots::RobotsRun;
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 
 /// A crowded floor: rooms, corridors, doors of both sorts, people of two sizes and speeds,
-/// robots of four sizes, several behaviours, sensors and periods, radio.
+/// robots of four sizes, several behaviors, sensors and periods, radio.
 pub(crate) const CROWD: &str = r#"
 format = 1
 world = "robots"

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 /// A room with two pillars and a niche.
 const ROOM: &str = "......## ...#.... ......#. .#...... .....>..";
 
-/// A behaviour in the scenario, and the policy that it is in the chain.
+/// A behavior in the scenario, and the policy that it is in the chain.
 type Policy = (&'static str, fn() -> Random);
 
 const UNIFORM: Policy = ("{ kind = \"random\" }", Random::uniform);
@@ -29,7 +29,7 @@ const BOUNCE: Policy = (
     Random::bounce,
 );
 /// Minds contacts, and mixes under every law: a robot that only bounces stands before a wall
-/// for ever where blocked transitions are struck out and so never become contacts.
+/// forever where blocked transitions are struck out and so never become contacts.
 const EXPLORE: Policy = (
     "{ kind = \"random\", weights = { forward = 6, left = 1, right = 1 }, \
      weights_after_contact = { forward = 2, left = 3, right = 3 } }",

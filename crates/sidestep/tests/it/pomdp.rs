@@ -19,11 +19,11 @@ struct File {
     observations: Vec<String>,
     start: String,
     discount: f64,
-    /// By (action, state): successor and probability in units.
+    /// Successors and their probabilities in units, by (action, state).
     transitions: BTreeMap<(String, String), BTreeMap<String, u64>>,
-    /// By state: observation and probability in units.
+    /// Observations and their probabilities in units, by state.
     readings: BTreeMap<String, BTreeMap<String, u64>>,
-    /// By successor.
+    /// Rewards by successor.
     rewards: BTreeMap<String, f64>,
 }
 

@@ -170,7 +170,7 @@ impl Tiles {
     }
 }
 
-/// A behaviour that does one action again and again.
+/// A behavior that does one action again and again.
 pub(crate) fn repeating(action: &str) -> String {
     format!("behaviour = {{ kind = \"replay\", actions = [\"{action}\"], repeat = true }}")
 }

@@ -133,7 +133,7 @@ impl Mistakes<'_> {
         }
     }
 
-    /// Whether the schema says that a number must be 0 or more.
+    /// Returns whether the schema says that a number must be 0 or more.
     fn is_not_negative(&self, key: &[String]) -> bool {
         let mut part = self.schema;
         for name in key.iter().filter(|name| name.parse::<usize>().is_err()) {
@@ -179,7 +179,7 @@ fn told(source: &Source) -> Vec<String> {
     keys
 }
 
-/// Whether two mistakes have nothing to do with each other.
+/// Returns whether two mistakes have nothing to do with each other.
 fn are_independent(a: &Mistake, b: &Mistake) -> bool {
     let key = |one: &Mistake| {
         one.key.iter().map(|part| part.trim_end_matches('_').to_string()).collect::<Vec<_>>()

@@ -84,7 +84,7 @@ fn members(root: &Value, words: &Words, value: &Value, at: &str, told: &mut Vec<
     }
 }
 
-/// Whether a word about the value itself allows it.
+/// Returns whether a word about the value itself allows it.
 fn allows(word: &str, means: &Value, value: &Value) -> bool {
     let number = |holds: &dyn Fn(f64, f64) -> bool| {
         value.as_f64().is_none_or(|x| holds(x, means.as_f64().expect("a number")))

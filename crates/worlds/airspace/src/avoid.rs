@@ -1,6 +1,6 @@
 //! Ways that keep clear of intruders, as far as there are any.
 //!
-//! Nobody knows where an intruder wants to go, so no orbit is safe from it for ever, and the
+//! Nobody knows where an intruder wants to go, so no orbit is safe from it forever, and the
 //! invariant of the shield is about all others. What is promised beside it: **an airplane that
 //! loses separation from an intruder is named with it before.** Within `dt` the intruder stays in a
 //! circle that grows at its greatest speed `s`. A way is *clear* if at each moment `t` of `dt` the

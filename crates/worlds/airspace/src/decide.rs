@@ -103,7 +103,7 @@ impl Considered {
 pub(super) enum Manner {
     /// Each alone.
     Alone,
-    /// By optimizing together.
+    /// All, by optimizing together.
     Optimizing,
     /// Each by the places and goals of all.
     Reacting,

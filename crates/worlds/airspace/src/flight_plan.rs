@@ -22,7 +22,7 @@ pub(super) struct AirplaneSection {
     callsign: Option<Spanned<String>>,
     /// Place at the start.
     pub(super) at_m: Option<Place>,
-    /// Heading at the start, counter-clockwise from east.
+    /// Heading at the start, counterclockwise from east.
     pub(super) heading_deg: Option<Value>,
     /// Places to fly to, one after the other.
     way_points_m: Option<Vec<Place>>,

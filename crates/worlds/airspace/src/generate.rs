@@ -16,9 +16,9 @@ const TRIES: usize = 2_000;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum GeneratorKind {
-    /// On a circle, each to the opposite point.
+    /// Airplanes on a circle, each bound for the opposite point.
     Superconflict,
-    /// From anywhere to anywhere in a disc.
+    /// Flights from anywhere to anywhere in a disc.
     Random,
     /// Three streams that meet.
     Streams,

@@ -10,7 +10,7 @@ use sidestep_import::traffic::FASTEST_M_S;
 use sidestep_kernel::Slot;
 
 /// Bounds on what is told of an intruder: meters, meters per second and seconds beyond which nothing makes sense, or
-/// takes for ever to look at. Recorded speeds are over the ground, and no wind is as fast as an airplane.
+/// takes forever to look at. Recorded speeds are over the ground, and no wind is as fast as an airplane.
 const FARTHEST_M: f64 = 1e15;
 const FASTEST_IN_WIND_M_S: f64 = 2.0 * FASTEST_M_S;
 const LONGEST_S: f64 = 1e4;

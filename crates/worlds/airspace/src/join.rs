@@ -13,7 +13,7 @@ use std::ops::Range;
 pub(super) struct Flown {
     /// Their ids, rising.
     pub(super) ids: Vec<Slot>,
-    /// Of each, those near it, itself and those who mind nobody among them, rising; empty where groups are
+    /// Slots near each airplane, itself and those who mind nobody among them, rising; empty where groups are
     /// announced, and all see all.
     near: Vec<Vec<Slot>>,
 }

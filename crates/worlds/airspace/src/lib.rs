@@ -8,7 +8,7 @@
 //! scenario.rs, flight_plan.rs, generate.rs -> world.rs (immutable), state.rs (cells)
 //! perceive.rs -> join.rs -> decide.rs -> act.rs                            one cycle of dt
 //! flight/: motion, orders, tracks       objective.rs: what is minimized    behind it
-//! shield/: what is safe for ever        agents/: programs aboard, and what they say to each other
+//! shield/: what is safe forever        agents/: programs aboard, and what they say to each other
 //! pilot/: an airplane from what it sees to what it does   deploy/: pilots on a network in memory
 //! intruder.rs: airplanes that mind nobody    outside.rs, wish.rs: decisions from outside
 //! baseline/: other methods              metrics.rs: the sums of a run

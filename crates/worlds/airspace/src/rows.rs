@@ -38,7 +38,7 @@ fn trajectories(callsigns: &[Option<String>]) -> Table<FlownLeg> {
         .u32("airplane", "entity id", |f| f.airplane)
         .f64("x_m", "position east at the start of the leg", |f| f.leg.pose.at[0])
         .f64("y_m", "position north", |f| f.leg.pose.at[1])
-        .f64("heading_rad", "heading, counter-clockwise from east", |f| f.leg.pose.heading_rad)
+        .f64("heading_rad", "heading, counterclockwise from east", |f| f.leg.pose.heading_rad)
         .f64("altitude_m", "altitude", |f| f.leg.altitude_m)
         .f64("from_s", "start of the leg, after the start of the run", |f| f.leg.from_s)
         .f64("until_s", "its end; the same as its start where the flight ends", |f| f.leg.until_s)
@@ -99,7 +99,7 @@ impl Rows {
         Self { record, ..Self::default() }
     }
 
-    /// Whether controls from outside of the run are to be kept.
+    /// Returns whether controls from outside of the run are to be kept.
     pub(super) fn keep_controls(&self) -> bool {
         self.record.controls
     }

@@ -25,7 +25,7 @@ const LEFT: u64 = 1 << 63;
 /// The end of a flight, with its step of `dtau` since the run's start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
-    /// At the last way-point, or at the end of the recorded way.
+    /// The airplane is at its last way-point, or at the end of its recorded way.
     Arrived(u64),
     /// Removed before it arrived.
     Left(u64),
@@ -41,7 +41,7 @@ pub struct AirspaceState {
     contacts: Box<[Mutex<Contacts>]>,
     /// The conflicts that each airplane resolves; empty unless the method is MVP.
     resolving: Box<[Mutex<Resolving>]>,
-    /// For each airplane the others with which it is named, see [`Self::name`].
+    /// The others with which each airplane is named, see [`Self::name`].
     named: Box<[Mutex<Named>]>,
     /// Each airplane's pose on its stored orbit; empty where no gust takes it off that.
     held: Box<[Held]>,
@@ -66,7 +66,7 @@ pub struct Cell {
     pub x_m: Shared<f64>,
     /// Position north, in meters.
     pub y_m: Shared<f64>,
-    /// Heading in radians, counter-clockwise from east.
+    /// Heading in radians, counterclockwise from east.
     pub heading_rad: Shared<f64>,
     /// Altitude in meters.
     pub altitude_m: Shared<f64>,

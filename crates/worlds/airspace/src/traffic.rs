@@ -1,4 +1,4 @@
-//! From other programs' traffic to a scenario: BlueSky `.scn` files and recorded tracks.
+//! Conversion of other programs' traffic to a scenario: BlueSky `.scn` files and recorded tracks.
 //!
 //! The resulting text is a scenario like any other, complete in itself: it goes into the run folder
 //! and can be edited. Latitude and longitude become a plane about the traffic's center. Turn rates
@@ -166,7 +166,7 @@ pub(crate) fn not_flown(file: &ScnFile) -> BTreeMap<String, u64> {
 /// A command to an airplane, in the scenario's terms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Told {
-    /// Degrees counter-clockwise from east.
+    /// Degrees counterclockwise from east.
     Heading(f64),
     Speed(f64),
     /// Meters, and meters per second.

@@ -35,7 +35,7 @@ pub enum Method {
     Mvp,
     /// Straight to the way-point, without regard to others.
     None,
-    /// By orders of a caller of the library; along its flight plan without them.
+    /// Follows the orders of a caller of the library; without them, its flight plan.
     External,
 }
 

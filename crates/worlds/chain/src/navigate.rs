@@ -42,7 +42,7 @@ pub(crate) enum Goal {
 }
 
 impl Navigator {
-    /// Whether it may turn without moving.
+    /// Returns whether it may turn without moving.
     pub(crate) fn can_turn_on_the_spot(&self) -> bool {
         self.leader.turning == Turning::OnTheSpotWhereBlocked
     }

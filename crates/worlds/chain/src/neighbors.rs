@@ -22,7 +22,7 @@ impl<const D: usize> Default for Neighbors<D> {
 }
 
 impl<const D: usize> Neighbors<D> {
-    /// Whether these are the claims after `made` claims.
+    /// Returns whether these are the claims after `made` claims.
     pub(crate) fn is_of(&self, made: u64) -> bool {
         self.made == made
     }

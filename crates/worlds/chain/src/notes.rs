@@ -25,7 +25,7 @@ pub(crate) struct Notes<const D: usize> {
 pub(crate) struct Wanted<const D: usize> {
     /// The connector that wants it.
     pub(crate) of: usize,
-    /// In words.
+    /// The note in words.
     pub(crate) words: &'static str,
     /// The place that the initiator wants to reach.
     pub(crate) to: Option<Point<D>>,

@@ -24,7 +24,7 @@ const CHAIN: &str = "chain";
 const CAUSES: [&str; 3] = ["none", "obstacle", "chain"];
 
 impl<const D: usize> ChainSpec<D> {
-    /// Whether some task of it takes orders.
+    /// Returns whether some task of it takes orders.
     fn is_external(&self) -> bool {
         self.tasks.iter().any(takes_orders)
     }

@@ -45,7 +45,7 @@ impl<const D: usize> ChainWorld<D> {
         body.driving.way_m.gone / (task.speed_m_s * self.starts_s(self.cycles.max(1)))
     }
 
-    /// Whether all tasks of all chains are done and everything is whole.
+    /// Returns whether all tasks of all chains are done and everything is whole.
     pub(crate) fn all_is_done(&self, state: &ChainState<D>) -> bool {
         self.chains.iter().enumerate().all(|(slot, spec)| {
             let body = state.leading(slot);

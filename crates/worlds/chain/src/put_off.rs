@@ -22,7 +22,7 @@ pub(crate) struct PutOff<const D: usize> {
 }
 
 impl<const D: usize> PutOff<D> {
-    /// Whether the chain is where it should be.
+    /// Returns whether the chain is where it should be.
     pub(crate) fn is_empty(&self) -> bool {
         self.heads.is_empty()
     }

@@ -32,7 +32,7 @@ fn idle<const D: usize>(compiled: &Compiled<D>) -> impl Iterator<Item = Remark> 
     })
 }
 
-/// Whether some connector of a chain is, or comes to be, unable to go anywhere.
+/// Returns whether some connector of a chain is, or comes to be, unable to go anywhere.
 fn is_held<const D: usize>(spec: &ChainSpec<D>) -> bool {
     let is_free = |c: &Connector<D>| c.mobility == Mobility::Free && !c.failed;
     let holds =

@@ -57,7 +57,7 @@ fn robots() -> Table<Place> {
         .u32("robot", "the connector that it follows", |p| p.id)
         .f64("x_m", "position of the body", |p| p.at[0])
         .f64("y_m", "position of the body", |p| p.at[1])
-        .f64("heading_rad", "heading, counter-clockwise from east", |p| p.at[2])
+        .f64("heading_rad", "heading, counterclockwise from east", |p| p.at[2])
 }
 
 fn joints() -> Table<JointValue> {
@@ -110,7 +110,7 @@ impl Rows {
         self.record.every
     }
 
-    /// Whether controls from outside of the run are to be kept.
+    /// Returns whether controls from outside of the run are to be kept.
     pub(super) fn keep_controls(&self) -> bool {
         self.record.controls
     }

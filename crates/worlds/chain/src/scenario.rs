@@ -229,7 +229,7 @@ enum EscapeWord {
     /// Before they are touched.
     #[default]
     LookAhead,
-    /// When they are touched.
+    /// Not before they are touched.
     Touch,
     /// Not at all.
     Off,
@@ -294,9 +294,9 @@ pub struct Compiled<const D: usize> {
 /// A compiled scenario in two or three dimensions.
 #[derive(Debug, Clone)]
 pub enum AnyCompiled {
-    /// In the plane.
+    /// A world in the plane.
     Plane(Compiled<2>),
-    /// In space.
+    /// A world in space.
     Space(Compiled<3>),
 }
 

@@ -354,7 +354,7 @@ impl<const D: usize> ChainState<D> {
         self.cells.len()
     }
 
-    /// Whether there are none.
+    /// Returns whether there are none.
     pub fn is_empty(&self) -> bool {
         self.cells.is_empty()
     }
@@ -375,7 +375,7 @@ impl<const D: usize> ChainState<D> {
         self.cells[slot].body.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether the decisions of a chain's agents for a cycle were handed over, and are not carried out yet.
+    /// Returns whether the decisions of a chain's agents for a cycle were handed over, and are not carried out yet.
     pub fn has_handed_over(&self, slot: usize, cycle: Cycle) -> bool {
         let body = self.leading(slot);
         body.handed.as_ref().is_some_and(|handed| handed.cycle == cycle)

@@ -26,11 +26,11 @@ pub const STANDARD_ACTIONS: [&str; 4] = ["forward", "left", "right", "stay"];
 pub enum Side {
     /// Ahead.
     Front,
-    /// To the left.
+    /// A move to the left.
     Left,
     /// Behind.
     Back,
-    /// To the right.
+    /// A move to the right.
     Right,
 }
 

@@ -70,7 +70,7 @@ pub struct Model {
     robot: Robot,
     rule: ObstacleRule,
     kinds: Vec<String>,
-    /// In the order in which the search finds them; the first is the start.
+    /// Poses in the order in which the search finds them; the first is the start.
     poses: Vec<Pose>,
     /// Outcomes, in row `pose * actions + action`.
     outcomes: Sparse<Arrival>,

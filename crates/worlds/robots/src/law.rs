@@ -20,7 +20,7 @@ pub(super) fn no_contacts(world: &RobotsWorld) -> Vec<Remark> {
         let words = format!(
             "no robot with the effector `{effector}` ever has a contact: each of its actions may \
              also leave it in place, so something is always left when \"renormalise\" strikes out \
-             what is blocked. Behaviours that turn on contact may push a wall for ever: use \
+             what is blocked. Behaviours that turn on contact may push a wall forever: use \
              obstacle_rule = \"cut\" or \"stay\", or sensors that see what is ahead"
         );
         Remark::warning("obstacle_rule", words)

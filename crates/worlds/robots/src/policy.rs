@@ -10,9 +10,9 @@ pub enum ConflictPolicy {
     /// A fair draw per body and cycle.
     #[default]
     Random,
-    /// By entity id.
+    /// The order of entity ids.
     Fixed,
-    /// By the rank of the kind (`kind_order`), then a fair draw.
+    /// The rank of the kind (`kind_order`), then a fair draw.
     ByKind,
     /// The body that comes from the right goes first; where all four headings meet, a fair draw
     /// says which heading starts.

@@ -6,7 +6,7 @@ use sidestep_kernel::stream::Purpose;
 pub(crate) const PLACE: Purpose = Purpose(1);
 /// Phases of periods.
 pub(crate) const PHASE: Purpose = Purpose(2);
-/// A behaviour's own stream.
+/// A behavior's own stream.
 pub(crate) const DECIDE: Purpose = Purpose(3);
 /// An action: index 0 says which transition it ends in, index 1 is the body's priority
 /// in its conflict group.

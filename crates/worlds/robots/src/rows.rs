@@ -30,7 +30,7 @@ pub const HEADING_NAMES: [&str; 4] = ["east", "north", "west", "south"];
 
 const CYCLE: &str = "cycle, counted from 0";
 const HEADING: &str =
-    "heading, counter-clockwise from east along the map: 0, 90, 180 or 270 degrees, by name";
+    "heading, counterclockwise from east along the map: 0, 90, 180 or 270 degrees, by name";
 const BODY: &str = "entity id: robots first, then people, then doors";
 
 /// Returns the table of poses, which are recorded as whole columns because they are many.

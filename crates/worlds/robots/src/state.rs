@@ -167,9 +167,8 @@ impl Frames {
     }
 }
 
-/// Returns column, row and heading in one word: `heading << 30
-/// row << 15
-/// col`.
+/// Returns column, row and heading in one word: the heading in bits 30 and 31, the row in bits 15 to 29,
+/// the column below.
 #[inline]
 pub fn pose_word(at: Position, facing: u8) -> u32 {
     u32::from(facing) << 30 | at.row() << 15 | at.col()
@@ -180,9 +179,8 @@ pub fn pose_of_word(word: u32) -> (u32, u32, u8) {
     (word & 0x7fff, word >> 15 & 0x7fff, (word >> 30) as u8)
 }
 
-/// Returns the word of a contact, `1 << 15
-/// side << 8
-/// kind`; 0 stands for no contact.
+/// Returns the word of a contact: bit 15 is set, the side is in bits 8 to 14, the kind below; 0 stands for
+/// no contact.
 #[inline]
 pub fn contact_word(kind: u8, side: u8) -> u16 {
     1 << 15 | u16::from(side) << 8 | u16::from(kind)

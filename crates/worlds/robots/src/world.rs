@@ -25,7 +25,7 @@ pub enum StorageOrder {
     /// Neighbors on the map are neighbors in memory; arranged anew now and then.
     #[default]
     Spatial,
-    /// By entity id.
+    /// The order of entity ids.
     ById,
     /// Shuffled by this number; for tests.
     Shuffled(u64),

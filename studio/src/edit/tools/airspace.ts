@@ -18,7 +18,7 @@ function routeOf(value: Table): { at: Place; index: number }[] {
   });
 }
 
-/** Headings are degrees from east, counter-clockwise. */
+/** Headings are degrees from east, counterclockwise. */
 export function headingTo([x0, y0]: Place, [x1, y1]: Place): number {
   return Math.round((Math.atan2(y1 - y0, x1 - x0) * 180) / Math.PI);
 }

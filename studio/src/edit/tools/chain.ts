@@ -4,10 +4,10 @@ import type { Edit, Place } from "../../protocol";
 import { isWithin, numbersOf, sectionsOf, valueAt, type Json, type Path, type Table } from "../keypath";
 import { box, insert, remove, removeFrom, ring, rounded, set, type Item } from "./item";
 
-/** How near obstacles of no thickness can be taken hold of. */
+/** Greatest distance at which obstacles of no thickness can be taken hold of. */
 const THIN_M = 0.02;
 
-/** How places of a scenario are written: in so many numbers, and how finely. */
+/** The form in which places of a scenario are written: in so many numbers, and how finely. */
 interface Script {
   dimensions: 2 | 3;
   m_per_px: number;

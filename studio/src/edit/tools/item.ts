@@ -1,4 +1,4 @@
-/** What can be touched on the canvas of a draft, and the edits that tools ask for. */
+/** Items that can be touched on the canvas of a draft, and the edits that tools ask for. */
 
 import type { Edit, Place } from "../../protocol";
 import { keyOf, type Path, type Table } from "../keypath";
@@ -12,7 +12,7 @@ export interface Item {
   /** Its outline, or its one place. */
   outline_m: Place[];
   isClosed: boolean;
-  /** Where it is taken hold of. */
+  /** The place where it is taken hold of. */
   at_m: Place;
   /** The edits that bring it elsewhere. */
   move(to_m: Place): Edit[];

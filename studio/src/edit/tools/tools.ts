@@ -42,7 +42,7 @@ const CHAIN: readonly Tool[] = [
   tool("polygon", "△", "Polygon", "Drag one side of a triangle; a click adds a corner to the polygon that is chosen"),
   tool("patrol", "⇄", "Patrol", "Click adds a way-point to the chosen ball or box, which then goes to and fro"),
 ];
-/** In space there is no place for what is new: what is there is moved. */
+/** Tools in space, where nothing can be placed anew: what is there is moved. */
 const CHAIN_IN_SPACE: readonly Tool[] = [
   tool("select", "↖", "Select", "Drag moves in the plane of the view, an arrow of the chosen thing along its axis; Delete takes away"),
 ];
@@ -60,7 +60,7 @@ export function toolsOf(scene: Scene): readonly Tool[] {
   return scene.world === "airspace" ? AIRSPACE : [];
 }
 
-/** Why a scene, or a part of it, cannot be drawn upon; nothing where all can. */
+/** Returns the reason why a scene, or a part of it, cannot be drawn upon; nothing where all can. */
 export function obstacleTo(scene: Scene, board: Board | null, has: { file: boolean; office: boolean; airplanes: boolean }): string {
   if (scene.is_recording) return "A recording stays as it is: open its scenario to change it.";
   if (toolsOf(scene).length === 0 && scene.dimensions === 3) return "A scene in space is changed in its forms and its text: there is nothing here to draw on, as a place on the screen is no place in space.";

@@ -17,7 +17,7 @@ pub trait Buffer {
     /// Number of waiting rows.
     fn rows(&self) -> usize;
 
-    /// Whether rows must be recorded before more should be kept.
+    /// Returns whether rows must be recorded before more should be kept.
     fn is_full(&self) -> bool {
         self.rows() >= MAX_ROWS
     }
@@ -34,7 +34,7 @@ pub trait Buffers {
     /// Returns all tables, in the same order.
     fn buffers_mut(&mut self) -> Vec<&mut dyn Buffer>;
 
-    /// Whether rows must be recorded before more can be kept.
+    /// Returns whether rows must be recorded before more can be kept.
     fn is_full(&self) -> bool {
         self.buffers().iter().any(|buffer| buffer.is_full())
     }
@@ -66,7 +66,7 @@ impl<R> RowBuffer<R> {
         self.table = table;
     }
 
-    /// Whether rows are kept at all.
+    /// Returns whether rows are kept at all.
     pub fn is_kept(&self) -> bool {
         self.table.is_some()
     }
@@ -128,7 +128,7 @@ impl BlockBuffer {
         self.schema = schema;
     }
 
-    /// Whether a block is kept at all.
+    /// Returns whether a block is kept at all.
     pub fn is_kept(&self) -> bool {
         self.schema.is_some()
     }

@@ -214,7 +214,7 @@ impl Texts {
         self.ends.len()
     }
 
-    /// Whether there are no cells.
+    /// Returns whether there are no cells.
     pub fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }

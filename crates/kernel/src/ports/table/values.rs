@@ -75,7 +75,7 @@ impl Values {
         each!(self, cells => cells.len())
     }
 
-    /// Whether there are no values.
+    /// Returns whether there are no values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -85,7 +85,7 @@ impl Values {
         each!(self, cells => cells.valid())
     }
 
-    /// Whether the value in `row` is missing, or there is no such row.
+    /// Returns whether the value in `row` is missing, or there is no such row.
     pub fn is_missing(&self, row: usize) -> bool {
         each!(self, cells => cells.get(row).is_none())
     }
@@ -133,7 +133,7 @@ impl Values {
         }
     }
 
-    /// Whether the values are numbers.
+    /// Returns whether the values are numbers.
     pub fn is_numeric(&self) -> bool {
         !matches!(self, Self::Bool(_) | Self::Label(_) | Self::Text(_))
     }

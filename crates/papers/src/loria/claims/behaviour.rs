@@ -53,7 +53,7 @@ fn collisions(r: &Reliability) -> Claim {
         judged(at_places.chain(at_levels)),
         format!(
             "Presets, rule cut, per 1000 actions: {}; sensors - effectors {}. Sensors are above \
-             effectors at {} of {} places (floors, rules, behaviours), and effectors above \
+             effectors at {} of {} places (floors, rules, behaviors), and effectors above \
              reliable at {}. At equal error level, of {} points: sensors more at {}, effectors at {}, \
              not to be told at {} (by Holm). {}",
             by_regime(|regime| r.estimate(Key::BASE, regime, CONTACTS)),
@@ -82,7 +82,7 @@ fn flips(r: &Reliability) -> String {
         format!("{mind}, {beams} beams, {spread}: {from}")
     };
     let cases: Vec<String> = SweepCase::all().map(sentence).collect();
-    format!("Sensors cause more, by behaviour, beams and recipe: {}.", cases.join("; "))
+    format!("Sensors cause more, by behavior, beams and recipe: {}.", cases.join("; "))
 }
 
 fn slowest_trips(r: &Reliability) -> Claim {

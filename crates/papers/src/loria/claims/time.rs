@@ -48,7 +48,7 @@ fn initialization(p: &Performance) -> Claim {
     }
 }
 
-/// Whether time over workers decides nothing: there is one processor, or others were using them.
+/// Returns whether time over workers decides nothing: there is one processor, or others were using them.
 fn is_excused(p: &Performance) -> bool {
     p.most_workers() == 1 || p.was_busy()
 }

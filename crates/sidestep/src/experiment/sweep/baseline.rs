@@ -140,7 +140,7 @@ impl Search<'_> {
         has_name && settings.iter().all(|setting| self.has(variant, setting, defaults))
     }
 
-    /// Whether the variant has this setting, or the scenario where the variant does not set the key.
+    /// Returns whether the variant has this setting, or the scenario where the variant does not set the key.
     fn has(
         &self,
         variant: &Variant,

@@ -86,8 +86,8 @@ impl Sweep {
     }
 }
 
-/// Whether a key is this one, or lies below it. A table that stands alone in an array needs no index: `robots.count` may
-/// be `robots.0.count`.
+/// Returns whether a key is this one, or lies below it. A table that stands alone in an array needs no index:
+/// `robots.count` may be `robots.0.count`.
 fn is_within(key: &str, above: &str) -> bool {
     let parts = |key: &str| key.split('.').filter(|part| *part != "0").map(String::from).collect();
     let [key, above]: [Vec<String>; 2] = [key, above].map(parts);

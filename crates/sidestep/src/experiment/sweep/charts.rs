@@ -40,7 +40,7 @@ pub(super) fn figures(groups: &Groups<'_>, metric: &RunColumn) -> Vec<Figure> {
     }
 }
 
-/// Whether variants are samples of a box of parameters: no two of them lie on a line, or there are many
+/// Returns whether variants are samples of a box of parameters: no two of them lie on a line, or there are many
 /// and some number is another in each of them, as in a Latin hypercube whose other sides are whole
 /// numbers.
 pub(super) fn is_scattered(groups: &Groups<'_>) -> bool {

@@ -61,7 +61,7 @@ pub(super) struct Groups<'a> {
     pub(super) parameters: Vec<Parameter>,
     /// The metrics in words.
     meanings: &'static [Meaning],
-    /// For each variant, whether seeds change nothing in it.
+    /// Whether seeds change nothing, variant by variant.
     pub(super) seedless: Vec<bool>,
     /// The run of each variant and replicate.
     run: BTreeMap<(usize, i64), usize>,
@@ -173,7 +173,7 @@ impl<'a> Groups<'a> {
         Estimate::of((0..self.replicates.len().min(all)).map(mean))
     }
 
-    /// Whether every level of `parameter` occurs with the same levels of all others, as in a full
+    /// Returns whether every level of `parameter` occurs with the same levels of all others, as in a full
     /// grid: only then does a mean over the others compare like with like.
     pub(super) fn is_balanced(&self, parameter: usize) -> bool {
         let mut others = vec![Vec::new(); self.parameters[parameter].levels.len()];
@@ -287,7 +287,7 @@ fn together(parameters: impl Iterator<Item = Parameter>) -> Vec<Parameter> {
 }
 
 impl Parameter {
-    /// Whether two parameters, not both of them numbers, tell the same variants apart.
+    /// Returns whether two parameters, not both of them numbers, tell the same variants apart.
     fn goes_with(&self, other: &Self) -> bool {
         let mut pairs: Vec<_> = self.of_variant.iter().zip(&other.of_variant).collect();
         pairs.sort_unstable();

@@ -191,7 +191,7 @@ impl Plan {
         self.variants.len() as u64 * u64::from(self.replicates)
     }
 
-    /// Whether there are no cells; a plan always has some.
+    /// Returns whether there are no cells; a plan always has some.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

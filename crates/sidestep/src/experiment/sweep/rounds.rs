@@ -19,9 +19,9 @@ const MIN_RUNS: usize = 10;
 pub struct Rounds<'a> {
     plan: &'a Plan,
     until: &'a Until,
-    /// For each variant, by metric, the values by replicate.
+    /// Values by replicate of each variant, by metric.
     values: Vec<BTreeMap<String, Values>>,
-    /// For each variant, the replicates that have an outcome.
+    /// Replicates of each variant that have an outcome.
     done: Vec<BTreeSet<u32>>,
 }
 
@@ -125,7 +125,7 @@ impl<'a> Rounds<'a> {
         rule.next_of(&columns)
     }
 
-    /// Whether a metric differs between two runs of a variant's first round, for any variant: a
+    /// Returns whether a metric differs between two runs of a variant's first round, for any variant: a
     /// rare event is then looked for also in variants that have not had it.
     fn varies(&self, name: &str) -> bool {
         let differ = |values: &Values| {

@@ -35,7 +35,7 @@ impl Rows {
         self.cells.len()
     }
 
-    /// Whether there are no outcomes.
+    /// Returns whether there are no outcomes.
     pub fn is_empty(&self) -> bool {
         self.cells.is_empty()
     }

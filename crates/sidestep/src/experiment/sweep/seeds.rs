@@ -55,7 +55,7 @@ impl<'a> Trials<'a> {
         }
     }
 
-    /// Whether all trials of a variant ended alike.
+    /// Returns whether all trials of a variant ended alike.
     pub fn is_settled(&self, variant: u32) -> bool {
         let Some(ends) = self.ends.get(&variant) else { return false };
         let mut ends = ends.values();
@@ -63,7 +63,7 @@ impl<'a> Trials<'a> {
         ends.len() + 1 == TRIALS as usize && ends.all(|end| Some(end) == first)
     }
 
-    /// Whether a cell is of use: it is not where its variant is settled without it.
+    /// Returns whether a cell is of use: it is not where its variant is settled without it.
     pub fn asks_for(&self, cell: &Cell) -> bool {
         cell.replicate < TRIALS || !self.is_settled(cell.variant)
     }

@@ -151,7 +151,7 @@ fn reference(
     }
 }
 
-/// Whether several parameters are varied independently.
+/// Returns whether several parameters are varied independently.
 fn is_grid(groups: &Groups<'_>) -> bool {
     let parameters = groups.parameters.len();
     parameters > 1 && (0..parameters).all(|p| groups.is_balanced(p))

@@ -57,7 +57,7 @@ fn what_is_put_off_or_proven_is_what_single_motions_do() {
     }
 }
 
-/// Whether two scenarios lead the first chain to the same places with the same counts.
+/// Returns whether two scenarios lead the first chain to the same places with the same counts.
 fn assert_same_end<const D: usize>(seed: u64, one: &str, other: &str, cycles: u64) {
     let [one, other] = [one, other].map(|text| {
         let mut run = run::<D>(&source(seed, text), 1);

@@ -333,7 +333,7 @@ fn run<const D: usize>(source: &Source, workers: usize) -> Running<D> {
     Running(run)
 }
 
-/// To a cycle, or to the end of all tasks.
+/// Advances the run to a cycle, or to the end of all tasks.
 fn advance_to<const D: usize>(run: &mut Running<D>, cycle: u64) {
     while run.cycle() < cycle && !run.is_over() {
         let left = cycle - run.cycle();

@@ -14,14 +14,14 @@ fn apart<const D: usize>(a: [f64; D], b: [f64; D]) -> f64 {
     sub(a, b).iter().fold(0.0, |all, x| hypot(all, *x))
 }
 
-/// From a point to a segment.
+/// Returns the distance from a point to a segment.
 fn to_segment<const D: usize>(p: [f64; D], [a, b]: [[f64; D]; 2]) -> f64 {
     let d = sub(b, a);
     let part = (dot(sub(p, a), d) / dot(d, d).max(1e-300)).clamp(0.0, 1.0);
     apart(p, std::array::from_fn(|i| a[i] + part * d[i]))
 }
 
-/// From a segment to a segment, by ternary search: the distance along one is convex.
+/// Returns the distance between two segments, by ternary search: the distance along one is convex.
 fn between<const D: usize>(one: [[f64; D]; 2], two: [[f64; D]; 2]) -> f64 {
     let at =
         |s: f64| to_segment(std::array::from_fn(|i| one[0][i] + s * (one[1][i] - one[0][i])), two);
@@ -33,7 +33,7 @@ fn between<const D: usize>(one: [[f64; D]; 2], two: [[f64; D]; 2]) -> f64 {
     at(lo).min(at(hi))
 }
 
-/// Whether the boxes of two segments are half a meter apart.
+/// Returns whether the boxes of two segments are half a meter apart.
 fn are_far<const D: usize>(one: [[f64; D]; 2], two: [[f64; D]; 2]) -> bool {
     let lo = |[a, b]: [[f64; D]; 2], i: usize| a[i].min(b[i]);
     let hi = |[a, b]: [[f64; D]; 2], i: usize| a[i].max(b[i]);

@@ -193,7 +193,7 @@ fn a_run_is_over_when_all_tasks_of_all_chains_are_done() {
     assert!(metrics.max_rod_violation_m <= 1e-9 && metrics.given_up.is_empty(), "{metrics:?}");
 }
 
-/// Of a time by time, of a script by motions, of targets by targets, without an end by the run.
+/// Progress is told of a time by time, of a script by motions, of targets by targets, without an end by the run.
 #[test]
 fn progress_means_what_the_task_asks_for() {
     let progress = |task: &str, cycles: u64| {

@@ -109,8 +109,9 @@ fn a_swarm_past_a_disc_has_the_same_bits_however_it_is_run() {
     assert_d1::<2>(CROSSED, 1500, &[0, 850, 1100, 1499]);
 }
 
-/// Whether two neighbors of the swarm can be on both sides of the disc while it is as near to the wall as it comes: a
-/// search over their places, in steps of 2 cm. Distances are in meters from the middle of the disc, and from the wall.
+/// Returns whether two neighbors of the swarm can be on both sides of the disc while it is as near to the wall as it
+/// comes: a search over their places, in steps of 2 cm. Distances are in meters from the middle of the disc, and from
+/// the wall.
 fn neighbors_fit_beside(room_m: f64, robot_m: f64) -> bool {
     let (disc_m, longest_m) = (0.3, 0.8);
     let places = |side: f64| {

@@ -41,7 +41,7 @@
 //!
 //! Nothing in this depends on why an airplane is not heard, or for how long: a dead radio, a
 //! network in two parts, a link that works one way only, a burst of losses, or an airplane that has
-//! just come in. Nobody has to tell one from the other, and nobody waits for an answer for ever,
+//! just come in. Nobody has to tell one from the other, and nobody waits for an answer forever,
 //! because two airplanes go first in turn.
 
 mod scene;

@@ -66,7 +66,7 @@ pub struct Start {
     pub near: Vec<Sighted>,
     /// Airplanes near it that mind nobody, by rising id.
     pub intruders: Vec<Intruder>,
-    /// Of each of those near, whether it was heard lately or is met for the first time.
+    /// Whether each of those near was heard lately or is met for the first time.
     pub expected: Vec<bool>,
     /// Number of all airplanes.
     pub airplanes: usize,
@@ -92,7 +92,7 @@ pub struct Agent {
     roster: Roster,
     /// Those near whose beacons have come from themselves.
     heard: BTreeSet<EntityId>,
-    /// Of those near, whether nothing more will come from it.
+    /// Whether nothing more will come from each of those near.
     gone: Vec<bool>,
     /// Items that have not been passed on: airplane, and whether it is the report.
     kept: BTreeSet<(EntityId, bool)>,

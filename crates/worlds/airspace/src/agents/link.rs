@@ -4,7 +4,7 @@
 //! agent's messages and keeps them; an endpoint that misses one asks for it again. One that does
 //! not answer, although asked so often that it can hardly be alive and in touch, or until the time
 //! for this step is up, is given up for this talk: the agent goes on with its knowledge of it. One
-//! that was not heard in the talk before is asked less often. So nobody waits for ever, and a loss
+//! that was not heard in the talk before is asked less often. So nobody waits forever, and a loss
 //! costs time instead of agreement.
 //!
 //! Endpoints and agents are state machines without a clock or a network of their own: ticks and

@@ -16,7 +16,7 @@
 //! | [`exchange`] | the shield: whether plans are safe together |
 //! | [`packet`] | the subjects of talks, and packets on their way out |
 //!
-//! No agent waits for ever: one that is not heard is presumed where it was last heard
+//! No agent waits forever: one that is not heard is presumed where it was last heard
 //! ([`contact`]).
 
 pub mod contact;

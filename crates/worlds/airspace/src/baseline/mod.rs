@@ -12,7 +12,7 @@ use sidestep_kernel::{Slot, math};
 pub(super) struct Moving {
     pub(super) slot: Slot,
     pub(super) at: Point,
-    /// Heading in radians, counter-clockwise from east.
+    /// Heading in radians, counterclockwise from east.
     pub(super) heading_rad: f64,
     /// Velocity in meters per second.
     pub(super) velocity: Point,

@@ -168,7 +168,7 @@ mod tests {
     }
 
     /// The headings that BlueSky 1.1.1 commands for the same poses after one look (`traf.cr.trk`, as
-    /// degrees counter-clockwise from east), with `RMETHH HDG`, a zone of 500 m, `RFACH 1.05`,
+    /// degrees counterclockwise from east), with `RMETHH HDG`, a zone of 500 m, `RFACH 1.05`,
     /// `DTLOOK 90`, and the bearings of its module `_geo`.
     #[test]
     fn headings_are_those_of_bluesky() {

@@ -95,7 +95,7 @@ fn every_method_decides_alike_whether_groups_are_heard_or_announced() {
     }
 }
 
-/// As fast as scenarios allow: a filed flight, and a glitch of a recording in a wind.
+/// Flights as fast as scenarios allow: a filed one, and a glitch of a recording in a wind.
 const FAST: &str = "[airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 5000.0\n\
     [[airplanes]]\nat_m = [0, -4000]\nheading_deg = 90\nway_points_m = [[0, 5e8]]\nv_m_s = 1e6\nintruder = true\n\
     [[airplanes]]\ntrack = [[0, 0, -4000, 0], [10, 0, -3000, 0], [11, 999995, -3000, 0], [12, 0, -2800, 0], [90, 0, 5000, 0]]\n";

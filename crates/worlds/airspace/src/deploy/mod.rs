@@ -217,7 +217,7 @@ mod tests {
         assert!(pim > 1.5 * network_s("pim", ""), "{pim} s");
     }
 
-    /// Without the shield, too, nobody waits for ever; an airplane that is not heard flies on.
+    /// Without the shield, too, nobody waits forever; an airplane that is not heard flies on.
     #[test]
     fn without_the_shield_a_silent_airplane_stops_nobody() {
         for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {

@@ -104,8 +104,8 @@ impl Legs {
 }
 
 /// Returns the action set of a model, ordered by turn rate, the optimal action last. Without legs
-/// it is the paper's: `2 m + 1` actions, every rate held for ever and for `dt_s`. With legs, which
-/// never start a turn only to undo it, these take the place of the held turns; straight on for ever
+/// it is the paper's: `2 m + 1` actions, every rate held forever and for `dt_s`. With legs, which
+/// never start a turn only to undo it, these take the place of the held turns; straight on forever
 /// remains. `holds_s` are further times in seconds for which turns are held.
 pub fn actions(model: &Model, dt_s: f64, holds_s: &[f64], legs: &Legs) -> Vec<Action> {
     let m = model.turns;

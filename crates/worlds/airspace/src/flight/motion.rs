@@ -1,6 +1,6 @@
 //! Motion: place, heading and speed of an airplane.
 //!
-//! Plane meters, x east and y north; headings in radians, counter-clockwise from east; a
+//! Plane meters, x east and y north; headings in radians, counterclockwise from east; a
 //! positive turn rate turns left. Source: section 3 of the paper; the step is exact.
 
 use serde::{Deserialize, Serialize};
@@ -40,7 +40,7 @@ impl Model {
 pub struct Pose {
     /// Position in meters, x east and y north.
     pub at: Point,
-    /// Heading in radians, counter-clockwise from east.
+    /// Heading in radians, counterclockwise from east.
     #[serde(rename = "psi_rad")]
     pub heading_rad: f64,
 }

@@ -21,7 +21,7 @@ pub struct FlightOrder {
 /// A task for an airplane.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Task {
-    /// Keep a heading, radians counter-clockwise from east, until sent to a way-point again.
+    /// Keep a heading, radians counterclockwise from east, until sent to a way-point again.
     Heading(f64),
     /// Fly with this airspeed, m/s.
     Speed(f64),

@@ -19,7 +19,7 @@ pub enum After {
 /// The rule by which an airplane is done with a way-point.
 ///
 /// It is reached within a tolerance. But an airplane whose way-point lies inside one of its two
-/// tightest turning circles would orbit it for ever, because steering for it keeps the airplane on
+/// tightest turning circles would orbit it forever, because steering for it keeps the airplane on
 /// that circle. Such a way-point counts as *passed* when it is abeam on the near side. That happens
 /// within one turn round the circle, and there the airplane is as near as it can be without flying
 /// away first.
@@ -294,7 +294,7 @@ mod tests {
             prop_assert!(apart_m(last) < tolerance_m || apart_m(last) < nearest_m + 35.0);
         }
 
-        /// As above, for airplanes that turn as fast as scenarios allow, in steps of all lengths.
+        /// The same for airplanes that turn as fast as scenarios allow, in steps of all lengths.
         #[test]
         fn nobody_orbits_a_way_point_for_ever_however_fast_it_turns(
             heading_rad in -3.2f64..3.2, x in -300.0f64..300.0, y in -300.0f64..300.0,

@@ -77,7 +77,7 @@ pub(crate) fn later(airplane: &Airplane) -> Vec<Later> {
     all
 }
 
-/// Returns way-points that lead along a heading for ever.
+/// Returns way-points that lead along a heading forever.
 fn ahead(heading_rad: f64, way_points: usize) -> Arc<[Point]> {
     let far = [FAR_AHEAD_M * math::cos(heading_rad), FAR_AHEAD_M * math::sin(heading_rad)];
     vec![far; way_points].into()

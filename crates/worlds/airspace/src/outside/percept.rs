@@ -223,7 +223,7 @@ pub(super) fn spaces(world: &AirspaceWorld, agents: &[EntityId]) -> Vec<Space> {
         Space::new("due", is(), "whether it decides in the next cycle; all else is padding if not"),
         Space::new("place_m", FREE, "its place, east and north, as all see it").shaped([2]),
         Space::new("altitude_m", FREE, "its altitude"),
-        Space::new("heading_rad", ANGLE, "its heading, counter-clockwise from east"),
+        Space::new("heading_rad", ANGLE, "its heading, counterclockwise from east"),
         Space::new("speed_m_s", POSITIVE, "its speed through the air"),
         Space::new(
             "turn_rate_rad_s",
@@ -278,7 +278,7 @@ fn neighbor_spaces(world: &AirspaceWorld) -> Vec<Space> {
         )
         .shaped([MOST_NEIGHBORS, 2]),
         each("neighbor_above_m", FREE, "how far they are above it"),
-        each("neighbor_heading_rad", ANGLE, "their headings, counter-clockwise from east"),
+        each("neighbor_heading_rad", ANGLE, "their headings, counterclockwise from east"),
         each("neighbor_speed_m_s", POSITIVE, "their speeds through the air"),
         each("neighbor_separation_m", POSITIVE, "the distances that it and they are to keep"),
         each("neighbor_minds", is(), "whether they mind others"),

@@ -16,7 +16,7 @@ use sidestep_kernel::{Cycle, EntityId, Slot};
 /// Distance in meters beyond which all goals rank alike.
 const FARTHEST_M: f64 = 2e9;
 /// Part of a `dt`'s way by which a refusal brings an airplane forward in rank, so that it does not
-/// wait for ever.
+/// wait forever.
 const REFUSED_PART: f64 = 0.125;
 
 /// Everything that an airplane perceives at the start of a cycle: one message. Whatever else it knows it has
@@ -112,7 +112,7 @@ impl Own {
     }
 
     /// Returns its rank. It is higher the nearer its goal is, so that it is soon out of
-    /// the others' way, and the more often its wish was refused, so that nobody waits for ever. Whole
+    /// the others' way, and the more often its wish was refused, so that nobody waits forever. Whole
     /// meters in the upper half; the id in the lower half makes it unique.
     fn rank(&self, dt_s: f64, stage: &Stage<'_>) -> u64 {
         let ahead = &stage.mission[(self.next as usize).min(stage.mission.len())..];

@@ -21,13 +21,13 @@ use std::sync::Arc;
 
 /// The outcome of a talk.
 pub(super) enum Came {
-    /// Of looking for those who decide together.
+    /// Those who decide together.
     Found(Found),
-    /// Of an optimization.
+    /// The conclusion of an optimization.
     Decided(Conclusion),
-    /// Of telling each other where all mean to fly.
+    /// The ways that all mean to fly.
     Told(Vec<Option<Intent>>),
-    /// Of the shield's exchange.
+    /// The result of the shield's exchange.
     Agreed(Agreed),
 }
 

@@ -1,4 +1,4 @@
-//! From a scenario's sections to an immutable world.
+//! Compilation of a scenario's sections to an immutable world.
 
 use super::{AirspaceFile, Compiled, Preset, Recipe};
 use crate::baseline::Reactive;
@@ -337,7 +337,7 @@ fn enough_cycles(world: &AirspaceWorld) -> u64 {
     FEWEST_CYCLES.max((TIMES_ALONE * longest_s / world.timing.dt_s).ceil() as u64)
 }
 
-/// Returns the time until which something is told of an airplane that flies on for ever.
+/// Returns the time until which something is told of an airplane that flies on forever.
 fn told_until_s(world: &AirspaceWorld, i: usize) -> f64 {
     let airplane = &world.airplanes[i];
     let last_s = airplane.orders.last().map_or(0.0, |order| order.at_s);

@@ -11,7 +11,7 @@
 //! the search never asks it of them. So the induction holds with this wider gap on new plans.
 //!
 //! **Headings.** A way is flown for one `dt` from a heading that is seen, so no gust disturbs it.
-//! An orbit is flown for ever. Airplanes orbit at less than their largest turn rate and have the
+//! An orbit is flown forever. Airplanes orbit at less than their largest turn rate and have the
 //! rest, `a`, to correct ([`hold`]). Let `D` be the bound, `v` the speed, and let `held` be the pose
 //! on the orbit that was stored, moved along it. At the start of each `dt` on it
 //!

@@ -80,7 +80,7 @@ impl Flyer {
     }
 
     /// Returns two discs that it cannot leave, whatever way it flies for `dt_s` seconds and to
-    /// whichever side it turns for ever after that: their centers, and their radius in meters.
+    /// whichever side it turns forever after that: their centers, and their radius in meters.
     ///
     /// At any time it is on the circle to its left that it would fly from there, whose center is at
     /// right angles to its heading. Flown straight on, that center ends `v dt` ahead, which is the

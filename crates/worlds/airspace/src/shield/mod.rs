@@ -1,7 +1,7 @@
 //! The shield: a filter that provably keeps airplanes apart.
 //!
 //! It stands between any method and the airplanes. Every airplane stores a *fallback* that it can
-//! fly for ever: an orbit to the left or to the right.
+//! fly forever: an orbit to the left or to the right.
 //!
 //! **Invariant.** The stored fallbacks of any two airplanes that are not *named* as a pair are at
 //! least `R` apart, from now on and for all time, unless the two are on levels that do not meet.

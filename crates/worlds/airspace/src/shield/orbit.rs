@@ -39,7 +39,7 @@ impl Side {
     }
 }
 
-/// A circle that is flown for ever.
+/// A circle that is flown forever.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Orbit {
     center: Point,

@@ -76,7 +76,7 @@ fn nearest_on_orbits(flyers: &[Flyer], seconds: usize) -> f64 {
 }
 
 proptest! {
-    /// Step 1 of the proof: first fallbacks without clashes stay apart for ever.
+    /// Step 1 of the proof: first fallbacks without clashes stay apart forever.
     #[test]
     fn first_fallbacks_stay_apart(flyers in some_flyers()) {
         let flyers = with_fallbacks(flyers);

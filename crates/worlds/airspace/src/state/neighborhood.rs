@@ -10,9 +10,9 @@ const NOBODY: u32 = u32::MAX;
 #[derive(Debug)]
 pub(in super::super) struct Neighborhood {
     side_m: f64,
-    /// For each bucket: cycle (upper half) and last airplane listed (lower half).
+    /// Cycle (upper half) and last airplane listed (lower half) of each bucket.
     first: Box<[AtomicU64]>,
-    /// For each airplane: the one listed before it.
+    /// The airplane listed before each one.
     next: Column<u32>,
 }
 

@@ -15,14 +15,14 @@ struct Alone<'a> {
     world: &'a AirspaceWorld,
     airplane: &'a Airplane,
     slot: Slot,
-    /// When the method takes it over, in seconds after the start of the run.
+    /// The time at which the method takes it over, in seconds after the start of the run.
     joins_s: f64,
     pose: Pose,
     orders: u32,
     next: usize,
     /// Number of steps flown, those at once among them.
     steps: usize,
-    /// Whether it flies on for ever after its last order.
+    /// Whether it flies on forever after its last order.
     keeps_a_heading: bool,
 }
 

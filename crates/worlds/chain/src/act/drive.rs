@@ -6,7 +6,7 @@ use crate::driver::{Driver, Targets, Task, Wander, wander};
 use crate::events::EventKind;
 use crate::metrics::GivenUp;
 use crate::notes::Wanted;
-use crate::rods::geometry::{Point, along, distance, in_dimensions, towards};
+use crate::rods::geometry::{Point, along, distance, in_dimensions, toward};
 use crate::script::Motion;
 use crate::state::Plan;
 use crate::swarm::drive::Pose;
@@ -169,7 +169,7 @@ impl<const D: usize> Acting<'_, D> {
             self.plan_if_late(task, targets);
             return match self.body.plan {
                 Some(_) => Wish::Follow,
-                None => Wish::Go(towards(at, target, step_m)),
+                None => Wish::Go(toward(at, target, step_m)),
             };
         }
         self.body.plan = None;
@@ -198,7 +198,7 @@ impl<const D: usize> Acting<'_, D> {
                     let left_m = distance(at, to);
                     driving.nearest_m = driving.nearest_m.min(left_m);
                     if left_m > there_m {
-                        return Wish::Go(towards(at, to, step_m));
+                        return Wish::Go(toward(at, to, step_m));
                     }
                 }
             }

@@ -3,7 +3,7 @@
 use super::Acting;
 use crate::events::{Event, EventKind};
 use crate::rods::TOLERANCE_M;
-use crate::rods::geometry::{Point, towards};
+use crate::rods::geometry::{Point, toward};
 use crate::rods::passage::in_the_way;
 use crate::rods::sweep::Sweep;
 use crate::state::Scattered;
@@ -66,7 +66,7 @@ impl<const D: usize> Acting<'_, D> {
         }
         for shorter in SHORTER {
             let ways = from.iter().zip(goals);
-            let to: Vec<_> = ways.map(|(p, goal)| towards(*p, *goal, shorter * step_m)).collect();
+            let to: Vec<_> = ways.map(|(p, goal)| toward(*p, *goal, shorter * step_m)).collect();
             match self.in_its_way(part.start, &from, &to) {
                 None => {
                     self.body.chain.points_mut()[part].copy_from_slice(&to);

@@ -258,8 +258,8 @@ impl<'a, const D: usize> Acting<'a, D> {
         objection.or_else(|| self.passes(from, posed).map(tunnels))
     }
 
-    /// Whether a connector goes farther than it may: at the speed of led joints from where it was before this motion,
-    /// or at that of escapes from where it was before the cycle.
+    /// Returns whether a connector goes farther than it may: at the speed of led joints from where it was before this
+    /// motion, or at that of escapes from where it was before the cycle.
     fn is_too_fast(&self, i: usize, from: Point<D>, to: Point<D>) -> bool {
         let escape_m = self.world.escape.as_ref().map(|e| e.speed_max_m_s * self.world.dt_s);
         let is_beyond = |from, most_m: f64| distance(from, to) > most_m * (1.0 + ROUNDING);

@@ -8,7 +8,7 @@ use crate::rods::geometry::{Point, distance};
 use crate::rods::veto::Moved;
 
 impl<const D: usize> Acting<'_, D> {
-    /// Whether the chain may follow the initiator's motion of this cycle later. The first cycle
+    /// Returns whether the chain may follow the initiator's motion of this cycle later. The first cycle
     /// measures all rods, so that later only those count that move.
     pub(super) fn may_put_off(&self) -> bool {
         let (world, body) = (self.world, &*self.body);
@@ -23,7 +23,7 @@ impl<const D: usize> Acting<'_, D> {
             && self.task().is_some_and(|task| self.leads_in_range(task))
     }
 
-    /// Whether a task moves connector 0, and cannot leave the range of coordinates in this cycle.
+    /// Returns whether a task moves connector 0, and cannot leave the range of coordinates in this cycle.
     fn leads_in_range(&self, task: &Task<D>) -> bool {
         let most_m = MAX_COORDINATE_M - 2.0 * task.speed_m_s * self.world.dt_s;
         task.agent == 0

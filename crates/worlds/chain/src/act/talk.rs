@@ -15,7 +15,7 @@ use crate::state::Missing;
 use std::collections::BTreeMap;
 
 impl<const D: usize> Acting<'_, D> {
-    /// Whether agents move the chain.
+    /// Returns whether agents move the chain.
     pub(super) fn is_team(&self) -> bool {
         self.world.deployment == Deployment::Team
     }

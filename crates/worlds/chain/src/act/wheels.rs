@@ -5,7 +5,7 @@ use super::go::Went;
 use crate::driver::{Driver, Task};
 use crate::formation::Robot;
 use crate::navigate::{Goal, Navigator};
-use crate::rods::geometry::{Point, distance, in_dimensions, towards};
+use crate::rods::geometry::{Point, distance, in_dimensions, toward};
 use crate::swarm::drive::{Pose, Wheels};
 use crate::swarm::follower::pace;
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
@@ -22,7 +22,7 @@ const LEFT_TO_OTHERS: f64 = 0.25;
 pub(super) const SAME_RAD: f64 = 1e-9;
 
 impl<const D: usize> Acting<'_, D> {
-    /// Whether a navigator has reached its goal.
+    /// Returns whether a navigator has reached its goal.
     pub(super) fn has_arrived(&self, task: &Task<D>, navigator: &Navigator) -> bool {
         let at = in_dimensions(self.body.chain.points()[task.agent]);
         let index = self.body.driving.next as usize;
@@ -68,7 +68,7 @@ impl<const D: usize> Acting<'_, D> {
         let k = task.agent;
         let (at, robot) = (self.body.chain.points()[k], in_dimensions(leader.pose.at));
         let has_fled = self.scratch.escaped.get(k) != self.scratch.before.get(k);
-        (at != robot).then(|| if has_fled { at } else { towards(at, robot, step_m) })
+        (at != robot).then(|| if has_fled { at } else { toward(at, robot, step_m) })
     }
 
     /// Returns the heading to turn to in this cycle where a navigator's robot faces elsewhere than it did when
@@ -107,7 +107,7 @@ impl<const D: usize> Acting<'_, D> {
         }
     }
 
-    /// Whether a leader's robot would come nearer to another one of its chain than that one, which keeps a
+    /// Returns whether a leader's robot would come nearer to another one of its chain than that one, which keeps a
     /// part of the gap for itself, allows for.
     fn comes_too_near(&self, agent: usize, to: Point<2>) -> bool {
         let robots = &self.body.robots;

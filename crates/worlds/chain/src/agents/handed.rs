@@ -52,7 +52,7 @@ impl<const D: usize> Handed<D> {
     }
 }
 
-/// Whether a decision is about connectors of a chain of `n`.
+/// Returns whether a decision is about connectors of a chain of `n`.
 fn is_right<const D: usize>(control: &Control<D>, n: usize) -> bool {
     let is_there = |k: u32| (k as usize) < n;
     let is_veto = |veto: &Veto<D>| veto.by < n && veto.from < n;

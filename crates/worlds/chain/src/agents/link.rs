@@ -149,12 +149,12 @@ impl<M: Clone> Link<M> {
         Some(parcel)
     }
 
-    /// Whether everything has arrived, or the neighbor is lost.
+    /// Returns whether everything has arrived, or the neighbor is lost.
     pub(super) fn is_quiet(&self) -> bool {
         self.is_lost || self.said.is_empty()
     }
 
-    /// Whether anything has come from the neighbor in this cycle.
+    /// Returns whether anything has come from the neighbor in this cycle.
     pub(super) fn is_heard(&self) -> bool {
         self.is_heard
     }

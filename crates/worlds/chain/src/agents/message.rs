@@ -45,28 +45,28 @@ pub(super) struct Packet<const D: usize> {
 pub(super) enum Message<const D: usize> {
     /// "I am here." The packet around it says who is lost.
     Here,
-    /// From a master: "I am to go there. Can you follow?"
+    /// A master's "I am to go there. Can you follow?"
     Prepare(Prepare<D>),
-    /// From a slave: "I can, and so can all beyond me that have to."
+    /// A slave's "I can, and so can all beyond me that have to."
     Consent(Consent<D>),
-    /// From a slave: "I cannot, or somebody beyond me cannot."
+    /// A slave's "I cannot, or somebody beyond me cannot."
     Object(Objection),
-    /// From a master: "All of that motion is carried out", or none of it.
+    /// A master's "All of that motion is carried out", or none of it.
     Settle {
         /// Number of the motion.
         request: u32,
         /// Whether it is carried out.
         goes: bool,
     },
-    /// From a leader to the far end: "Where are you, and where does your rod point?"
+    /// A leader's question to the far end: "Where are you, and where does your rod point?"
     AskEnd,
     /// The answer: place, and direction out of the chain.
     End(Place<D>, Option<Place<D>>),
-    /// From a leader to the far end: "Lead a motion."
+    /// A leader's order to the far end: "Lead a motion."
     Order(Order<D>),
     /// The answer: its outcome; none if the target is beyond all coordinates.
     Done(Option<Outcome<D>>),
-    /// From a leader to all: "I have finished this cycle."
+    /// A leader's word to all: "I have finished this cycle."
     Over,
 }
 
@@ -165,7 +165,7 @@ fn is_length(length_m: f64) -> bool {
 }
 
 impl<const D: usize> Message<D> {
-    /// Whether its numbers make sense in a chain of `n` connectors.
+    /// Returns whether its numbers make sense in a chain of `n` connectors.
     fn is_right(&self, n: u32) -> bool {
         let is_place = |place: &Option<Place<D>>| place.is_none_or(|Place(at)| is_in_range(&at));
         match self {

@@ -31,7 +31,7 @@ impl Side {
         }
     }
 
-    /// Whether connector `other` is on this side of connector `k`.
+    /// Returns whether connector `other` is on this side of connector `k`.
     pub(crate) fn has(self, other: u32, k: u32) -> bool {
         match self {
             Self::Below => other < k,

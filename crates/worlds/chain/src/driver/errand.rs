@@ -3,7 +3,7 @@
 use crate::rods::chain::Chain;
 use crate::rods::geometry::{
     Point, across, add, along, angle_rad, between, distance, first_axis, norm, perpendicular,
-    scaled, sub, towards, unit,
+    scaled, sub, toward, unit,
 };
 use crate::rods::veto::Motion;
 use sidestep_kernel::math::{cos, sin};
@@ -26,7 +26,7 @@ impl<const D: usize> Errand<D> {
         let points = chain.points();
         match *motion {
             Motion::Connector { k, to } => {
-                let to = towards(points[k], to, step_m);
+                let to = toward(points[k], to, step_m);
                 Self { first: k, is_rod: false, from: [points[k]; 2], to: [to; 2] }
             }
             Motion::Rod { i, to } => {

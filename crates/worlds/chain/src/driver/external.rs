@@ -76,12 +76,12 @@ impl Came {
 }
 
 impl External {
-    /// Whether there is nothing to keep.
+    /// Returns whether there is nothing to keep.
     pub(crate) fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Whether it belongs to a chain of `n` connectors.
+    /// Returns whether it belongs to a chain of `n` connectors.
     pub(crate) fn is_within(&self, n: usize) -> bool {
         let Orders { connector, rod, .. } = self.orders;
         let is_there = |k: Option<u32>, most: usize| k.is_none_or(|k| (k as usize) < most);

@@ -22,9 +22,9 @@ pub enum Course<const D: usize> {
         /// The room that its whole body never leaves.
         room: Bounds<D>,
     },
-    /// From way point to way point. The middle of the body is at the first one at time 0.
+    /// A round from way point to way point. The middle of the body is at the first one at time 0.
     Patrol {
-        /// At least two; neighbors lie apart.
+        /// Way points, at least two; neighbors lie apart.
         way_points: Vec<Point<D>>,
         /// Whether it goes from the last way point straight to the first, or back the way it came.
         closed: bool,
@@ -102,7 +102,7 @@ impl<const D: usize> Mover<D> {
     }
 }
 
-/// Whether a box holds another, apart from rounding.
+/// Returns whether a box holds another, apart from rounding.
 fn holds<const D: usize>(room: &Bounds<D>, body: &Bounds<D>) -> bool {
     let slack_m = 1e-9;
     is_finite(&room.lo)
@@ -200,7 +200,7 @@ impl<const D: usize> Movers<D> {
         self.0.len()
     }
 
-    /// Whether there are none.
+    /// Returns whether there are none.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

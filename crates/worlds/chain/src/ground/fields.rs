@@ -171,7 +171,7 @@ impl<const D: usize> Clear<D> {
         Ok(Self { bodies: Obstacles::new(bodies, reach_m)?, keep_m })
     }
 
-    /// Whether a capsule between `ends` stays away from all of them.
+    /// Returns whether a capsule between `ends` stays away from all of them.
     fn is_away(&self, ends: [Point<D>; 2], radius_m: f64) -> bool {
         let reach_m = radius_m + self.keep_m;
         let mut is_away = reach_m.is_finite();

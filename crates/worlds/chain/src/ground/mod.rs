@@ -26,7 +26,7 @@ use sidestep_kernel::stream::Purpose;
 pub struct Pose {
     /// The place, meters.
     pub at: Point<2>,
-    /// Heading, counter-clockwise from the first axis, rad.
+    /// Heading, counterclockwise from the first axis, rad.
     pub heading_rad: f64,
 }
 

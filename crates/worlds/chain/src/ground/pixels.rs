@@ -95,7 +95,7 @@ impl Floor {
         self.solid.iter().filter(|&&solid| solid).count()
     }
 
-    /// Whether a pixel is solid; pixels outside the floor are like its surroundings.
+    /// Returns whether a pixel is solid; pixels outside the floor are like its surroundings.
     pub fn is_solid(&self, col: i64, row: i64) -> bool {
         let inside =
             (0..i64::from(self.width)).contains(&col) && (0..i64::from(self.height)).contains(&row);
@@ -106,7 +106,7 @@ impl Floor {
         }
     }
 
-    /// Whether a place is free.
+    /// Returns whether a place is free.
     pub fn is_free(&self, at: Point<2>) -> bool {
         let from = sub(at, self.corner_m);
         let pixel = |i: usize| (dot(from, self.axes[i]) / self.pixel_m[i]).floor() as i64;

@@ -56,7 +56,7 @@ impl Site {
         (first_id..).zip(all).map(|(id, obstacle)| Obstacle { id, ..obstacle }).collect()
     }
 
-    /// Whether a place is on no solid pixel. Boxes are ignored: see
+    /// Returns whether a place is on no solid pixel. Boxes are ignored: see
     /// [`Obstacles::clearance_m`](crate::rods::Obstacles::clearance_m).
     pub fn is_free(&self, at: Point<2>) -> bool {
         self.floors.iter().all(|floor| floor.is_free(at))

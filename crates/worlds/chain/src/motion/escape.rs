@@ -107,7 +107,7 @@ pub struct Escaped<const D: usize> {
     pub capped: usize,
     /// Depth of the deepest part still in a moving obstacle, meters; 0 if none is.
     pub deepest_m: f64,
-    /// That part.
+    /// The part that is left.
     pub left: Option<Left<D>>,
     /// The first part that got away: its connector, or the one at the start of its rod, and the
     /// obstacle that it got away from.

@@ -38,7 +38,7 @@ pub(crate) fn go<const D: usize>(
     held(propagator, chain, obstacles, &order, veto)
 }
 
-/// Whether an objection is that of a connector that is held.
+/// Returns whether an objection is that of a connector that is held.
 fn holds(reason: Reason) -> bool {
     matches!(reason, Reason::Fixed | Reason::Failed | Reason::Mobility)
 }
@@ -277,7 +277,7 @@ mod tests {
         let mut most_m = 0.0;
         for _ in 0..400 {
             let (before, at) = (chain.points().to_vec(), chain.points()[2]);
-            let to = crate::rods::geometry::towards(at, [1.199_94, 1.599_92], step_m);
+            let to = crate::rods::geometry::toward(at, [1.199_94, 1.599_92], step_m);
             let motion = Motion::Connector { k: 2, to };
             let request = Request { motion, source: Source::Autonomous, mode: Mode::Exact };
             go(&mut propagator, &mut chain, &Obstacles::default(), &request).unwrap();
@@ -298,7 +298,7 @@ mod tests {
             let target = [0.5 * n_rods as f64, 0.0];
             for _ in 0..4000 {
                 let before = arm.points().to_vec();
-                let to = crate::rods::geometry::towards(before[n_rods], target, 0.04);
+                let to = crate::rods::geometry::toward(before[n_rods], target, 0.04);
                 let request = Request::exact(n_rods, to);
                 go(&mut Propagator::new(rules), &mut arm, &Obstacles::default(), &request).unwrap();
                 assert!(longest(&before, arm.points()).1 <= joint_step_max_m);
@@ -330,7 +330,7 @@ mod tests {
         for place in places {
             for _ in 0..2000 {
                 let before = chain.points().to_vec();
-                let to = crate::rods::geometry::towards(before[k], *place, 0.01);
+                let to = crate::rods::geometry::toward(before[k], *place, 0.01);
                 let request = Request::exact(k, to);
                 let came =
                     go(&mut Propagator::new(rules), &mut chain, &Obstacles::default(), &request)

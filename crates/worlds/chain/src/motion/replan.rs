@@ -69,7 +69,7 @@ pub struct Situation {
 /// Outcome of a climb. The chain has moved only in the variants that hold a motion.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Climbed<const D: usize> {
-    /// As wanted.
+    /// The motion as wanted.
     Straight(Moved<D>),
     /// A part of the step.
     Shorter {
@@ -78,11 +78,11 @@ pub enum Climbed<const D: usize> {
         /// The motion.
         moved: Moved<D>,
     },
-    /// In another direction.
+    /// A motion in another direction.
     Sideways {
         /// The turn from the wanted direction, rad; positive to the left, in space toward the axis.
         turn_rad: f64,
-        /// In space: 0 if the turn was toward the second axis, 1 if toward the third.
+        /// The plane of the turn in space: 0 if it was toward the second axis, 1 if toward the third.
         plane: usize,
         /// The motion.
         moved: Moved<D>,
@@ -99,14 +99,14 @@ pub enum Climbed<const D: usize> {
     },
     /// The other end led.
     PulledBack {
-        /// That end.
+        /// The end that led.
         by: usize,
         /// The motion.
         moved: Moved<D>,
     },
     /// Nothing moved, and no rung is left; all objections, each once.
     Stuck {
-        /// From the wanted motion to the last rung; empty if the wanted motion would now be free
+        /// Vetoes from the wanted motion to the last rung; empty if the wanted motion would now be free
         /// and only detours have led here.
         vetoes: Vec<Veto<D>>,
     },

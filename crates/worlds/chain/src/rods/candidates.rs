@@ -292,7 +292,7 @@ impl<const D: usize> Scene<'_, D> {
         inside
     }
 
-    /// Whether a place is surely farther from the slave than it may go in one step.
+    /// Returns whether a place is surely farther from the slave than it may go in one step.
     fn is_too_far(&self, step: &Step<D>, at: Point<D>) -> bool {
         distance(step.so, at) > self.rules.slave_step_max_m * (1.0 + ROUNDING)
     }
@@ -325,7 +325,7 @@ fn contains_master<const D: usize>(step: &Step<D>, block: &Block<D>) -> bool {
 }
 
 fn sort<const D: usize>(step: &Step<D>, found: &mut [Candidate<D>]) {
-    // The sort is stable, so of equal candidates the counter-clockwise one, found first, stays
+    // The sort is stable, so of equal candidates the counterclockwise one, found first, stays
     // first.
     found.sort_by(|a, b| {
         let way = |c: &Candidate<D>| distance(c.at, step.so);

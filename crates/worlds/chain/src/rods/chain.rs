@@ -13,7 +13,7 @@ pub(crate) const LENGTH_TOLERANCE_M: f64 = 1e-9;
 /// Largest coordinate: farther from the origin, rounding is no longer small against the tolerances.
 pub(crate) const MAX_COORDINATE_M: f64 = 1e6;
 
-/// Whether a connector may be at a point at all: it must be finite, and at most 1e6 m from the
+/// Returns whether a connector may be at a point at all: it must be finite, and at most 1e6 m from the
 /// origin along every axis.
 pub(crate) fn is_in_range<const D: usize>(point: &Point<D>) -> bool {
     point.iter().all(|x| x.abs() <= MAX_COORDINATE_M)
@@ -29,9 +29,9 @@ pub(super) fn out_of_range<const D: usize>(target: &Point<D>) -> InputError {
 pub enum Mobility<const D: usize> {
     /// Anywhere.
     Free,
-    /// On the segment between two points.
+    /// The segment between two points.
     OnSegment([Point<D>; 2]),
-    /// On a plane, in two dimensions a line: `normal . x = offset_m`. The normal has length 1.
+    /// A plane, in two dimensions a line: `normal . x = offset_m`. The normal has length 1.
     OnPlane {
         /// Unit vector perpendicular to the plane.
         normal: Point<D>,
@@ -63,7 +63,7 @@ impl<const D: usize> Mobility<D> {
         }
     }
 
-    /// Whether `p` is allowed, within 1e-9 m.
+    /// Returns whether `p` is allowed, within 1e-9 m.
     pub fn allows(&self, p: Point<D>, at: Point<D>) -> bool {
         matches!(self, Self::Free) || distance(self.project(p, at), p) <= LENGTH_TOLERANCE_M
     }
@@ -88,7 +88,7 @@ impl<const D: usize> Connector<D> {
         Self { radius_m, mobility: Mobility::Free, failed: false, max_bend_rad: PI }
     }
 
-    /// Whether it never moves: fixed, or failed.
+    /// Returns whether it never moves: fixed, or failed.
     pub fn is_still(&self) -> bool {
         self.failed || self.mobility == Mobility::Fixed
     }
@@ -278,7 +278,7 @@ impl<const D: usize> Chain<D> {
         distance(self.points[rod], self.points[rod + 1])
     }
 
-    /// Whether a rod is within its limits, to a tolerance of `LENGTH_TOLERANCE_M`.
+    /// Returns whether a rod is within its limits, to a tolerance of `LENGTH_TOLERANCE_M`.
     pub fn is_rod_within(&self, i: usize) -> bool {
         let rod = self.rods[i];
         let allowed = rod.min_m - LENGTH_TOLERANCE_M..=rod.max_m + LENGTH_TOLERANCE_M;
@@ -325,7 +325,7 @@ impl<const D: usize> Chain<D> {
         self.still.thickest_m
     }
 
-    /// Whether every connector is free and bends without limit.
+    /// Returns whether every connector is free and bends without limit.
     pub fn is_plain(&self) -> bool {
         self.special == 0
     }

@@ -6,7 +6,7 @@
 
 pub use sidestep_kernel::geometry::{
     Point, across, add, along, angle_rad, between, cross, cross_2d, distance, dot, first_axis,
-    in_dimensions, is_finite, nearest_on_segment, norm, norm2, perpendicular, scaled, sub, towards,
+    in_dimensions, is_finite, nearest_on_segment, norm, norm2, perpendicular, scaled, sub, toward,
     unit,
 };
 
@@ -75,7 +75,7 @@ fn between_insides<const D: usize>(
     })
 }
 
-/// Whether two plane segments cross: the ends of each are strictly on both sides of the other.
+/// Returns whether two plane segments cross: the ends of each are strictly on both sides of the other.
 #[inline]
 pub fn cross_each_other<const D: usize>([p, q]: [Point<D>; 2], [a, b]: [Point<D>; 2]) -> bool {
     let (d1, d2) = (sub(q, p), sub(b, a));
@@ -157,7 +157,7 @@ impl<const D: usize> Cuboid<D> {
         std::array::from_fn(|w| (0..D).map(|i| (self.axes[i][w] * self.half_m[i]).abs()).sum())
     }
 
-    /// Returns the outline of a plane box, counter-clockwise.
+    /// Returns the outline of a plane box, counterclockwise.
     pub fn edges_2d(&self) -> [[Point<D>; 2]; 4] {
         let corner = |sx: f64, sy: f64| {
             let mut local = [0.0; D];
@@ -200,7 +200,7 @@ impl<const D: usize> Core<D> {
         }
     }
 
-    /// Whether no point of the core is nearer than `reach_m` to a segment. The answer is that of
+    /// Returns whether no point of the core is nearer than `reach_m` to a segment. The answer is that of
     /// the distance, but faster in the usual case.
     #[inline]
     pub fn is_clear_of_segment(&self, [p, q]: [Point<D>; 2], reach_m: f64) -> bool {
@@ -221,7 +221,7 @@ impl<const D: usize> Core<D> {
         }
     }
 
-    /// Whether no point of the core is nearer than `reach_m` to a point.
+    /// Returns whether no point of the core is nearer than `reach_m` to a point.
     #[inline]
     pub fn is_clear_of_point(&self, p: Point<D>, reach_m: f64) -> bool {
         if reach_m <= 0.0 {
@@ -256,7 +256,7 @@ impl<const D: usize> Core<D> {
         }
     }
 
-    /// Whether all its numbers are finite.
+    /// Returns whether all its numbers are finite.
     pub fn is_finite(&self) -> bool {
         match self {
             Self::Point(c) => is_finite(c),
@@ -268,7 +268,7 @@ impl<const D: usize> Core<D> {
     }
 }
 
-/// Whether a point is at least `reach_m` from a segment, without division or root.
+/// Returns whether a point is at least `reach_m` from a segment, without division or root.
 #[inline]
 fn is_far_from_segment<const D: usize>(c: Point<D>, [p, q]: [Point<D>; 2], reach_m: f64) -> bool {
     let (d, r) = (sub(q, p), sub(c, p));
@@ -284,7 +284,7 @@ fn is_far_from_segment<const D: usize>(c: Point<D>, [p, q]: [Point<D>; 2], reach
     across2 >= reach2 * whole
 }
 
-/// Whether a plane segment `a b` lies on one side of the line `p q`, farther away than `reach_m`.
+/// Returns whether a plane segment `a b` lies on one side of the line `p q`, farther away than `reach_m`.
 #[inline]
 fn is_beside<const D: usize>(
     a: Point<D>,
@@ -344,7 +344,7 @@ impl<const D: usize> Bounds<D> {
         }
     }
 
-    /// Whether the other box lies completely in this one.
+    /// Returns whether the other box lies completely in this one.
     #[inline]
     pub fn contains(&self, other: &Self) -> bool {
         let mut contains = true;
@@ -354,7 +354,7 @@ impl<const D: usize> Bounds<D> {
         contains
     }
 
-    /// Whether the boxes touch.
+    /// Returns whether the boxes touch.
     #[inline]
     pub fn meets(&self, other: &Self) -> bool {
         let mut meets = true;

@@ -11,12 +11,12 @@ use super::geometry::{Core, Point, cross_2d, dot, nearest_on_segment, norm, sub}
 use sidestep_kernel::math;
 use std::f64::consts::TAU;
 
-/// The directions from `from_rad`, counter-clockwise, over `width_rad`.
+/// The directions from `from_rad`, counterclockwise, over `width_rad`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Arc {
     /// Its start, rad.
     pub(crate) from_rad: f64,
-    /// Its width, counter-clockwise, rad; 2 pi for all directions.
+    /// Its width, counterclockwise, rad; 2 pi for all directions.
     pub(crate) width_rad: f64,
 }
 
@@ -25,7 +25,7 @@ impl Arc {
         Self { from_rad: center_rad + low_rad, width_rad: (high_rad - low_rad).min(TAU) }
     }
 
-    /// Whether a direction is inside.
+    /// Returns whether a direction is inside.
     #[cfg(test)]
     pub(super) fn contains(&self, angle_rad: f64) -> bool {
         wrapped_rad(angle_rad - self.from_rad) < self.width_rad

@@ -31,7 +31,7 @@ pub(super) struct Leeway<const D: usize> {
     points: Vec<Point<D>>,
     /// Twice the ways of everything so far, meters.
     odometer_m: f64,
-    /// For each rod, the odometer's reading at which something could touch it.
+    /// The odometer's reading at which something could touch each rod.
     until_m: Vec<f64>,
     /// Boxes of the rods without their thickness, and the odometer's reading when they were right.
     tree: OwnBody<D>,
@@ -39,7 +39,7 @@ pub(super) struct Leeway<const D: usize> {
 }
 
 impl<const D: usize> Leeway<D> {
-    /// Whether a chain is long enough for this to be worth the effort.
+    /// Returns whether a chain is long enough for this to be worth the effort.
     pub(super) fn is_for(chain: &Chain<D>) -> bool {
         chain.rods().len() >= FEWEST_RODS
     }
@@ -87,7 +87,7 @@ impl<const D: usize> Leeway<D> {
         &self.points
     }
 
-    /// Whether a motion from the noted positions to where the chain is now, in which no connector
+    /// Returns whether a motion from the noted positions to where the chain is now, in which no connector
     /// moved by more than `way_m`, brings no two parts near each other, neither now nor on its way.
     pub(super) fn allows(&mut self, chain: &Chain<D>, way_m: f64) -> bool {
         self.travel(way_m);
@@ -129,7 +129,7 @@ impl<const D: usize> Leeway<D> {
     }
 }
 
-/// Whether two rods are surely as far from each other as `room_m`, or less than half of the spare
+/// Returns whether two rods are surely as far from each other as `room_m`, or less than half of the spare
 /// distance nearer: by their middles, which is much quicker than their distance.
 fn is_beyond<const D: usize>([a, b]: [Point<D>; 2], [c, d]: [Point<D>; 2], room_m: f64) -> bool {
     let middles_m = 0.5 * distance(add(a, b), add(c, d));

@@ -39,7 +39,7 @@ impl<const D: usize> Obstacle<D> {
         Self::still(id, Core::Segment(ends), radius_m)
     }
 
-    /// Whether it moves.
+    /// Returns whether it moves.
     pub fn is_moving(&self) -> bool {
         self.velocity_m_s.iter().any(|&v| v != 0.0)
     }
@@ -49,7 +49,7 @@ impl<const D: usize> Obstacle<D> {
         self.core.bounds().grown(self.radius_m)
     }
 
-    /// Whether it is in the range of coordinates: an obstacle that flies on and on leaves it in the
+    /// Returns whether it is in the range of coordinates: an obstacle that flies on and on leaves it in the
     /// end.
     pub(crate) fn is_in_range(&self) -> bool {
         self.check().is_ok()
@@ -133,7 +133,7 @@ impl<const D: usize> Obstacles<D> {
         Ok(obstacles)
     }
 
-    /// Whether there are none.
+    /// Returns whether there are none.
     pub fn is_empty(&self) -> bool {
         self.still.all.is_empty() && self.moving.is_empty()
     }

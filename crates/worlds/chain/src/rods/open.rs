@@ -12,12 +12,12 @@ use super::geometry::{Point, distance, dot, sub};
 use super::pass::{Direction, Tally};
 use super::scene::fits;
 
-/// When a slave counts as staying where it is.
+/// The rule by which a slave counts as staying where it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Stays {
-    /// If its new place is the old one, bit for bit.
+    /// The new place is the old one, bit for bit.
     Exactly,
-    /// If it would move by no more than the least move: the rule of chains with something nearby.
+    /// The slave would move by no more than the least move: the rule of chains with something nearby.
     Nearly,
 }
 
@@ -155,7 +155,7 @@ impl<const D: usize> Sweep<D> {
         true
     }
 
-    /// Whether the rod beyond a slave that stays is good as it is; in a broken chain it need not
+    /// Returns whether the rod beyond a slave that stays is good as it is; in a broken chain it need not
     /// be.
     fn may_end_at(&self, slave: usize, points: &[Point<D>], rods: &[Rod]) -> bool {
         let Some(next) = self.direction.next(slave, points.len()) else { return true };

@@ -365,7 +365,7 @@ impl<const D: usize> Propagator<D> {
         Err(objection)
     }
 
-    /// Whether the rest of the chain has nothing to react to: this slave stays, and the bend at it
+    /// Returns whether the rest of the chain has nothing to react to: this slave stays, and the bend at it
     /// and the rod beyond it are good as they are.
     fn may_stop(
         &self,
@@ -431,7 +431,7 @@ impl<const D: usize> Propagator<D> {
     }
 }
 
-/// Whether nothing but the chain itself can be in the way of a motion.
+/// Returns whether nothing but the chain itself can be in the way of a motion.
 fn is_open<const D: usize>(chain: &Chain<D>, obstacles: &Obstacles<D>, heads: &Heads<D>) -> bool {
     obstacles.is_empty() && chain.is_plain() && heads.n == 1
 }
@@ -459,7 +459,7 @@ fn n_sub_steps(
     Ok(n as usize)
 }
 
-/// Whether a second try finds slaves more places: rods of other lengths, and in the plane also the
+/// Returns whether a second try finds slaves more places: rods of other lengths, and in the plane also the
 /// other side.
 fn may_go_elsewhere<const D: usize>(chain: &Chain<D>, head: usize, direction: Direction) -> bool {
     let rods = match direction {

@@ -123,7 +123,7 @@ fn check_ends<const D: usize>(
     Err(InputError::new("scattered connectors", cause, "leave a whole end on both sides"))
 }
 
-/// Whether all rods between two connectors are within their limits.
+/// Returns whether all rods between two connectors are within their limits.
 fn is_whole<const D: usize>(chain: &Chain<D>, low: usize, high: usize) -> bool {
     (low..high).all(|i| fits(chain.rods()[i], chain.length_m(i)))
 }
@@ -230,7 +230,7 @@ mod tests {
         }
     }
 
-    /// As a chain is laid out by a scenario: every rod at its greatest length.
+    /// The layout of a scenario: every rod at its greatest length.
     #[test]
     fn parts_that_only_just_reach_across_lie_on_a_line() {
         for (rod_m, n) in [(1.1, 40), (0.3, 30), (0.7, 12)] {

@@ -227,7 +227,7 @@ impl<'a, const D: usize> Scene<'a, D> {
         worst.map_or(Ok(()), |(_, name, reason)| Err(Refusal::by(reason, name)))
     }
 
-    /// Whether the slave stays where it is allowed to be.
+    /// Returns whether the slave stays where it is allowed to be.
     pub(super) fn may_be_at(&self, i: usize, p: Point<D>) -> bool {
         let connector = &self.chain.connectors()[i];
         if connector.is_still() {
@@ -283,7 +283,7 @@ fn depth_m<const D: usize>(m: Point<D>, s: Point<D>, step: &Step<D>, block: &Blo
     rod_m.max(tip_m)
 }
 
-/// Whether a rod's length is within its limits, up to the tolerance.
+/// Returns whether a rod's length is within its limits, up to the tolerance.
 pub(crate) fn fits(rod: Rod, length_m: f64) -> bool {
     (rod.min_m - LENGTH_TOLERANCE_M..=rod.max_m + LENGTH_TOLERANCE_M).contains(&length_m)
 }

@@ -17,7 +17,7 @@ pub(crate) struct Sweep<const D: usize> {
     pub(crate) to: [Point<D>; 2],
 }
 
-/// In space, the part of the distance at rest that a rod keeps on its way.
+/// The part of the distance at rest that a rod keeps on its way in space.
 const PART_KEPT: f64 = 0.5;
 /// Conservative steps before a way counts as blocked.
 const MAX_ADVANCES: usize = 64;
@@ -32,7 +32,7 @@ impl<const D: usize> Sweep<D> {
         way2(0).max(way2(1)).sqrt()
     }
 
-    /// Whether the rod passes no point of the core on its way; in space, whether it stays half as
+    /// Returns whether the rod passes no point of the core on its way; in space, whether it stays half as
     /// far away as `keep_m`, the distance that it must keep at rest.
     pub(crate) fn is_clear(&self, core: &Core<D>, keep_m: f64) -> bool {
         let way_m = self.longest_way_m();
@@ -51,7 +51,7 @@ impl<const D: usize> Sweep<D> {
         if D == 2 { 0.0 } else { PART_KEPT * keep_m }
     }
 
-    /// Whether the way is clear, without checking where it ends.
+    /// Returns whether the way is clear, without checking where it ends.
     pub(super) fn is_clear_on_the_way(&self, core: &Core<D>, keep_m: f64, way_m: f64) -> bool {
         match core {
             Core::Point(c) if D == 2 => !self.is_crossed_by(*c),
@@ -69,7 +69,7 @@ impl<const D: usize> Sweep<D> {
         cross_each_other([self.from[1], self.to[1]], wall)
     }
 
-    /// Whether a plane point lies on the rod at some time, by the roots of a parabola.
+    /// Returns whether a plane point lies on the rod at some time, by the roots of a parabola.
     fn is_crossed_by(&self, p: Point<D>) -> bool {
         let (m, r) = (sub(self.from[0], p), sub(self.from[1], self.from[0]));
         let dm = sub(self.to[0], self.from[0]);
@@ -124,7 +124,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Whether a rod crosses a wall at one of many times between.
+    /// Returns whether a rod crosses a wall at one of many times between.
     fn sampled(sweep: &Sweep<2>, wall: [Point<2>; 2]) -> bool {
         (0..=4000).any(|k| {
             let rod = [0, 1].map(|e| between(sweep.from[e], sweep.to[e], f64::from(k) / 4000.0));

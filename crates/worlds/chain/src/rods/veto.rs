@@ -22,9 +22,9 @@ pub enum Source {
 /// Effect of a veto on the way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
-    /// All the way or not at all.
+    /// All of the way, or nothing of it.
     Exact,
-    /// As far as possible.
+    /// The way up to the veto.
     AsFarAsPossible,
 }
 

@@ -166,7 +166,7 @@ impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
         }
     }
 
-    /// Whether a lane is at a slave when lane 0 is at connector `j`.
+    /// Returns whether a lane is at a slave when lane 0 is at connector `j`.
     fn is_at_slave(&self, w: usize, j: usize) -> bool {
         w < self.n && w < j && j - w < self.connectors
     }
@@ -263,7 +263,7 @@ impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
         self.changed += u64::from(new != so);
     }
 
-    /// Whether no motion goes on.
+    /// Returns whether no motion goes on.
     fn have_ended(&self) -> bool {
         self.is_mixed && self.ended[..self.n].iter().all(|&ended| ended)
     }

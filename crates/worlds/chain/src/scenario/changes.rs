@@ -54,12 +54,12 @@ impl<const D: usize> ChangeSection<D> {
         self.scatter.is_some().then(|| self.cycle(dt_s))
     }
 
-    /// Whether it may let a connector go that is held or has failed.
+    /// Returns whether it may let a connector go that is held or has failed.
     pub(super) fn lets_go(&self, connector: usize) -> bool {
         self.connector == Some(connector) && (self.failed == Some(false) || self.mobility.is_some())
     }
 
-    /// Whether it would take an arm from where its joints can put it: apart, or off its base.
+    /// Returns whether it would take an arm from where its joints can put it: apart, or off its base.
     pub(super) fn takes_apart(&self) -> bool {
         self.scatter.is_some() || (self.connector == Some(0) && self.mobility.is_some())
     }

@@ -12,13 +12,13 @@ use serde::Deserialize;
 pub(super) enum MobilitySection<const D: usize> {
     /// Anywhere.
     Free,
-    /// At the place where it begins.
+    /// Stays at the place where it begins.
     Fixed,
-    /// On the line between two points.
+    /// Stays on the line between two points.
     OnSegment([Place<D>; 2]),
-    /// On a line or a plane, given by its normal and its distance from the origin.
+    /// Stays on a line or a plane, given by its normal and its distance from the origin.
     OnPlane { normal: Place<D>, offset_m: f64 },
-    /// In a box, given by its lower and its upper corner.
+    /// Stays in a box, given by its lower and its upper corner.
     InBox([Place<D>; 2]),
 }
 

@@ -27,7 +27,7 @@ impl<const D: usize> Recipe<D> {
         Ok(Self { source: source.clone(), head, file, site })
     }
 
-    /// Whether the seed decides what is there at the start: obstacles, or where a chain begins.
+    /// Returns whether the seed decides what is there at the start: obstacles, or where a chain begins.
     pub(crate) fn draws_start(&self) -> bool {
         !self.file.fields.0.is_empty() || self.file.is_anywhere()
     }
@@ -62,7 +62,7 @@ impl<const D: usize> Recipe<D> {
 }
 
 impl<const D: usize> ChainFile<D> {
-    /// Whether the seed decides where a chain starts.
+    /// Returns whether the seed decides where a chain starts.
     pub(super) fn is_anywhere(&self) -> bool {
         self.chains.0.iter().any(|section| section.get_ref().anywhere)
     }

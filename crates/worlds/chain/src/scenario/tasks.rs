@@ -22,17 +22,17 @@ const PLANS_AFTER_S: f64 = 0.5;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum Kind {
-    /// Nothing, but to get out of the way.
+    /// Rests, but gets out of the way.
     Rest,
-    /// Anywhere, at random.
+    /// Wanders anywhere, at random.
     Wander,
-    /// An operator's orders, one after the other.
+    /// Follows an operator's orders, one after the other.
     Script,
-    /// To places, one after the other.
+    /// Goes to places, one after the other.
     Targets,
-    /// On wheels, with a laser, along walls.
+    /// Drives on wheels, with a laser, along walls.
     Navigate,
-    /// To where a caller orders, cycle by cycle.
+    /// Goes to where a caller orders, cycle by cycle.
     External,
 }
 
@@ -80,7 +80,7 @@ impl<const D: usize> TaskSection<D> {
         self.speed_m_s.map_or(SPEED_M_S, f64::from)
     }
 
-    /// Whether it plans ways, on a chain that has a fixed base or has none.
+    /// Returns whether it plans ways, on a chain that has a fixed base or has none.
     fn plans(&self, has_base: bool) -> bool {
         match self.planner {
             Some(planner) => planner == PlannerWord::RrtConnect,
@@ -88,7 +88,7 @@ impl<const D: usize> TaskSection<D> {
         }
     }
 
-    /// Whether it drives on wheels.
+    /// Returns whether it drives on wheels.
     pub(super) fn navigates(&self) -> bool {
         self.kind == Kind::Navigate
     }

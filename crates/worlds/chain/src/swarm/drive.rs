@@ -11,7 +11,7 @@ use std::f64::consts::FRAC_PI_4;
 pub struct Pose {
     /// The middle of its axle, which is the middle of its body.
     pub at: Point<2>,
-    /// Heading, counter-clockwise from the first axis.
+    /// Heading, counterclockwise from the first axis.
     pub heading_rad: f64,
 }
 

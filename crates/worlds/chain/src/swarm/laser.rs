@@ -262,7 +262,7 @@ impl Laser {
         Some(beams.filter(counts).map(|k| scan.ranges_m[k]).fold(self.range_m, f64::min))
     }
 
-    /// Whether a sector lies completely in the field and has a beam.
+    /// Returns whether a sector lies completely in the field and has a beam.
     pub fn sees(&self, sector_rad: [f64; 2]) -> bool {
         self.sector(sector_rad).is_some()
     }

@@ -226,9 +226,9 @@ impl LeaderState {
 /// A value for each side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Sides<T> {
-    /// On the left.
+    /// The value on the left.
     pub left: T,
-    /// On the right.
+    /// The value on the right.
     pub right: T,
 }
 
@@ -511,7 +511,7 @@ mod tests {
         };
         let (ahead, aside, moves, stands) = ([0.8, 0.1], [0.0, 0.8], [0.0, -0.4], [0.0, 0.0]);
         assert_eq!(sees(ahead, moves, true).wheels, Wheels::default(), "it waits");
-        assert_ne!(sees(ahead, moves, false).wheels, Wheels::default(), "not for ever");
+        assert_ne!(sees(ahead, moves, false).wheels, Wheels::default(), "not forever");
         assert_eq!(sees(ahead, moves, false).layer, sees(ahead, stands, true).layer);
         assert_eq!(sees(aside, moves, true).layer, Layer::KeepMoving, "it is no wall");
         assert_eq!(sees(aside, stands, true).layer, Layer::CloseLeft);

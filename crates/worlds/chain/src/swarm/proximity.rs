@@ -9,7 +9,7 @@ use crate::rods::obstacle::{Obstacles, around};
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
 use std::f64::consts::TAU;
 
-/// Number of sensors. The first looks ahead, the others follow counter-clockwise.
+/// Number of sensors. The first looks ahead, the others follow counterclockwise.
 pub(crate) const SECTORS: usize = 8;
 /// The angle that one sensor watches.
 pub(crate) const SECTOR_RAD: f64 = TAU / SECTORS as f64;
@@ -134,7 +134,7 @@ mod tests {
     fn other_robots_are_seen_too() {
         let pose = Pose { at: [0.0, 0.0], heading_rad: std::f64::consts::FRAC_PI_2 };
         let gaps = RING.read(&pose, &Obstacles::default(), [Body::disc([0.6, 0.0], 0.25)]);
-        // It is on the right: the seventh of eight, counter-clockwise from ahead.
+        // It is on the right: the seventh of eight, counterclockwise from ahead.
         assert!((gaps[6] - 0.1).abs() < 1e-12);
         assert_eq!(gaps[0], 0.15);
     }

@@ -68,7 +68,7 @@ fn to_segment(from: Point<2>, u: Point<2>, [a, b]: [Point<2>; 2]) -> Option<f64>
     (ahead_m >= 0.0).then_some(ahead_m)
 }
 
-/// Whether no obstacle lies on a line.
+/// Returns whether no obstacle lies on a line.
 pub(crate) fn is_clear(obstacles: &Obstacles<2>, line: [Point<2>; 2]) -> bool {
     let mut is_clear = true;
     obstacles.visit(&Bounds::of(&line), |o| {

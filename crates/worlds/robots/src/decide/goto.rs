@@ -84,7 +84,7 @@ impl Goto {
             memory.words[REACHED] += 1;
             if self.repeat && reached + 1 == n {
                 memory.words[REACHED] = 0;
-                // Stop here, because a list whose goals all are here would loop for ever.
+                // Stop here, because a list whose goals all are here would loop forever.
                 return (None, trip);
             }
         }

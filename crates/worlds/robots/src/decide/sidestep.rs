@@ -12,7 +12,7 @@ use sidestep_map::planning::FlowField;
 /// The condition for believing that something is near.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trust {
-    /// As soon as one beam of a sector reports it.
+    /// One beam of a sector that reports it is enough.
     OneBeam,
     /// Ahead, where a miss costs a contact, as soon as one beam reports it; at the sides only if
     /// two reports agree, out of those of this cycle and of the one before if the heading was the
@@ -169,7 +169,7 @@ mod tests {
     /// Decides in a corridor of 9 x 3 boxes whose end in the west is the goal.
     fn decide(trust: Trust, percept: &Percept<'_>, memory: &mut Memory) -> ActionId {
         let free = FreeSpace::new(9, 3, |_, _| true);
-        let field = FlowField::towards(&free, 1, &[(0, 0), (0, 1), (0, 2)]);
+        let field = FlowField::toward(&free, 1, &[(0, 0), (0, 1), (0, 2)]);
         let mut draws = Streams::new(Seed(1)).draws(0, percept.now, Purpose(0));
         sidestep(trust, &field, percept, memory, &mut draws)
     }

@@ -19,7 +19,7 @@ pub(crate) struct Pose {
 pub(crate) struct Motion {
     pub(crate) ahead_m: f64,
     pub(crate) left_m: f64,
-    /// To the left, in [-pi, pi).
+    /// The turn to the left, in [-pi, pi).
     pub(crate) turn_rad: f64,
 }
 

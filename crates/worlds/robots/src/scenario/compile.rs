@@ -1,4 +1,4 @@
-//! From a scenario's text to an immutable world and everybody's start.
+//! Compilation of a scenario's text to an immutable world and everybody's start.
 
 mod bodies;
 pub(super) mod idle;
@@ -96,8 +96,8 @@ impl Compiled {
 }
 
 impl Compiled {
-    /// Whether every run draws: errors of sensors and effectors, people, doors, a radio, or places at the start, as far as
-    /// another seed gives others.
+    /// Returns whether every run draws: errors of sensors and effectors, people, doors, a radio, or places at the
+    /// start, as far as another seed gives others.
     pub(crate) fn draws_always(&self) -> bool {
         let RobotsWorld { regime, types, radio, .. } = &*self.world;
         let is_robot = |ty: &BodyType| matches!(ty.role, Role::Robot(_));

@@ -170,7 +170,7 @@ impl Kinds {
         }
     }
 
-    /// Whether a table stands in the scenario itself.
+    /// Returns whether a table stands in the scenario itself.
     pub(super) fn stand_in<T>(&self, at: &Located<T>) -> bool {
         Arc::ptr_eq(&at.source, &self.source)
     }

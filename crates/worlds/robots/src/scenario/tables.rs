@@ -1,4 +1,4 @@
-//! From sensor and effector sections to checked models.
+//! Compilation of sensor and effector sections to checked models.
 
 use super::kinds::Kinds;
 use super::located::Located;

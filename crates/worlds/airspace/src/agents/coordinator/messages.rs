@@ -14,7 +14,7 @@ pub(super) enum Message {
     /// "It has arrived here."
     Ack(Position),
     /// "It was alive so many ticks ago, and I know it to have come as far as this": none ago, if it is in
-    /// the sender's care. Hearsay ages, or else two hosts could keep telling each other for ever.
+    /// the sender's care. Hearsay ages, or else two hosts could keep telling each other forever.
     Alive(Position, u64),
     /// "I have accepted a newer one."
     Stale(Epoch),

@@ -54,7 +54,7 @@
 //! *(c) Only one that was accepted by a majority tells controls.* In the first epoch it has visited every
 //! airplane before it decides, because a hop that fails ends the epoch; later ones are elected.
 //!
-//! *(d) Nobody waits for ever.* A hop and a candidacy are repeated a number of times. Signs of life age, hearsay too: a
+//! *(d) Nobody waits forever.* A hop and a candidacy are repeated a number of times. Signs of life age, hearsay too: a
 //! dead coordinator cannot be kept alive by two who tell each other. Whoever finds no majority goes on
 //! without; and when time is up the talk ends for each host by its own clock.
 //!

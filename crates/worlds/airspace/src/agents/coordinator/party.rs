@@ -27,7 +27,7 @@ impl Host {
     /// hierarchy, one for each part of it and one above them.
     pub fn new(own: OwnShip, is_hierarchy: bool, radio: Radio) -> Self {
         let Radio { group, me, patience, ticks, is_silent } = radio;
-        // Nobody waits for ever but for those of whom no message is lost.
+        // Nobody waits forever but for those of whom no message is lost.
         let patience = (patience.ticks < u64::MAX).then_some(patience);
         let at: Vec<_> = own.briefing.poses.iter().map(|pose| pose.at).collect();
         let parts = if is_hierarchy { parts(&at) } else { vec![(0..group.len()).collect()] };

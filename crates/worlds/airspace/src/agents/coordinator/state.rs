@@ -44,13 +44,13 @@ pub(super) struct Gathered {
 /// The next thing that a coordinator has to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Task {
-    /// To visit the airplanes of its part from this one on.
+    /// Visits the airplanes of its part from this one on.
     Gather(usize),
-    /// To return to the airplane that it comes from.
+    /// Returns to the airplane that it comes from.
     Return,
-    /// To wait there for the coordinator above.
+    /// Waits there for the coordinator above.
     Await,
-    /// To bring airplanes from this one on their controls.
+    /// Brings airplanes from this one on their controls.
     Deliver(usize),
     /// Above others: to collect the data of the parts from this one on.
     Collect(usize),

@@ -30,13 +30,13 @@ pub(super) struct Turn {
 
 /// The part of a cycle that an airplane is in.
 pub(super) enum Stage {
-    /// In a talk about who decides together.
+    /// A talk about who decides together.
     Grouping(Talk<Speaker>),
-    /// In a talk about what each wants.
+    /// A talk about what each wants.
     Deciding(Talk<Speaker>),
     /// It knows what it wants, and waits until the shield's exchange starts.
     Decided,
-    /// In the shield's exchange; the places of the ways that it has proposed, among all that it considers.
+    /// The shield's exchange; the places of the ways that it has proposed, among all that it considers.
     Shielding(Talk<Speaker>, Vec<usize>),
     /// The control is there.
     Over,

@@ -75,7 +75,7 @@ impl<const D: usize> ConnectorAgent<D> {
         out
     }
 
-    /// Whether its cycle is over. It goes on answering questions.
+    /// Returns whether its cycle is over. It goes on answering questions.
     pub fn is_done(&self) -> bool {
         let mut links = Side::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
         self.is_closed || self.is_over && links.all(Link::is_quiet)

@@ -30,11 +30,11 @@ pub(super) struct Leading<const D: usize> {
 enum Stage {
     /// The next sub-step, if there is one.
     Step,
-    /// To ask one side.
+    /// Asks one side.
     Ask(Side, Lengths),
-    /// To wait for its answer.
+    /// Waits for its answer.
     Wait(Side, Lengths),
-    /// To end it, because of an objection.
+    /// Ends the motion, because of an objection.
     Object(Objection),
 }
 

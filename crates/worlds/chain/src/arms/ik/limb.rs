@@ -94,7 +94,7 @@ pub(super) fn nearest_still<const D: usize>(chain: &Chain<D>, base: usize, k: us
     found.unwrap_or(base)
 }
 
-/// Whether all connectors except the base move and bend without limit.
+/// Returns whether all connectors except the base move and bend without limit.
 pub(super) fn is_free<const D: usize>(chain: &Chain<D>, base: usize) -> bool {
     let is_plain = |i: usize| {
         let c = &chain.connectors()[i];

@@ -80,7 +80,7 @@ impl Pose {
         scaled(unscaled, sign / norm(unscaled))
     }
 
-    /// Whether its rotation is one, to 1e-6: three orthogonal unit vectors that form a right hand.
+    /// Returns whether its rotation is one, to 1e-6: three orthogonal unit vectors that form a right hand.
     pub(super) fn is_turned(&self) -> bool {
         let [x, y, z] = self.rotation;
         let is_near = |a: f64, b: f64| (a - b).abs() <= 1e-6;

@@ -70,7 +70,7 @@ pub enum RecoverError {
     DoesNotFit {
         /// Index of the connector.
         connector: usize,
-        /// That distance in m.
+        /// Distance from the connector to that place, in m.
         distance_m: f64,
     },
     /// The connectors can be reached, but only with a joint outside its limits.
@@ -132,7 +132,7 @@ impl SerialChain {
         Ok(search.finish())
     }
 
-    /// Whether each connector is moved by at most two joints that no earlier one is moved by.
+    /// Returns whether each connector is moved by at most two joints that no earlier one is moved by.
     fn check_solvable(&self, skeleton: &Skeleton) -> Result<(), RecoverError> {
         let mut known = 0;
         for (connector, anchor) in skeleton.connectors.iter().enumerate() {
@@ -207,7 +207,7 @@ impl Search<'_> {
             && self.place(connector + 1, known + found.len(), outer)
     }
 
-    /// Whether the joints from `known` on may have these values.
+    /// Returns whether the joints from `known` on may have these values.
     fn are_legal(&mut self, connector: usize, known: usize, found: &[Value]) -> bool {
         for (joint, found) in self.chain.joints[known..].iter().zip(found) {
             if let Some(limits) = joint.limits.filter(|l| !l.contain(found.value)) {

@@ -166,7 +166,7 @@ impl Builder<'_> {
         Anchor { point_m: self.frames.links[first].point_inside(p_m), first, last }
     }
 
-    /// Whether a rod can join two points: fixed in one link, or on either side of a slide.
+    /// Returns whether a rod can join two points: fixed in one link, or on either side of a slide.
     fn adjacent(&self, inner: &Anchor, outer: &Anchor) -> bool {
         outer.first <= inner.last || self.slide_between(inner, outer).is_some()
     }

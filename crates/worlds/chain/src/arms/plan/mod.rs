@@ -66,10 +66,10 @@ pub(crate) trait Postures {
     /// evenly.
     fn at(&self, a: &Self::Posture, b: &Self::Posture, part: f64) -> Self::Posture;
 
-    /// Whether a posture is good in itself.
+    /// Returns whether a posture is good in itself.
     fn is_free(&self, posture: &Self::Posture) -> bool;
 
-    /// Whether the straight way from one good posture to another is free.
+    /// Returns whether the straight way from one good posture to another is free.
     fn is_way_free(&self, a: &Self::Posture, b: &Self::Posture) -> bool;
 
     /// Returns any posture, good or not.

@@ -22,7 +22,7 @@ impl Part {
         k
     }
 
-    /// Whether it is one of some connectors, or a rod that ends at one of them.
+    /// Returns whether it is one of some connectors, or a rod that ends at one of them.
     pub(super) fn is_among(self, connectors: &Range<usize>) -> bool {
         match self {
             Self::Connector(k) => connectors.contains(&k),

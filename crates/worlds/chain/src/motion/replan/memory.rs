@@ -72,7 +72,7 @@ impl Memory {
         }
     }
 
-    /// Whether the other end leads.
+    /// Returns whether the other end leads.
     pub(crate) fn is_pulling_back(&self) -> bool {
         self.pulling_back > 0
     }

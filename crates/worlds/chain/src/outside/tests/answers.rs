@@ -14,7 +14,7 @@ fn facing_a_disc(more: &str) -> crate::ChainRun<2> {
     plane(&text, 1)
 }
 
-/// Whether values are the same but for rounding.
+/// Returns whether values are the same but for rounding.
 fn is_near(values: &[f64], expected: &[f64]) -> bool {
     values.len() == expected.len()
         && values.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12)

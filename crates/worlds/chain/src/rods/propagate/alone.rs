@@ -81,12 +81,12 @@ impl<const D: usize> Alone<D> {
         self.chain.set_max_bend_rad(ME, max_bend_rad)
     }
 
-    /// Whether trying all lengths could find more places than trying one, for the rod to a master.
+    /// Returns whether trying all lengths could find more places than trying one, for the rod to a master.
     pub(crate) fn may_go_elsewhere(rod: Rod) -> bool {
         D == 2 || rod.min_m < rod.max_m
     }
 
-    /// Whether a sweep that ended in a veto is to be repeated with all lengths, if rods have turned.
+    /// Returns whether a sweep that ended in a veto is to be repeated with all lengths, if rods have turned.
     pub(crate) fn repeats(&self) -> bool {
         self.rules.rotation == Rotation::Union
     }
@@ -167,7 +167,7 @@ impl<const D: usize> Alone<D> {
         n_sub_steps(&self.rules, self.chain.step_m(), is_empty, distance(from, to))
     }
 
-    /// Whether its own constraint allows it to go from its place to a target as an initiator.
+    /// Returns whether its own constraint allows it to go from its place to a target as an initiator.
     ///
     /// # Errors
     /// The constraint because of which it objects.
@@ -177,7 +177,7 @@ impl<const D: usize> Alone<D> {
         project(&self.chain, &mut heads, Mode::Exact).map_err(|(_, refusal)| refusal)
     }
 
-    /// Whether a sub-step is too short to count.
+    /// Returns whether a sub-step is too short to count.
     pub(crate) fn is_there(&self, from: Point<D>, to: Point<D>) -> bool {
         distance(to, from) <= self.chain.least_move_m()
     }

@@ -20,7 +20,7 @@ pub(super) struct Proofs {
 const MOST_PAUSE: u32 = 256;
 
 impl Proofs {
-    /// Whether a proof is to be tried now.
+    /// Returns whether a proof is to be tried now.
     fn is_due(&mut self) -> bool {
         let is_due = self.until_next == 0;
         self.until_next = self.until_next.saturating_sub(1);
@@ -103,8 +103,8 @@ impl<const D: usize> Propagator<D> {
         holds
     }
 
-    /// Whether a motion from the noted places, in which connectors went `way_m` at most, is allowed; otherwise it is taken
-    /// back.
+    /// Returns whether a motion from the noted places, in which connectors went `way_m` at most, is allowed;
+    /// otherwise it is taken back.
     fn is_proven(&mut self, chain: &mut Chain<D>, tally: &Tally, way_m: f64) -> bool {
         let may = tally.max_slave_step_m <= self.rules.slave_step_max_m
             && self.leeway.allows(chain, way_m);
@@ -142,7 +142,7 @@ impl<const D: usize> Propagator<D> {
         holds
     }
 
-    /// Whether the new places bring no part near another.
+    /// Returns whether the new places bring no part near another.
     fn are_apart(&mut self, chain: &mut Chain<D>) -> bool {
         self.leeway.note(chain);
         let run = self.overlay.from..self.overlay.to;

@@ -12,7 +12,7 @@
 //!    with backtracking for iterative multi-agent path finding", 2022). Ranks are drawn; a robot that
 //!    stands at its last goal has none and obeys everybody, then returns.
 //! 4. *Deadlock*: after many actions without progress a robot draws a new rank and strays for some
-//!    actions. Without this, two robots in a dead end could wait for each other for ever.
+//!    actions. Without this, two robots in a dead end could wait for each other forever.
 
 mod detour;
 mod mood;
@@ -292,7 +292,7 @@ fn stray(mood: &mut Mood, view: &View<'_>, draws: &mut Draws) -> ActionId {
     if draws.below(2) == 0 { LEFT } else { RIGHT }
 }
 
-/// Takes the next step towards the goal, or waits before what is in the way.
+/// Takes the next step toward the goal, or waits before what is in the way.
 fn travel(mood: &mut Mood, view: &View<'_>, draws: &mut Draws) -> ActionId {
     let direction = if view.is_alone {
         view.downhill()
@@ -312,7 +312,7 @@ fn travel(mood: &mut Mood, view: &View<'_>, draws: &mut Draws) -> ActionId {
     }
     if view.is_blocked(direction) {
         mood.waited += 1;
-        // Sensors that err may see something in a narrow gap for ever.
+        // Sensors that err may see something in a narrow gap forever.
         let tries = view.is_careful && mood.waited > PATIENCE && draws.below(4) == 0;
         return if tries { FORWARD } else { STAY };
     }

@@ -1,4 +1,4 @@
-//! From beams to boxes: the places around a robot where it cannot stand now.
+//! Boxes that beams tell of: the places around a robot where it cannot stand now.
 
 use super::super::Percept;
 use crate::ray::crossings;

@@ -1,4 +1,4 @@
-//! From a displacement in the plane to moves on a grid.
+//! Moves on a grid that come of a displacement in the plane.
 //!
 //! The simulation knows whole boxes only. A log does not say where in its box a robot was when it
 //! started to move; *phase averaging* takes all places as equally likely and asks how often each

@@ -40,7 +40,7 @@ impl Reading {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Distance {
     pub(super) class: usize,
-    /// In meters; `None` where only the class is given.
+    /// Range in meters; `None` where only the class is given.
     pub(super) range_m: Option<f64>,
 }
 

@@ -127,7 +127,7 @@ fn consistent(
         .collect()
 }
 
-/// Whether a measured range may be that of something at a true range.
+/// Returns whether a measured range may be that of something at a true range.
 pub(super) fn is_consistent(true_m: f64, measured_m: f64) -> bool {
     let tolerance_m = RANGE_TOLERANCE_M.max(RANGE_TOLERANCE_SHARE * true_m);
     (measured_m - true_m).abs() <= tolerance_m

@@ -1,4 +1,4 @@
-//! From the map section to boxes.
+//! Compilation of the map section to boxes.
 
 use super::*;
 use sidestep_import::AsBoxes;

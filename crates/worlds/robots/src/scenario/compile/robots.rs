@@ -57,7 +57,7 @@ impl Compiler<'_> {
         for row in &rows[..count] {
             let checked = row.check_against(&place, &self.map);
             checked.map_err(|error| self.source.naming(scen.span(), error))?;
-            let goals = vec![Arc::new(FlowField::towards(&free, size, &[row.goal]))];
+            let goals = vec![Arc::new(FlowField::toward(&free, size, &[row.goal]))];
             let avoidance = avoidance.clone();
             if !goals[0].is_goal(row.goal.0, row.goal.1) {
                 let cause =
@@ -231,7 +231,7 @@ impl Ways<'_, '_> {
         let [col, row, width, height] = rect;
         let goals: Vec<_> =
             (row..row + height).flat_map(|r| (col..col + width).map(move |c| (c, r))).collect();
-        let field = FlowField::towards(self.free, size, &goals);
+        let field = FlowField::toward(self.free, size, &goals);
         if goals.iter().any(|&(c, r)| field.is_goal(c, r)) {
             return Ok(Arc::new(field));
         }

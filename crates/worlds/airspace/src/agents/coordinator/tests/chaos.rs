@@ -67,7 +67,7 @@ pub(super) struct Group {
     pub tick: u64,
     pub faults: Faults,
     sent: u64,
-    /// By tick of arrival and number: sender, receiver, message.
+    /// Messages with sender and receiver, by tick of arrival and number.
     under_way: BTreeMap<(u64, u64), (usize, usize, Vec<u8>)>,
 }
 
@@ -175,7 +175,7 @@ fn faults(group: usize) -> impl Strategy<Value = Faults> {
 fn one_rules(group: usize, rounds: u8, faults: Faults) -> Result<(), TestCaseError> {
     let mut group = Group::new(hosts(group, rounds, PATIENCE, 120), faults);
     while !group.is_done() {
-        prop_assert!(group.tick < 60_000, "somebody waits for ever");
+        prop_assert!(group.tick < 60_000, "somebody waits forever");
         prop_assert!(group.step(), "nothing happens any more");
         let aboard = group.aboard();
         for (k, epoch) in aboard.iter().enumerate() {
@@ -191,7 +191,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
     /// Over losses, delays, copies, cuts and crashes no coordinator has a twin, at most one is accepted
-    /// by a majority, and nobody waits for ever.
+    /// by a majority, and nobody waits forever.
     #[test]
     fn whatever_the_network_does_one_coordinator_rules_at_any_tick(
         (group, faults) in (2usize..8).prop_flat_map(|n| (Just(n), faults(n))), rounds in 1u8..6,

@@ -23,7 +23,7 @@ struct Whole {
     hosts: Vec<Hosting<Tourist>>,
     tick: u64,
     is_alive: [bool; GROUP],
-    /// In order, because only what is under way matters, and not since when.
+    /// Flights in order, because only what is under way matters, and not since when.
     flights: Vec<Flight>,
     faults_left: u8,
     /// The hosts that have ever accepted each epoch.
@@ -171,7 +171,7 @@ impl Whole {
     fn check_end(&self) {
         for k in (0..GROUP).filter(|&k| self.is_alive[k]) {
             let hotel = self.hotel(k);
-            assert!(hotel.is_done(), "{k} waits for ever");
+            assert!(hotel.is_done(), "{k} waits forever");
             if is_majority(&self.is_alive) {
                 assert!(hotel.told.is_some(), "{k} is cut off, and a majority is alive");
             }

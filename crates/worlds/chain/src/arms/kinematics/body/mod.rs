@@ -98,7 +98,7 @@ impl ArmBody {
         Self { parts: parts.into_iter().map(|(_, part)| part).collect(), pairs }
     }
 
-    /// Whether it has no shapes at all.
+    /// Returns whether it has no shapes at all.
     pub fn is_empty(&self) -> bool {
         self.parts.is_empty()
     }
@@ -124,7 +124,7 @@ impl ArmBody {
         self.pairs.iter().filter_map(overlap).collect()
     }
 
-    /// Whether a link of the arm, counted as [`Frames::links`] are, has a shape.
+    /// Returns whether a link of the arm, counted as [`Frames::links`] are, has a shape.
     pub(super) fn covers(&self, link: usize) -> bool {
         self.parts.iter().any(|part| part.mount.link == link)
     }

@@ -33,7 +33,7 @@ impl Mount {
         at.then(&self.last)
     }
 
-    /// Whether it never moves against the link that it hangs on.
+    /// Returns whether it never moves against the link that it hangs on.
     pub(super) fn is_rigid(&self) -> bool {
         self.steps.is_empty()
     }

@@ -35,9 +35,9 @@ pub struct ArmAnswer {
 pub struct Posture {
     /// A value for each variable.
     pub values: Vec<f64>,
-    /// As [`ArmAnswer::error_m`].
+    /// Distance of the tool from its goal, see [`ArmAnswer::error_m`].
     pub error_m: f64,
-    /// As [`ArmAnswer::error_rad`].
+    /// Angle of the tool to its goal, see [`ArmAnswer::error_rad`].
     pub error_rad: f64,
 }
 

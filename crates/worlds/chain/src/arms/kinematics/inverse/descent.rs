@@ -28,7 +28,7 @@ impl Effort {
     /// One start of many: where it goes slowly, another start is quicker (half of the time for all
     /// starts, measured).
     pub(super) const BRIEF: Self = Self { steps: 200, patience: 6, least_gain: 0.3 };
-    /// As near as it goes.
+    /// Effort that comes as near as it goes.
     pub(super) const PATIENT: Self = Self { steps: 400, patience: 24, least_gain: 1e-3 };
 }
 
@@ -102,7 +102,7 @@ impl Descender<'_> {
         }
     }
 
-    /// Whether a variable that is a full turn larger is the same posture.
+    /// Returns whether a variable that is a full turn larger is the same posture.
     pub(super) fn is_round(&self, variable: usize) -> bool {
         let mut driven = self.chain.joints.iter().filter(|j| j.drive.variable == variable);
         driven.all(|j| j.motion == Motion::Turn && j.drive.is_own())

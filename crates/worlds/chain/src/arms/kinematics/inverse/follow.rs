@@ -119,7 +119,7 @@ impl Follower {
         })
     }
 
-    /// Whether a variable is at an end of its limits.
+    /// Returns whether a variable is at an end of its limits.
     pub(crate) fn is_at_limit(&self, values: &[f64]) -> bool {
         let ends = values.iter().zip(&self.limits.ranges);
         ends.into_iter().any(|(value, range)| range.contains(value))

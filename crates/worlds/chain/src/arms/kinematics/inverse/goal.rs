@@ -93,7 +93,7 @@ impl Asked {
         Ok(Self { along, turn })
     }
 
-    /// Whether all of the position counts.
+    /// Returns whether all of the position counts.
     pub fn whole_position(self) -> bool {
         self.along == [true; 3]
     }
@@ -191,7 +191,7 @@ impl ArmGoal {
         self.check_spheres()
     }
 
-    /// Whether one posture after the other is looked for, instead of the first that does.
+    /// Returns whether one posture after the other is looked for, instead of the first that does.
     pub(super) fn wants_many(&self) -> bool {
         self.solutions > 1 || self.nearest
     }

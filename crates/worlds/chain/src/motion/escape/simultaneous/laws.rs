@@ -56,7 +56,7 @@ pub(super) struct Laws<'a, 'b, const D: usize> {
 }
 
 impl<const D: usize> Laws<'_, '_, D> {
-    /// Whether all laws hold.
+    /// Returns whether all laws hold.
     pub(super) fn hold(&self, contacts: &Contacts<D>, bends: &[Bend]) -> bool {
         self.lengths_hold()
             && self.ways_hold()

@@ -27,7 +27,7 @@ const MOST_WORK: usize = 40_000;
 /// Ticks inside that are worth a rest.
 const WORTH_IT: f64 = 0.5;
 
-/// Whether a leader should rest.
+/// Returns whether a leader should rest.
 pub(super) fn should_rest<const D: usize>(
     rules: &Escape,
     given: &Given<'_, D>,

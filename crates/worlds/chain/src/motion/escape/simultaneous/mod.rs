@@ -100,7 +100,7 @@ impl<const D: usize> Simultaneous<D> {
         told
     }
 
-    /// Whether a leader should rest.
+    /// Returns whether a leader should rest.
     pub(super) fn should_rest(
         &self,
         (chain, obstacles): (&Chain<D>, &Obstacles<D>),

@@ -144,7 +144,7 @@ fn motions(obstacles: &[u32], seed: u64) -> Vec<Vec<Leg>> {
     all
 }
 
-/// Of 24 runs, seeds 1 to 12 with 8 discs and with 16, one episode is longer than 50 ticks. The search tries 1,481 motions
+/// One episode of 24 runs, seeds 1 to 12 with 8 discs and with 16, is longer than 50 ticks. The search tries 1,481 motions
 /// by the same solver at the same speed limit, from 2 s before on, in which nobody leads, with discs where they will be.
 /// So this is no pinch that no motion can leave; but in the roll-outs, in which discs go straight on, the chain is inside
 /// for as long if its leader rests.

@@ -204,7 +204,7 @@ impl<const D: usize> Solver<D> {
         Laws { given, points }.hold(contacts, bends)
     }
 
-    /// Whether all parts are farther from an obstacle than it takes to have passed it.
+    /// Returns whether all parts are farther from an obstacle than it takes to have passed it.
     pub(super) fn is_behind(&self, given: &Given<'_, D>, through: &Through<D>) -> bool {
         let moving = given.obstacles.moving();
         let threats = self.contacts.threats.iter();

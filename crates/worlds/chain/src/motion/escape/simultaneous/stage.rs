@@ -90,7 +90,7 @@ impl<'a, const D: usize> Stage<'a, D> {
         })
     }
 
-    /// Whether something that moves may come near it.
+    /// Returns whether something that moves may come near it.
     pub(super) fn is_approached(&self) -> bool {
         self.obstacles.moving().iter().any(Obstacle::is_moving)
     }

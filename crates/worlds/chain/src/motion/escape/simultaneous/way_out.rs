@@ -42,17 +42,17 @@ const MOST_WORK: usize = 100_000;
 const AROUND: usize = 12;
 
 impl WayOut {
-    /// Whether nothing is remembered.
+    /// Returns whether nothing is remembered.
     pub(crate) fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Whether the chain is on its way through an obstacle.
+    /// Returns whether the chain is on its way through an obstacle.
     pub(super) fn is_passing(&self) -> bool {
         self.passing.is_some()
     }
 
-    /// Whether the chain's leader rests, to keep it out.
+    /// Returns whether the chain's leader rests, to keep it out.
     pub(crate) fn rests(&self) -> bool {
         self.rests
     }
