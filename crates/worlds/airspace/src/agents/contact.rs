@@ -59,7 +59,7 @@ pub struct Contact {
 /// The side to which an airplane turns at the end of a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Planned {
-    /// Cycle at whose start the plan ends.
+    /// The plan ends at the start of this cycle.
     pub as_of: Cycle,
     /// The side to which it turns then.
     pub side: Side,
@@ -80,7 +80,7 @@ impl Orbiting {
 }
 
 impl Beacon {
-    /// Returns the beacon of an airplane whose wishes are not known.
+    /// Returns the beacon of an airplane with unknown wishes.
     pub(crate) fn of(flyer: &Flyer) -> Self {
         Self {
             pose: flyer.pose,

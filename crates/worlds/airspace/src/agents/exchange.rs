@@ -2,10 +2,10 @@
 //!
 //! On a network that loses nothing, all airplanes send all others their place, their stored
 //! fallback and the ways they would fly; all know the same, filter the same, and compute the same
-//! plans, to the bit ([`Certainty::Sure`]). Nobody sends anything else.
+//! plans, to the bit ([`Certainty::Sure`]). No other messages are sent.
 //!
-//! On one that loses messages no airplane can be sure what others know. So plans must stay safe
-//! whichever of them are flown, and no airplane flies one that others may not know:
+//! On one that loses messages no airplane can be sure of the others' knowledge. So plans must stay
+//! safe whichever of them are flown, and no airplane flies one that others may not know:
 //!
 //! 1. Each airplane sends its *proposal* as above.
 //! 2. From the proposals it has heard each computes plans by [`filter`] that are *mixable*: each
@@ -15,33 +15,33 @@
 //!    and sends the list of those it accepts.
 //! 4. Of two airplanes one *goes first* (`Scene::goes_first`). An airplane flies its plan if all
 //!    those that go before it have accepted it, else its fallback. It does not ask those that it
-//!    goes before, nor those from whom its plan keeps apart whatever they do.
+//!    goes before, nor those from which its plan keeps apart in any case.
 //!
-//! The order of going first follows from ids, time and what can be seen, and so both know it without a word.
-//! It cannot follow from anything that was heard: whatever the one has heard, the other may not
-//! know of it, and both might believe that they go first.
+//! The order of going first follows from ids, time and visible state, and so both know it without a word. It cannot
+//! follow from anything that was heard: the other may not know that the one has heard it, and both might believe that
+//! they go first.
 //!
 //! Airplanes nearby can be seen, heard or not: their place, whether they are on an orbit, and the
-//! side to which they then turn. What cannot be seen is what an airplane wants, and the fallback of
-//! one that flies a way. So the orbits that an unheard airplane may be on are: the one on which it
-//! is seen; or, if it flew a way, that at the end of the plan that was heard of it in the exchange
+//! side to which they then turn. Not visible are the wishes of an airplane, and the fallback of one
+//! that flies a way. So the orbits that an unheard airplane may be on are: the one on which it is
+//! seen; or, if it flew a way, that at the end of the plan that was heard of it in the exchange
 //! before; or else both from where it is seen.
 //!
 //! **Invariant.** For any two airplanes, the orbits that the one may be on, as far as the other
 //! knows, include the one it is on; and the orbits that the two are on keep apart.
 //!
 //! *Why it is kept.* Take two airplanes, of which `i` goes first. Each flies its plan or its
-//! fallback. Whatever was heard, `i`'s plan keeps apart from `j`'s fallback: `j` has told it, or it
-//! is among the orbits possible, from all of which `i`'s plan keeps apart. The fallbacks keep apart
-//! from each other. So only `j`'s plan is left. `j` flies it only if it keeps apart from whatever
-//! `i` may do, or if it has heard that `i` accepts it; and `i` has compared it with both its own
-//! plan and its own fallback. So whatever the two fly keeps apart, during `dt` and on the orbits
-//! after it. The orbit on which the other is after that each sees, or has heard as the end of its
-//! only plan; where it has not, it takes both sides to be possible.
+//! fallback. Whether `j` was heard or not, `i`'s plan keeps apart from `j`'s fallback: `j` has told
+//! it, or it is among the orbits possible, from all of which `i`'s plan keeps apart. The fallbacks
+//! keep apart from each other. So only `j`'s plan is left. `j` flies it only if it keeps apart from
+//! everything that `i` may do, or if it has heard that `i` accepts it; and `i` has compared it with
+//! both its own plan and its own fallback. So the two keep apart in every case, during `dt` and on
+//! the orbits after it. Each sees the orbit on which the other is after that, or has heard it as
+//! the end of the other's only plan; where it has not, it takes both sides to be possible.
 //!
 //! Nothing in this depends on why an airplane is not heard, or for how long: a dead radio, a
 //! network in two parts, a link that works one way only, a burst of losses, or an airplane that has
-//! just come in. Nobody has to tell one from the other, and nobody waits for an answer forever,
+//! just come in. No airplane has to tell one from the other, and none waits for an answer forever,
 //! because two airplanes go first in turn.
 
 mod scene;
@@ -140,7 +140,7 @@ pub struct Agent {
     contacts: Contacts,
     members: Vec<Member>,
     decision: Option<Decision>,
-    /// Places of those without whose consent it does not fly its plan.
+    /// Places of the members whose consent it needs to fly its plan.
     asked: Vec<usize>,
     agreed: Option<Agreed>,
 }
@@ -274,7 +274,7 @@ impl Agent {
         filter(&flyers, &candidates, frame, self.scene.certainty)[mine]
     }
 
-    /// Returns those with which an unheard airplane is named, as far as they say so themselves.
+    /// Returns the members with which an unheard airplane is named, as far as they say so themselves.
     fn named_with(&self, place: usize) -> Named {
         let id = self.id(place);
         let names = |other: &usize| match &self.members[*other].proposal {
@@ -317,7 +317,7 @@ impl Agent {
             else {
                 continue;
             };
-            // One that plans what it has not proposed is not to be believed.
+            // A member whose plan was not among its proposals is not to be believed.
             let is_proposed = plan.as_ref().is_none_or(|(way, _)| proposal.ways.contains(way));
             let theirs = self.plan_of(self.flyer_of(place, proposal), plan);
             if is_proposed && mine.iter().all(|plan| plan.is_compatible(&theirs)) {
@@ -428,7 +428,7 @@ impl link::Agent for Agent {
         let has_accepted = self.members[self.me].accepts.is_some();
         let member = &mut self.members[from];
         match message {
-            // The proposal of one that was given up is too late once plans are made.
+            // The proposal of a member that was given up is too late once plans are made.
             Message::Proposal(proposal) if !has_planned => member.proposal = Some(proposal),
             Message::Plan(plan) if !has_accepted => member.plan = Some(plan),
             Message::Accepts(accepted) => member.accepts = Some(accepted),
@@ -460,7 +460,7 @@ impl link::Agent for Agent {
         match self.stage() {
             Stage::Proposals => 0.5,
             Stage::Plans => 0.75,
-            // Something is left for an end in good order.
+            // Some time is left for an orderly end.
             Stage::Consent | Stage::Over => 0.95,
         }
     }

@@ -1,43 +1,44 @@
 //! Groups that airplanes find by themselves, from beacons.
 //!
-//! Those who have to mind each other decide together. Which these are can be announced by somebody who sees all
-//! of them; here it is not. An airplane sees who is *near* it: so near that the two have to mind each other.
-//! A group reaches farther, from one to the next, and nobody sees all of it. So before anything else they
-//! talk about that, in a talk of its own in each cycle:
+//! Airplanes that have to mind each other decide together. Their group can be announced by an observer that sees all
+//! of them; here it is not. An airplane sees the others *near* it: so near that the two have to mind each other. A
+//! group reaches farther, from one to the next, and no airplane sees all of it. So before anything else they talk
+//! about that, in a talk of its own in each cycle:
 //!
 //! 1. Each sends its *beacon* to those near it: where all see it (place, heading, altitude, whether it is on its
-//!    orbit), whom it sees near it, and those near who mind nobody. Its speed and its abilities are in the
-//!    filed plan.
-//! 2. When the beacons of all near have come, or those that are missing were asked for so often that they can
-//!    hardly be in touch, it *reports* whom it has heard. It reports once, and so all that there is to know of it
-//!    in a cycle are two items, each of which is there or not: no older version can be taken for a newer one.
-//! 3. An item goes on to those near who lack it: who do not see its airplane, or report that they have not
-//!    heard it. So each item goes from one to the next over all links that work.
-//! 4. Two airplanes *hear each other* if both say so. The *group* of an airplane are all to whom a chain of such
-//!    pairs leads from it. It has all that it needs when it knows both items of everybody in the chain, and
-//!    of those whom these have heard; all others of the chain find the same from the same items (`roster.rs`).
+//!    orbit), the airplanes that it sees near it, and those near that mind no other. Its speed and its abilities are
+//!    in the filed plan.
+//! 2. When the beacons of all near have come, or those that are missing were asked for so often that their senders
+//!    can hardly be in touch, it *reports* the airplanes that it has heard. It reports once, and so all that there is
+//!    to know of it in a cycle are two items, each of which is there or not: no older version can be taken for a
+//!    newer one.
+//! 3. An item goes on to those near that lack it: that do not see its airplane, or report that they have not heard
+//!    it. So each item goes from one to the next over all links that work.
+//! 4. Two airplanes *hear each other* if both say so. The *group* of an airplane are all to which a chain of such
+//!    pairs leads from it. It has all that it needs when it knows both items of every airplane in the chain, and of
+//!    those that these have heard; all others of the chain find the same from the same items (`roster.rs`).
 //!
-//! **What a group is.** Where everybody hears everybody near, it is what the simulator would announce, because what is
-//! near is the same for both. A partition, or a range of radio that is too short, cuts it into those who can talk.
-//! Two near each other may be in it that do not hear each other, as long as others hear both: the talks
-//! that follow find that out as they do where groups are announced, and go on without the one for the other. To leave
-//! out one of the two would be simpler to say and costs more: with four links of 56 that work one way only, super-conflicts
-//! of 8 were delayed by 43 % instead of 5 %.
+//! **Definition of a group.** Where all hear all that are near them, it is the group that the simulator would
+//! announce, because both use the same nearness. A partition, or a radio range that is too short, cuts it into parts
+//! that can talk. Two near each other may be in it that do not hear each other, as long as others hear both: the
+//! talks that follow find that out as they do where groups are announced, and go on without the one for the other. To
+//! leave out one of the two would be simpler to say but would cost more: with four links of 56 that work one way
+//! only, super-conflicts of 8 were delayed by 43 % instead of 5 %.
 //!
 //! **Talking in it.** All later talks of the cycle carry the cycle and a digest of the members
 //! ([`TalkId`](super::packet::TalkId)). Packets between airplanes of different opinions are of different
 //! talks, and are dropped. So opinions never mix: either the whole group that an airplane believes in answers, or
 //! those of another opinion do not, and are given up after some questions.
 //!
-//! **Why nothing is lost by that.** Whoever is near and not in the group is to the shield what it is to it
-//! anyway when its radio is dead: seen, and not heard ([`exchange`](super::exchange)). The proof there is about
-//! two airplanes that see each other, whatever each has heard, and all who have to mind each other do. It does
-//! not ask whether the two believe in the same group: a plan counts as accepted only within one talk, and
-//! who is taken to be unheard never accepts. So an airplane may be wrong about its group in any way at all, by
-//! losses, by links that work one way only, in a partition, or because somebody lies, and the worst is
-//! that it waits on its orbit. Where the network loses nothing there are no reports, since all near hear each
-//! other; nobody goes on before it knows the whole group, and so all know the same one, as plans that are
-//! sure ([`Certainty::Sure`]) need it.
+//! **Why nothing is lost by that.** To the shield, an airplane that is near and not in the group is like one whose
+//! radio is dead: seen, and not heard ([`exchange`](super::exchange)). The proof there is about two airplanes that
+//! see each other, regardless of the messages heard, and all that have to mind each other do. It does not ask whether
+//! the two believe in the same group: a plan counts as accepted only within one talk, and an airplane that is taken
+//! to be unheard never accepts. So an airplane may be wrong about its group in any way at all, by losses, by links
+//! that work one way only, in a partition, or because another one lies, and the worst outcome is that it waits on its
+//! orbit. Where the network loses nothing there are no reports, because all near hear each other; no airplane goes on
+//! before it knows the whole group, and so all know the same one, as plans that are sure ([`Certainty::Sure`])
+//! require.
 
 mod beacon;
 mod roster;
@@ -64,7 +65,7 @@ pub struct Start {
     pub me: usize,
     /// Those near it, itself among them, by rising id.
     pub near: Vec<Sighted>,
-    /// Airplanes near it that mind nobody, by rising id.
+    /// Airplanes near it that mind no other, by rising id.
     pub intruders: Vec<Intruder>,
     /// Whether each of those near was heard lately or is met for the first time.
     pub expected: Vec<bool>,
@@ -81,7 +82,7 @@ pub struct Start {
 pub struct Found {
     /// The airplanes that decide together, its own among them, by rising id.
     pub members: Vec<Sighted>,
-    /// The airplanes near any of them that mind nobody, by rising id.
+    /// The airplanes near any of them that mind no other, by rising id.
     pub intruders: Vec<Intruder>,
 }
 
@@ -90,7 +91,7 @@ pub struct Found {
 pub struct Agent {
     start: Start,
     roster: Roster,
-    /// Those near whose beacons have come from themselves.
+    /// The airplanes near it that have sent their beacons themselves.
     heard: BTreeSet<EntityId>,
     /// Whether nothing more will come from each of those near.
     gone: Vec<bool>,
@@ -162,7 +163,7 @@ impl Agent {
         }
     }
 
-    /// Returns whether somebody near lacks what is known of an airplane.
+    /// Returns whether another one near lacks the known items about an airplane.
     fn is_lacked(&self, about: EntityId) -> bool {
         self.others().any(|(_, id)| id != about && self.roster.lacks(id, about))
     }
@@ -170,7 +171,7 @@ impl Agent {
     /// Takes out the items that have to go on, of those `about` these airplanes.
     fn passed_on(&mut self, about: &BTreeSet<EntityId>) -> Vec<Vec<Item>> {
         let due = |id: EntityId| self.roster.knows(id) && self.is_lacked(id);
-        // Most of what comes has come before, and is kept no longer.
+        // Most incoming items have come before, and are no longer kept.
         let is_kept =
             |id: &EntityId| [false, true].iter().any(|&of| self.kept.contains(&(*id, of)));
         let due: Vec<(EntityId, bool)> = about
@@ -203,9 +204,9 @@ impl Agent {
         self.others().filter(|&(place, _)| !self.gone[place]).collect()
     }
 
-    /// Returns the places of those of whom something is missing.
+    /// Returns the places of those from which an item is missing.
     fn missing(&self, present: &[(usize, EntityId)]) -> Vec<usize> {
-        // Where nothing is lost it does not matter by whom an item has come.
+        // Where nothing is lost, an item may have come by way of any airplane.
         let is_heard = |id| self.start.certainty == Certainty::Sure || self.heard.contains(&id);
         let lacks = |id: EntityId| !is_heard(id) || !self.roster.is_known(id);
         present.iter().filter(|(_, id)| lacks(*id)).map(|(place, _)| *place).collect()
@@ -221,7 +222,7 @@ impl Agent {
             self.has_reported = true;
             let (about, heard): (_, Vec<_>) = (self.id(), self.heard.iter().copied().collect());
             self.roster.note_report(about, heard.clone());
-            // Also one that has heard nobody: those who hear it wait for that.
+            // An agent that has heard no other one reports too: those that hear it wait for the report.
             said.push(vec![Item::Report { about, heard }]);
         }
         if self.found.is_none() && self.has_reported && self.has_all() {
@@ -230,14 +231,14 @@ impl Agent {
         said
     }
 
-    /// Finds its group from what it knows.
+    /// Finds its group from the known items.
     fn find(&mut self) {
         let members = self.roster.group(self.id());
         let mut intruders = self.start.intruders.clone();
         for beacon in members.iter().filter_map(|&id| self.roster.beacon(id)) {
             intruders.extend(beacon.intruders.iter().cloned());
         }
-        // A stable sort: of what several say of one, its own sight comes first.
+        // A stable sort: where several airplanes report the same intruder, its own sighting comes first.
         intruders.sort_by_key(|one| one.slot);
         intruders.dedup_by_key(|one| one.slot);
         let sighted = |&id: &EntityId| self.roster.beacon(id).map(|beacon| beacon.own);
@@ -264,7 +265,7 @@ impl link::Agent for Agent {
             let seen = &self.start.near;
             let place = seen.binary_search_by_key(&item.about(), |one| one.id);
             match (item, place) {
-                // It is where all see it.
+                // It must be where all see it.
                 (Item::Beacon(beacon), Ok(k)) => Unsound::Plan.unless(beacon.own == seen[k]),
                 _ => Ok(()),
             }
@@ -273,7 +274,7 @@ impl link::Agent for Agent {
 
     fn most(&self) -> Most {
         let n = self.start.airplanes;
-        // Two items of each airplane, and each comes but once of one sender.
+        // Two items of each airplane, and each comes only once from one sender.
         Most { bytes: MOST_ITEMS * beacon::most_bytes(n), messages: 2 * n as u32 + 2 }
     }
 
@@ -301,7 +302,7 @@ impl link::Agent for Agent {
         if !missing.is_empty() || self.roster.is_complete(self.id()) {
             return missing;
         }
-        // What is missing of those farther away comes by way of somebody near.
+        // Missing items of those farther away come by way of one near.
         present.into_iter().map(|(place, _)| place).collect()
     }
 

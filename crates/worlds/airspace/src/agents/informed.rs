@@ -156,7 +156,7 @@ impl Agent {
         said
     }
 
-    /// Sets up the game and the first distributions, once everybody's options are known.
+    /// Sets up the game and the first distributions, once all options are known.
     fn meet(&mut self) {
         let objective = &self.own.briefing.objective;
         let all: Vec<&Options> = self.members.iter().filter_map(|m| m.options.as_ref()).collect();
@@ -179,8 +179,8 @@ impl Agent {
         self.game = Some(game);
     }
 
-    /// Returns the agents whose message is missing for the next step. With exact expectations round
-    /// `r` leads to the distributions `q_r`, and a step is the agent's own update or everybody's;
+    /// Returns the agents that owe a message for the next step. With exact expectations round `r`
+    /// leads to the distributions `q_r`, and a step is the agent's own update or that of all;
     /// samples are those of the round after `round` rounds.
     fn awaits_in_round(&self) -> Vec<usize> {
         let (me, sequence) = (self.own.me, self.own.settings().order == Order::Sequence);
@@ -232,7 +232,7 @@ impl Agent {
         Message::Distribution { round, change, q }
     }
 
-    /// Draws samples, unless it has; else learns from everybody's samples.
+    /// Draws samples, unless it has; else learns from the samples of all.
     fn sampled_step(&mut self) -> Option<Message> {
         let Estimator::Sampled { block, ageing } = self.own.settings().estimator else {
             return None;
@@ -268,7 +268,7 @@ impl Agent {
     fn learn(&mut self, block: usize, ageing: f64) -> f64 {
         let Some(game) = &self.game else { return 0.0 };
         let of = |m: &Member, k: usize| {
-            // One that is only presumed has nothing to choose from.
+            // A presumed member has nothing to choose from.
             m.samples(self.round).and_then(|all| all.get(k)).copied().unwrap_or(0)
         };
         let cost = |k: usize| {
@@ -370,7 +370,7 @@ impl link::Agent for Agent {
         let member = &mut self.members[other];
         member.gone = true;
         if member.options.is_none() {
-            // Samples are numbers of options, which nobody knows here, so they mean nothing.
+            // Samples are numbers of options, which are unknown here, so they mean nothing.
             *member = Member { gone: true, beacon: member.beacon.take(), ..Member::default() };
             member.options = Some(self.own.presumed(other));
         }

@@ -1,5 +1,5 @@
-//! Agents that tell each other where they mean to fly, once, for methods by which each then finds all
-//! headings itself.
+//! Agents that tell each other where they intend to fly, once, for methods by which each then finds all headings
+//! itself.
 
 use super::link::{self, Most};
 use super::own_ship::Filed;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
-/// The part of an airplane that nobody can see.
+/// The part of an airplane that no other one can see.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Intent {
     /// Number of way-points done with.
@@ -110,7 +110,7 @@ impl link::Agent for Agent {
 }
 
 impl Resolving {
-    /// Checks what somebody says to resolve, among this number of airplanes.
+    /// Checks the conflicts that an airplane says it resolves, among this number of airplanes.
     ///
     /// # Errors
     /// When there are no such airplanes, or no such heading.

@@ -4,7 +4,7 @@
 //! agent's messages and keeps them; an endpoint that misses one asks for it again. One that does
 //! not answer, although asked so often that it can hardly be alive and in touch, or until the time
 //! for this step is up, is given up for this talk: the agent goes on with its knowledge of it. One
-//! that was not heard in the talk before is asked less often. So nobody waits forever, and a loss
+//! that was not heard in the talk before is asked less often. So no agent waits forever, and a loss
 //! costs time instead of agreement.
 //!
 //! Endpoints and agents are state machines without a clock or a network of their own: ticks and
@@ -31,10 +31,10 @@ pub trait Agent {
     /// Returns its messages before it has heard anything.
     fn start(&mut self) -> Vec<Self::Message>;
 
-    /// Checks a message of agent `from`: whatever it says, [`Self::on_message`] is to make sense of it.
+    /// Checks a message of agent `from`: [`Self::on_message`] must be able to handle every message that passes.
     ///
     /// # Errors
-    /// When it says what cannot be.
+    /// When its content is impossible.
     fn check(&self, from: usize, message: &Self::Message) -> Result<(), Unsound>;
 
     /// Returns the largest number of bytes of a message, and of messages of one agent in a talk.
@@ -49,7 +49,7 @@ pub trait Agent {
         0
     }
 
-    /// Returns the places of those whose messages it needs in order to go on.
+    /// Returns the places of the members from which it needs messages in order to go on.
     fn awaits(&self) -> Vec<usize>;
 
     /// Returns whether an answer of agent `other` can be expected.
@@ -67,7 +67,7 @@ pub trait Agent {
     /// has ended regularly, rather than fallen silent.
     fn without(&mut self, other: usize, is_settled: bool) -> Vec<Self::Message>;
 
-    /// Ends because time is up, with the best outcome from what it knows.
+    /// Ends because time is up, with the best outcome that its knowledge allows.
     fn at_deadline(&mut self);
 
     /// Returns whether it has come to its outcome.
@@ -77,7 +77,7 @@ pub trait Agent {
     fn outcome(&self) -> Option<Self::Outcome>;
 }
 
-/// Bounds on what an agent may be sent.
+/// Bounds on the messages that an agent may be sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Most {
     /// Largest number of bytes of a message.
@@ -122,7 +122,7 @@ pub struct Endpoint<A> {
     most: Most,
     /// Number of its messages so far.
     count: u32,
-    /// These, serialized, by number; none where nobody ever asks for one.
+    /// These, serialized, by number; none where they are never asked for.
     said: Vec<Draft>,
     others: Vec<Other>,
     /// Messages that wait to be sent.
@@ -165,7 +165,7 @@ pub(crate) fn bytes_of<M: Serialize>(message: &M) -> Vec<u8> {
 }
 
 impl<A: Agent> Endpoint<A> {
-    /// Returns an endpoint whose agent has not sent anything yet.
+    /// Returns an endpoint with an agent that has not sent anything yet.
     pub fn new(agent: A, radio: Radio) -> Self {
         let others = vec![Other::default(); radio.group.len()];
         Self {
@@ -183,7 +183,7 @@ impl<A: Agent> Endpoint<A> {
         }
     }
 
-    /// Says something to one other.
+    /// Sends a message to one other.
     fn tell(&mut self, to: usize, message: Draft) {
         self.send(Some(self.radio.group[to]), message);
     }
@@ -193,7 +193,7 @@ impl<A: Agent> Endpoint<A> {
         self.out.push(Outgoing { to, message });
     }
 
-    /// Says something to all others.
+    /// Sends messages to all others.
     fn say(&mut self, messages: Vec<A::Message>) {
         for message in messages {
             let message = Draft::of(&Wired::Said(self.count, message));
@@ -235,7 +235,7 @@ impl<A: Agent> Endpoint<A> {
         }
     }
 
-    /// Ends the talk of an airplane that nobody hears and that hears nobody.
+    /// Ends the talk of an airplane that is not heard and hears no other.
     fn is_alone(&mut self) {
         let me = self.radio.me;
         for j in (0..self.others.len()).filter(|&j| j != me) {

@@ -2,17 +2,17 @@
 //!
 //! An agent owns its knowledge of its airplane and of others ([`OwnShip`]), the knowledge that all
 //! share ([`Briefing`]), and its part of the optimization. It is a state machine: messages in,
-//! messages out. An [`Endpoint`] is an agent together with the code that makes its messages arrive,
-//! a [`Party`] to a talk; a [`Talk`] makes packets of what it says, and lets through to it only what is
-//! sound. Which network carries the packets, in memory or between processes, none of them knows.
+//! messages out. An [`Endpoint`] is an agent together with the code that makes its messages arrive, a [`Party`] to a
+//! talk; a [`Talk`] wraps its messages in packets, and lets only sound messages through to it. None of them knows
+//! which network carries the packets, in memory or between processes.
 //!
-//! | Module | What it does |
+//! | Module | Task |
 //! |---|---|
 //! | [`sampling`] | the paper's Algorithm 1: samples, predicts, and shares both |
 //! | [`informed`] | sends all its possible ways once, and then only samples or distributions |
 //! | [`coordinator`] | migrates from airplane to airplane, and decides for all |
-//! | [`intent`] | tells what nobody can see, once, for methods that find headings |
-//! | [`grouping`] | finds who decides together, where nobody announces it |
+//! | [`intent`] | tells hidden intentions once, for methods that find headings |
+//! | [`grouping`] | finds the airplanes that decide together, where groups are not announced |
 //! | [`exchange`] | the shield: whether plans are safe together |
 //! | [`packet`] | the subjects of talks, and packets on their way out |
 //!
@@ -51,8 +51,8 @@ pub struct Decided {
     pub rounds: u32,
     /// Whether the distributions had settled.
     pub converged: bool,
-    /// The probability of every action at the end, for those who ask: no coordinator carries it
-    /// from airplane to airplane, where it is empty.
+    /// The probability of every action at the end, on request: no coordinator carries it from
+    /// airplane to airplane, where it is empty.
     #[serde(skip)]
     pub chances: Vec<f64>,
 }

@@ -31,7 +31,7 @@ pub struct Briefing {
     pub settings: Settings,
     /// The random streams from which samples are drawn.
     pub streams: Streams,
-    /// Airplanes near the group that mind nobody, as all see them.
+    /// Airplanes near the group that mind no other, as all see them.
     pub intruders: Vec<Intruder>,
     /// Whether the shield keeps airplanes that are not heard on their orbits.
     pub is_shielded: bool,
@@ -48,7 +48,7 @@ pub struct Filed {
     pub contact: Contact,
     /// Its greatest speed in meters per second.
     pub top_m_s: f64,
-    /// Largest number of way-points that it is to reach, whatever it is ordered.
+    /// Largest number of way-points that it is to reach under any orders.
     pub most_way_points: usize,
     /// Number of orders that it will be given.
     pub orders: usize,
@@ -120,7 +120,7 @@ impl Briefing {
     /// Checks some predicted ways.
     ///
     /// # Errors
-    /// When they are not `expected` ones of whole horizons.
+    /// When there are not `expected` of them, or one does not span the whole horizon.
     pub(super) fn admits_ways(&self, ways: &[Prediction], expected: usize) -> Result<(), Unsound> {
         Unsound::Length.unless(ways.len() == expected)?;
         ways.iter().try_for_each(|way| {
@@ -130,7 +130,7 @@ impl Briefing {
         })
     }
 
-    /// Checks how far somebody's probabilities have moved in a round: infinitely far before the first.
+    /// Checks how far an agent's probabilities have moved in a round: infinitely far before the first.
     ///
     /// # Errors
     /// When there is no such round, or a distance is no number.

@@ -7,11 +7,11 @@ use std::sync::Arc;
 /// The subject of a talk: each cycle has one talk of each at most, in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Topic {
-    /// The choice of those who decide together, where nobody announces them.
+    /// The choice of the airplanes that decide together, where groups are not announced.
     Group,
-    /// The choice of what each wants to fly.
+    /// The choice of the action that each wants to fly.
     Decision,
-    /// The shield's exchange, which checks that this is safe.
+    /// The shield's exchange, which checks that these actions are safe.
     Shield,
 }
 

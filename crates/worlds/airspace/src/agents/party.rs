@@ -1,5 +1,5 @@
-//! Parties to a talk: programs aboard that take messages and give messages, without a clock, a network, or
-//! the packets around what they say.
+//! Parties to a talk: programs aboard that take messages and give messages, without a clock, a network, or the
+//! packets around the messages.
 
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
@@ -7,7 +7,7 @@ use sidestep_kernel::network::{Draft, Refusal};
 
 /// A party to a talk, as a state machine: messages and ticks in, messages out.
 ///
-/// It lives on after it has come to its outcome, and answers those that have not.
+/// It lives on after it has come to its outcome, and answers members that have not.
 pub trait Party: Send {
     /// Starts the talk.
     fn start(&mut self, tick: u64);
@@ -16,10 +16,10 @@ pub trait Party: Send {
     /// any order.
     ///
     /// # Errors
-    /// When the message cannot be read, or says what cannot be; nothing has changed then.
+    /// When the message cannot be read, or its content is impossible; nothing has changed then.
     fn on_message(&mut self, from: EntityId, message: &[u8], tick: u64) -> Result<(), Unsound>;
 
-    /// Does what is due by a tick.
+    /// Performs the actions that are due by a tick.
     fn on_timer(&mut self, tick: u64);
 
     /// Returns the tick in which something is due, unless a message comes before it.
@@ -78,12 +78,12 @@ pub struct Outgoing {
     pub message: Draft,
 }
 
-/// A reason why a message is not taken: whoever sent it is none of ours, or lies.
+/// A reason why a message is not taken: its sender does not belong to the talk, or lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Unsound {
     /// Its bytes are no message of the talk.
     Form,
-    /// It is of a kind that nobody sends with these settings.
+    /// It is of a kind that no agent sends with these settings.
     Kind,
     /// A list in it has another length than it must have.
     Length,
@@ -93,17 +93,16 @@ pub enum Unsound {
     Airplane,
     /// It is of a round that there is not.
     Round,
-    /// It tells an airplane to be where nobody sees it, or to be able to do what its filed plan does not
-    /// say.
+    /// It claims a place at which the airplane is not seen, or abilities that are not in its filed plan.
     Plan,
 }
 
-/// Largest number of meters that anybody tells: beyond it, distances and their squares lose all sense.
+/// Largest number of meters that a message may contain: beyond it, distances and their squares lose all sense.
 const FARTHEST_M: f64 = 1e15;
 
-/// Returns whether coordinates and altitudes in meters are such that one can compute with them.
+/// Returns whether coordinates and altitudes in meters can be computed with.
 pub(super) fn are_places(told_m: impl IntoIterator<Item = f64>) -> bool {
-    // Nothing compares with what is no number. To look at all of them, whatever comes first, is several at a time.
+    // Comparisons with NaN are false. Looking at all of them, without an early exit, handles several at a time.
     told_m.into_iter().fold(true, |are, m| are & (m.abs() <= FARTHEST_M))
 }
 

@@ -45,7 +45,7 @@ struct Member {
     changes: BTreeMap<u32, f64>,
     /// Its part of the costs, by round.
     costs: BTreeMap<u32, Vec<f64>>,
-    /// Predictions for it, when no more messages come from it.
+    /// Predictions for it, once its messages have stopped.
     presumed: Option<Options>,
 }
 
@@ -233,7 +233,7 @@ impl link::Agent for Agent {
             Message::Costs { round, costs } => {
                 briefing.admits_round(*round, 0.0)?;
                 Unsound::Length.unless(costs.len() == self.block)?;
-                // Large ones are taken, but not those whose sum is none.
+                // Large ones are taken, unless their sum would not be a number.
                 Unsound::Number.unless(costs.iter().all(|cost| (0.0..1e60).contains(cost)))
             }
         }

@@ -1,4 +1,4 @@
-//! One talk, as one airplane takes part in it: a party, and the packets around what it says and hears.
+//! One talk, as one airplane takes part in it: a party, and the packets around its messages.
 
 use super::packet::{Packet, Seal, TalkId};
 use super::party::{Concludes, Ended, Outgoing, Party, Progress};
@@ -7,14 +7,14 @@ use sidestep_kernel::EntityId;
 use sidestep_kernel::network::Refusal;
 use std::sync::Arc;
 
-/// The identity of a talk, who takes part, and when.
+/// The identity, participants and times of a talk.
 #[derive(Debug, Clone)]
 pub struct Frame {
     /// The talk.
     pub id: TalkId,
-    /// Ids of all who take part, rising.
+    /// Ids of all participants, rising.
     pub members: Arc<[EntityId]>,
-    /// The one among them that is aboard.
+    /// Id of the airplane itself.
     pub me: EntityId,
     /// Digest of scenario and build.
     pub fingerprint: u64,
@@ -67,7 +67,7 @@ impl<P: Party + ?Sized> Talk<P> {
     /// Takes a message of another airplane.
     ///
     /// # Errors
-    /// When that one takes no part in it, or says what cannot be; nothing has changed then.
+    /// When that one takes no part in it, or its message has impossible content; nothing has changed then.
     pub fn hear(
         &mut self,
         from: EntityId,
@@ -86,7 +86,7 @@ impl<P: Party + ?Sized> Talk<P> {
         Ok(())
     }
 
-    /// Does what is due by a tick.
+    /// Performs the actions that are due by a tick.
     pub fn on_timer(&mut self, tick: u64, out: &mut Vec<Packet>) {
         self.party.on_timer(tick);
         self.send(out);
@@ -128,7 +128,7 @@ impl<P: Concludes + ?Sized> Talk<P> {
 }
 
 impl<O> Talk<dyn Concludes<Outcome = O>> {
-    /// Returns the talk that it is for others once it has ended here: answers to their questions.
+    /// Returns the talk as it remains for others once it has ended here: it answers their questions.
     pub fn past(self) -> Talk<dyn Party> {
         let Self { frame, others, sent, traffic, party } = self;
         Talk { frame, others, sent, traffic, party }

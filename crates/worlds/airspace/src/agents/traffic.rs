@@ -27,7 +27,7 @@ impl Traffic {
         self.ticks += other.ticks;
     }
 
-    /// Adds the counts of the same talk by another one who took part in it.
+    /// Adds the counts of the same talk by another participant.
     pub(crate) fn add_beside(&mut self, other: Self) {
         let ticks = self.ticks.max(other.ticks);
         self.add(other);

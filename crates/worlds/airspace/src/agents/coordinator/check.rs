@@ -1,4 +1,4 @@
-//! Checks of states that come in over the network: whatever bytes arrive, what a host takes in can be
+//! Checks of states that come in over the network: whichever bytes arrive, every state that a host accepts can be
 //! computed with.
 
 use super::aboard::Aboard;
@@ -9,7 +9,7 @@ use crate::agents::{Briefing, Decided};
 /// Checks the state of the coordinator number `seat` of the host's group.
 ///
 /// # Errors
-/// When it cannot be that.
+/// When it cannot be such a state.
 pub(super) fn state(state: &Coordinator, ship: &Aboard, seat: usize) -> Result<(), Unsound> {
     let airplanes = &state.gathered.airplanes;
     let places: Vec<usize> = airplanes.iter().map(|airplane| airplane.place).collect();

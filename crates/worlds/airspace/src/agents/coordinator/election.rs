@@ -1,4 +1,4 @@
-//! Elections: how a coordinator that is missed is brought back.
+//! Elections: how a missing coordinator is brought back.
 
 use super::Passenger;
 use super::epoch::{Epoch, Position, is_majority};
@@ -40,8 +40,8 @@ impl<P: Passenger> Seat<P> {
 
     /// Takes part in an election.
     ///
-    /// Whoever has the coordinator in its care, or has heard of it lately, says so. After a loss on
-    /// a hop only what has come farther than that hop counts as having heard of it.
+    /// A host that has the coordinator in its care, or has heard of it lately, says so. After a
+    /// loss on a hop only news from beyond that hop counts as having heard of it.
     pub(super) fn on_elect(&mut self, from: usize, asks: Candidacy, tick: u64) {
         let standing = match &self.post {
             Post::Standing(standing) => Some(standing.asks.epoch),
@@ -94,7 +94,7 @@ impl<P: Passenger> Seat<P> {
         if let Some(copy) = copy.filter(is_newer) {
             P::read(&copy.state, ship, self.number.into())?;
             self.copy = Some(copy);
-            // Where it was lost in the end is not known then.
+            // The hop on which it was lost is not known then.
             standing.lost = None;
         }
         standing.votes[from] = true;
@@ -120,12 +120,12 @@ impl<P: Passenger> Seat<P> {
         self.broadcast(&Message::Alive(at, 0));
     }
 
-    /// Asks those who have not voted again, unless they have been asked often enough.
+    /// Again asks the hosts that have not voted, unless they have been asked often enough.
     pub(super) fn ask_again(&mut self, tick: u64) {
         let due = tick + self.answer_ticks();
         let Post::Standing(standing) = &mut self.post else { return };
         let Some(left) = standing.tries_left.checked_sub(1) else {
-            // Where a majority is in touch, it is not for want of it that it was not elected.
+            // Where a majority is in touch, a lack of contact is not why it was not elected.
             if is_majority(&standing.heard) {
                 self.quiet_until = tick.saturating_add(self.rules.miss_ticks);
             } else {

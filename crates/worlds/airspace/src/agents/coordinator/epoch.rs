@@ -1,4 +1,4 @@
-//! Epochs: which of two coordinators is the newer one, how far one has come, and who is a majority.
+//! Epochs: the order of coordinators by age, the progress of each, and the definition of a majority.
 
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
@@ -67,7 +67,7 @@ impl Position {
     }
 }
 
-/// Returns whether hosts are enough to elect: more than half of the group, or half of it with the
+/// Returns whether some hosts suffice to elect: more than half of the group, or half of it with the
 /// first of all. Any two such sets have a member in common, which is all that elections rest on.
 pub(super) fn is_majority(members: &[bool]) -> bool {
     let count = members.iter().filter(|is_in| **is_in).count();

@@ -25,7 +25,7 @@ impl<P: Passenger> Hosting<P> {
         Self { ship, seats: stops.iter().enumerate().map(seat).collect(), rules: rules.clone() }
     }
 
-    /// Begins: the coordinators are on their first hosts.
+    /// Starts: the coordinators are on their first hosts.
     pub(super) fn start(&mut self, tick: u64) {
         for seat in &mut self.seats {
             seat.begin(&self.ship, tick);
@@ -51,7 +51,7 @@ impl<P: Passenger> Hosting<P> {
         Ok(())
     }
 
-    /// Does whatever is due.
+    /// Performs all actions that are due.
     pub(super) fn on_timer(&mut self, tick: u64) {
         for seat in &mut self.seats {
             let watches = self.ship.watches(seat.number.into());

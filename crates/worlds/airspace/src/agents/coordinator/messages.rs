@@ -1,5 +1,4 @@
-//! Messages between hosts, and how they are read: whatever arrives, it is checked before a host
-//! sees it.
+//! Messages between hosts, and how they are read: every message is checked before a host sees it.
 
 use super::epoch::{Epoch, Position};
 use crate::agents::party::Unsound;

@@ -3,20 +3,20 @@
 //! A coordinator visits the airplanes in turn. While it is on an airplane it can read that airplane's
 //! model: a host owns its own model only, and predicts ways with it, which the coordinator then carries along.
 //! Its whole state is serialized for every hop, and read and checked on the other side; these are the
-//! bytes that are counted. With sampled expectations it makes a tour per round, because each round has new
-//! samples; with exact ones it gathers the ways of all actions in a first tour, and computes the rounds where it
-//! set out from. A last tour brings each airplane its control.
+//! bytes that are counted. With sampled expectations it makes a tour per round, because each round has new samples;
+//! with exact ones it gathers the ways of all actions in a first tour, and computes the rounds at the host from which
+//! it set out. A last tour brings each airplane its control.
 //!
 //! `pim` has one coordinator for a group. `hierarchical-pim` (the paper's outlook) splits the group by
-//! proximity into about as many parts as each has members: a coordinator tours each part, all at the same time,
-//! and one above them goes from home to home, gathers their data, and brings back what all have learned. The
-//! algorithm is the same, and so are the controls.
+//! proximity into about as many parts as each has members: a coordinator tours each part, all at the same time, and
+//! one above them goes from home to home, gathers their data, and brings back the results of all. The algorithm is
+//! the same, and so are the controls.
 //!
-//! | Module | What is in it |
+//! | Module | Contents |
 //! |---|---|
 //! | `passenger` | a coordinator and a host, as they see each other |
-//! | `state`, `tour`, `aboard` | the coordinator of this world: its data, its tours, and what it sees of an airplane |
-//! | `check` | whatever bytes arrive, what is taken in can be computed with |
+//! | `state`, `tour`, `aboard` | the coordinator of this world: its data, its tours, and its view of an airplane |
+//! | `check` | checks of arriving bytes: every accepted state can be computed with |
 //! | `epoch`, `messages`, `seat`, `election`, `host` | the protocol, which knows nothing of airplanes |
 //! | `party` | a host as a party to a talk |
 //!
@@ -27,13 +27,13 @@
 //! lower place. On a network that loses nothing only hops are sent. Else:
 //!
 //! 1. **A hop** carries the state, the epoch, and the number of the hop in it (`Hop`). It is repeated until it is
-//!    acknowledged (`Ack`). The sender runs the coordinator no more, but has it in its care, and keeps the copy
-//!    until it leaves there again: so at least the last two hosts have one. The receiver takes each hop
-//!    once; copies on the network are acknowledged and do nothing.
+//!    acknowledged (`Ack`). The sender no longer runs the coordinator, but has it in its care, and keeps the copy
+//!    until it leaves there again: so at least the last two hosts have one. The receiver takes each hop once; copies
+//!    on the network are acknowledged and do nothing.
 //! 2. **A hop that is never acknowledged** may have arrived all the same. So the sender does not go on as if it had
 //!    not, but stands for election, and the new coordinator presumes the host that it could not reach.
-//! 3. **Signs of life** are hops, and messages of a host that has it in its care for long (`Alive`). Who has
-//!    no sign for some time, and needs it, stands for election, one after the other by place.
+//! 3. **Signs of life** are hops, and messages of a host that has it in its care for long (`Alive`). Hosts that have
+//!    had no sign for some time, and need it, stand for election, one after the other by place.
 //! 4. **An election** (`Elect`, `Vote`): a candidate begins an epoch with a number above all that it has seen.
 //!    Others accept it and send their copy if it is newer, unless they have the coordinator in their care or
 //!    have had a sign of it, which they tell with its age. With a majority of the group (or half of it with the
@@ -43,20 +43,21 @@
 //!
 //! # Why one rules at any time
 //!
-//! *(a) No coordinator has a twin in its epoch.* The owner begins an epoch once, since its numbers rise. From
-//! then on a token moves: whoever sends hop `k + 1` has taken hop `k` and stops running it in the same step; hop `k + 1`
-//! has one receiver, which takes it once. So at most one host runs it.
+//! *(a) No coordinator has a twin in its epoch.* The owner begins an epoch once, since its numbers rise. From then on
+//! a token moves: the host that sends hop `k + 1` has taken hop `k` and stops running it in the same step; hop
+//! `k + 1` has one receiver, which takes it once. So at most one host runs it.
 //!
 //! *(b) At most one is accepted by a majority.* A host has accepted one epoch at a time, and accepted epochs
 //! never become older. Two majorities have a member in common. So when one epoch is accepted by a majority, no other
-//! one is, and a stale coordinator that is still alive somewhere is refused by everybody that has seen the newer one.
+//! one is, and a stale coordinator that is still alive somewhere is refused by every host that has seen the newer
+//! one.
 //!
 //! *(c) Only one that was accepted by a majority tells controls.* In the first epoch it has visited every
 //! airplane before it decides, because a hop that fails ends the epoch; later ones are elected.
 //!
-//! *(d) Nobody waits forever.* A hop and a candidacy are repeated a number of times. Signs of life age, hearsay too: a
-//! dead coordinator cannot be kept alive by two who tell each other. Whoever finds no majority goes on
-//! without; and when time is up the talk ends for each host by its own clock.
+//! *(d) No host waits forever.* A hop and a candidacy are repeated a number of times. Signs of life age, hearsay too:
+//! a dead coordinator cannot be kept alive by two hosts that tell each other about it. A host that finds no majority
+//! goes on without; and when time is up the talk ends for each host by its own clock.
 //!
 //! `tests/interleavings.rs` searches all orders of events of three real hosts with two faults (a crash, a loss, a
 //! copy, a delay beyond all patience) for a state in which (a), (b), (c) or (d) is wrong; `tests/chaos.rs` checks

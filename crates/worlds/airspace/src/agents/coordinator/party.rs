@@ -23,18 +23,18 @@ pub struct Host {
 }
 
 impl Host {
-    /// Returns the host aboard an airplane. There is one coordinator for the group, or, if they are a
-    /// hierarchy, one for each part of it and one above them.
+    /// Returns the host aboard an airplane. There is one coordinator for the group, or in a hierarchy one for each
+    /// part of it and one above these.
     pub fn new(own: OwnShip, is_hierarchy: bool, radio: Radio) -> Self {
         let Radio { group, me, patience, ticks, is_silent } = radio;
-        // Nobody waits forever but for those of whom no message is lost.
+        // No host waits forever, except where no message is lost.
         let patience = (patience.ticks < u64::MAX).then_some(patience);
         let at: Vec<_> = own.briefing.poses.iter().map(|pose| pose.at).collect();
         let parts = if is_hierarchy { parts(&at) } else { vec![(0..group.len()).collect()] };
         let bytes = state_bytes(&own.briefing);
         let miss_ticks = patience.map_or(u64::MAX, |patience| {
-            // Those of a tour, and those in which nobody in touch stays silent; at most a quarter of the
-            // talk, so that enough is left to bring it back.
+            // The ticks of a tour, and those within which every host in touch answers; at most a quarter of the talk,
+            // so that enough is left to bring it back.
             let hops = group.len() as u64 + u64::from(patience.tries);
             hops.saturating_mul(patience.ticks_for(bytes)).min(ticks / 4).max(1)
         });

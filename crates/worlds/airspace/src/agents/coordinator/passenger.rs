@@ -78,7 +78,7 @@ pub(super) struct Rules {
     pub group: usize,
     /// Place of the host in the group.
     pub me: usize,
-    /// Repetition of what is not acknowledged; `None` on a network that loses nothing.
+    /// Repetition of unacknowledged messages; `None` on a network that loses nothing.
     pub patience: Option<Patience>,
     /// Whether an answer of each other host can be expected.
     pub expected: Vec<bool>,

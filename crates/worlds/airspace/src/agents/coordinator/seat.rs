@@ -42,7 +42,7 @@ pub(super) struct Stay<P> {
     pub passenger: P,
     /// Tick in which the others are told that it is alive.
     pub beat_at: u64,
-    /// Tick in which it goes on without what it waits for here.
+    /// Tick in which it stops waiting here and goes on.
     pub impatient_at: u64,
 }
 
@@ -65,7 +65,7 @@ pub(super) struct Seat<P> {
     /// Its number among the coordinators of the group.
     pub number: u16,
     pub rules: Arc<Rules>,
-    /// Place among those who miss it, who stand for election one after the other.
+    /// Place among the hosts that miss it, which stand for election one after the other.
     rank: u64,
     /// The newest epoch that this host has accepted; it refuses older ones.
     pub promised: Epoch,
@@ -108,7 +108,7 @@ impl<P: Passenger> Seat<P> {
         }
     }
 
-    /// Begins: the coordinator is on the first host.
+    /// Starts: the coordinator is on the first host.
     pub(super) fn begin(&mut self, ship: &P::Ship, tick: u64) {
         self.heard_at = tick;
         if usize::from(self.promised.owner) == self.rules.me {
@@ -242,7 +242,8 @@ impl<P: Passenger> Seat<P> {
             Post::Leaving { to, .. } => self.has_arrived(*to, from, at),
             Post::Standing(Standing { asks, lost, .. }) => match lost {
                 Some(lost) => self.has_arrived(*lost, from, at),
-                // What others have heard of it is of use as long as it is not missed all the same.
+                // The hearsay of others is of use unless it is so old that the coordinator is
+                // missed all the same.
                 None => at >= asks.seen && ago < self.rules.miss_ticks,
             },
         };
@@ -257,8 +258,9 @@ impl<P: Passenger> Seat<P> {
         left.is_none_or(|left| at > left || (at == left && from == to))
     }
 
-    /// Takes the news that a newer epoch was accepted by another host. Whoever has the coordinator
-    /// in its care wants to bring it back in a still newer one, unless one is alive in that one.
+    /// Takes the news that a newer epoch was accepted by another host. A host that has the
+    /// coordinator in its care wants to bring it back in a still newer one, unless one is alive in
+    /// that one.
     fn on_stale(&mut self, epoch: Epoch, ship: &P::Ship, tick: u64) {
         if epoch <= self.promised {
             return;
@@ -285,7 +287,7 @@ impl<P: Passenger> Seat<P> {
         self.heard_at = self.heard_at.max(heard_at);
     }
 
-    /// Does whatever is due; `watches` says whether the host needs the coordinator.
+    /// Performs all actions that are due; `watches` says whether the host needs the coordinator.
     pub(super) fn on_timer(&mut self, watches: bool, ship: &P::Ship, tick: u64) {
         if self.next_timer(watches).is_none_or(|due| due > tick) {
             return;

@@ -1,4 +1,4 @@
-//! The tours of coordinators: which airplane they visit next, and for what.
+//! The tours of coordinators: the airplane that they visit next, and the reason.
 
 use super::aboard::{Aboard, Answer};
 use super::state::{Coordinator, Gathered, Overview, Task, Visited};
@@ -94,7 +94,7 @@ impl Coordinator {
 
 /// The tours of the coordinator above others: from home to home, and back.
 impl Coordinator {
-    /// Returns the overview, with the newest that a host knows of the parts.
+    /// Returns the overview, with the newest epochs of the parts that a host knows.
     fn overview(&mut self, ship: &Aboard, here: &Here<'_>) -> &mut Overview {
         let parts = &here.epochs[..ship.parts.len()];
         let overview = self.overview.get_or_insert_default();
@@ -140,7 +140,7 @@ impl Coordinator {
         self.gathered.airplanes.extend(report.airplanes);
     }
 
-    /// Presumes the airplanes of a part whose coordinator is not to be found.
+    /// Presumes the airplanes of a part whose coordinator cannot be found.
     fn presume(&mut self, part: usize, ship: &Aboard) {
         let presumed = ship.parts[part].iter().map(|&place| {
             let mut airplane = Visited::new(place);
@@ -182,7 +182,7 @@ impl Coordinator {
         Answer { gathered: Gathered { airplanes, ..self.gathered }, is_known: true }
     }
 
-    /// Lets a part go that was left out and whose coordinator has waited here.
+    /// Releases a part that was left out while its coordinator waited here.
     fn leave_nobody_waiting(&self, ship: &mut Aboard, here: &Here<'_>) {
         if here.aboard[ship.part] && ship.report.is_some() {
             ship.answer(Answer { gathered: Gathered::default(), is_known: false });

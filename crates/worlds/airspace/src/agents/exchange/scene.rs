@@ -10,7 +10,7 @@ use sidestep_kernel::{Cycle, EntityId};
 
 /// Number of cycles after which airplanes take turns.
 const TURN_CYCLES: Cycle = 12;
-/// Bound on headings in radians that anybody tells.
+/// Bound on headings in messages, in radians.
 const FARTHEST_RAD: f64 = 1e6;
 
 /// An airplane as others see it, and as they know it from its filed plan.
@@ -50,7 +50,7 @@ pub struct Scene {
     pub vertical_m: f64,
     /// The present cycle.
     pub now: Cycle,
-    /// Whether all hear all, and fly what they have planned.
+    /// Whether all hear all, and fly as planned.
     pub certainty: Certainty,
     /// Number of all airplanes, also of those that are not in the group.
     pub airplanes: usize,
@@ -60,7 +60,7 @@ pub struct Scene {
 
 impl Scene {
     /// Returns whether the airplane at one place goes before another one: it flies on without the
-    /// other's consent, and the other not without its own.
+    /// other's consent, but the other does not without its own.
     ///
     /// One that is seen to fly a way goes before one on an orbit, so that it is soon out of the
     /// other's reach. Among equals all go first in turn.
@@ -88,7 +88,7 @@ impl Scene {
     pub(super) fn admits_way(&self, place: usize, way: &Way) -> Result<(), Unsound> {
         let most_rad_s = self.seen[place].flyer.omega_max_rad_s;
         Unsound::Length.unless(way.omegas_rad_s.len() == self.air.timing.points_per_dt())?;
-        // Nothing compares with what is no number.
+        // Comparisons with NaN are false.
         Unsound::Number.unless(way.omegas_rad_s.iter().all(|omega| omega.abs() <= most_rad_s))
     }
 

@@ -1,4 +1,4 @@
-//! Beacons: the words of airplanes about themselves, before they know whom they decide with.
+//! Beacons: messages of airplanes about themselves, before they know the others that they decide with.
 
 use crate::agents::party::{Unsound, are_places};
 use crate::flight::Pose;
@@ -7,7 +7,7 @@ use crate::shield::Side;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
 
-/// Bound on headings in radians that anybody tells.
+/// Bound on headings in messages, in radians.
 const FARTHEST_RAD: f64 = 1e6;
 
 /// An airplane as others see it.
@@ -30,11 +30,11 @@ pub struct Beacon {
     pub own: Sighted,
     /// Ids of those that it sees near it, rising.
     pub near: Vec<EntityId>,
-    /// Airplanes near it that mind nobody, by rising id.
+    /// Airplanes near it that mind no other, by rising id.
     pub intruders: Vec<Intruder>,
 }
 
-/// Something that is known of an airplane.
+/// A piece of knowledge about an airplane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Item {
     /// Its beacon.
@@ -43,7 +43,7 @@ pub enum Item {
     Report {
         /// The airplane.
         about: EntityId,
-        /// Ids of those near it whose beacons it has heard from themselves, rising.
+        /// Ids of those near it that have sent it their beacons themselves, rising.
         heard: Vec<EntityId>,
     },
 }
@@ -57,7 +57,7 @@ impl Item {
         }
     }
 
-    /// Checks what it says, in a world of some airplanes.
+    /// Checks its content, in a world of `airplanes` airplanes.
     pub(super) fn check(&self, airplanes: usize) -> Result<(), Unsound> {
         let list = match self {
             Self::Beacon(beacon) => &beacon.near,
@@ -86,8 +86,8 @@ impl Beacon {
     }
 }
 
-/// Returns the largest number of bytes of an item in a world of some airplanes.
+/// Returns the largest number of bytes of an item in a world of `airplanes` airplanes.
 pub(super) fn most_bytes(airplanes: usize) -> usize {
-    // Of each other one its id, and perhaps where it is seen to fly.
+    // For each other airplane its id, and perhaps its observed flight.
     64 + airplanes * (5 + 96)
 }

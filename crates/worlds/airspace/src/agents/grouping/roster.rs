@@ -1,4 +1,4 @@
-//! The knowledge of who sees and who hears whom, and the groups that follow from it.
+//! The knowledge of which airplanes see and hear each other, and the groups that follow from it.
 
 use super::beacon::{Beacon, Item};
 use sidestep_kernel::EntityId;
@@ -19,7 +19,8 @@ pub(super) struct Roster {
 struct Settling {
     from: EntityId,
     chain: BTreeSet<EntityId>,
-    /// Those in it of whom not all is known yet that they have heard, each with the number of those looked at.
+    /// Those in it for which some that they have heard are not fully known yet, each with the number of those looked
+    /// at.
     due: Vec<(EntityId, usize)>,
 }
 
@@ -37,8 +38,8 @@ impl Roster {
         Self { beacons, reports: BTreeMap::new(), is_sure, settling }
     }
 
-    /// Notes a beacon. Returns whether there was none of the airplane; what it says itself counts for more than
-    /// what others pass on.
+    /// Notes a beacon. Returns whether there was none of the airplane; a beacon from the airplane itself counts for
+    /// more than one that others pass on.
     pub(super) fn note_beacon(&mut self, beacon: Beacon, is_own: bool) -> bool {
         let id = beacon.own.id;
         if !is_own && self.beacons.contains_key(&id) {
@@ -46,13 +47,13 @@ impl Roster {
         }
         let is_other = |known: &Beacon| known.near != beacon.near;
         if self.beacons.get(&id).is_some_and(is_other) {
-            // Somebody has lied about it, and whatever followed from that is void.
+            // Another airplane has lied about it, and all conclusions from that are void.
             self.settling = Settling::new(self.settling.from);
         }
         self.beacons.insert(id, beacon).is_none()
     }
 
-    /// Notes whom an airplane has heard. Returns whether that is new: the first report counts.
+    /// Notes the airplanes that another one has heard. Returns whether that is new: the first report counts.
     pub(super) fn note_report(&mut self, id: EntityId, heard: Vec<EntityId>) -> bool {
         let is_new = !self.reports.contains_key(&id);
         self.reports.entry(id).or_insert(heard);
@@ -68,7 +69,7 @@ impl Roster {
         self.beacons.contains_key(&id)
     }
 
-    /// Returns whether all is known of an airplane that there is to know.
+    /// Returns whether everything that there is to know of an airplane is known.
     pub(super) fn is_known(&self, id: EntityId) -> bool {
         self.knows(id) && self.heard_by(id).is_some()
     }
@@ -109,8 +110,8 @@ impl Roster {
         self.knows(a) && self.knows(b) && self.hears(a, b) && self.hears(b, a)
     }
 
-    /// Returns all to whom a chain of airplanes that hear each other leads from one, itself among them, and
-    /// whether all is known that this depends on.
+    /// Returns all to which a chain of airplanes that hear each other leads from one, itself among them, and whether
+    /// everything is known that this depends on.
     fn chain(&self, from: EntityId) -> (BTreeSet<EntityId>, bool) {
         let (mut chain, mut due, mut is_complete) = (BTreeSet::from([from]), vec![from], true);
         while let Some(id) = due.pop() {
@@ -126,7 +127,7 @@ impl Roster {
     }
 
     /// Returns the same as [`Self::is_complete`] for the own airplane, and goes on from where it stopped before: each
-    /// link is looked at once, however often something comes that is not yet all.
+    /// link is looked at once, however often incomplete knowledge comes in.
     pub(super) fn settle(&mut self) -> bool {
         let mut settling = std::mem::replace(&mut self.settling, Settling::new(0));
         let is_complete = self.settle_from(&mut settling);
@@ -145,7 +146,7 @@ impl Roster {
             if !self.is_known(other) {
                 return false;
             }
-            // What is known of two does not change any more, nor whether they hear each other.
+            // The items of two airplanes no longer change, nor does whether they hear each other.
             due.last_mut().expect("it is there").1 += 1;
             if self.is_linked(id, other) && chain.insert(other) {
                 due.push((other, 0));

@@ -26,7 +26,7 @@ impl Links {
         links
     }
 
-    /// Returns all to whom a chain of those that hear each other leads.
+    /// Returns all airplanes to which a chain of pairs that hear each other leads.
     fn chain(&self, from: usize) -> Vec<EntityId> {
         let mut chain = vec![from];
         let mut k = 0;
@@ -56,7 +56,7 @@ impl Links {
     }
 }
 
-/// Ids are no places.
+/// Ids differ from places.
 fn id(place: usize) -> EntityId {
     3 * place as EntityId + 1
 }
@@ -66,8 +66,8 @@ fn sighted(place: usize) -> Sighted {
     Sighted { id: id(place), pose, altitude_m: 0.0, orbit: (place == 1).then_some(Side::Left) }
 }
 
-/// Lets all look for their groups; messages come in any order. Returns what each has found, and how many
-/// messages were sent.
+/// Lets all look for their groups; messages come in any order. Returns the group that each has found, and the number
+/// of messages sent.
 fn found(links: &Links, certainty: Certainty, draws: &mut Draws) -> (Vec<Vec<EntityId>>, usize) {
     let n = links.near.len();
     let mut agents: Vec<Agent> = (0..n).map(|i| links.agent(i, certainty)).collect();
@@ -95,7 +95,7 @@ fn found(links: &Links, certainty: Certainty, draws: &mut Draws) -> (Vec<Vec<Ent
         if agents.iter().all(|agent| agent.is_done()) {
             break;
         }
-        // Who is there answers that it waits, too, and is not given up.
+        // One that is there answers that it waits, too, and is not given up.
         let never_answers = |i: usize, agent: &Agent| {
             let is_cut = |&place: &usize| {
                 let other = (0..n).find(|&j| id(j) == agent.start.near[place].id).expect("near");
@@ -118,7 +118,7 @@ fn found(links: &Links, certainty: Certainty, draws: &mut Draws) -> (Vec<Vec<Ent
 }
 
 proptest! {
-    /// Whichever links work, both ways or one way only: no two are of different opinions.
+    /// Whichever links work, both ways or one way only: no two disagree.
     #[test]
     fn all_find_those_to_whom_others_lead_that_hear_each_other(
         seed in any::<u64>(), n in 1usize..9, near in 0.2f64..1.0, heard in 0.3f64..1.0,
@@ -145,7 +145,7 @@ proptest! {
 }
 
 proptest! {
-    /// Items come in any order, again and again, and of some airplanes somebody has lied before they come themselves.
+    /// Items come in any order, again and again, and for some airplanes a lie comes before their own items.
     #[test]
     fn what_is_known_is_enough_as_soon_as_it_is_when_all_is_looked_at_anew(
         seed in any::<u64>(), n in 1usize..10, near in 0.1f64..1.0, heard in 0.3f64..1.0,
@@ -170,8 +170,8 @@ proptest! {
     }
 }
 
-/// A crowd in which everybody sees everybody, each of whom passes on what all have heard already: each look at all
-/// links at each message would take minutes.
+/// A crowd in which all see all, and each passes on items that all have heard already: to look at all links at each
+/// message would take minutes.
 #[test]
 fn a_crowd_of_hundreds_is_found_at_once() {
     let n = 600;

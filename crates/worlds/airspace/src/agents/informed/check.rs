@@ -1,4 +1,4 @@
-//! Checks of what others say, before an agent takes it.
+//! Checks of the others' messages, before an agent takes them.
 
 use super::{Agent, Message};
 use crate::agents::party::{Unsound, are_places};

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use sidestep_kernel::network::Patience;
 use std::collections::BTreeMap;
 
-/// A while in which some hosts hear no others: from tick, to tick, and the side of each host.
+/// A period in which some hosts hear no others: from tick, to tick, and the side of each host.
 #[derive(Debug, Clone)]
 pub(super) struct Cut {
     pub while_ticks: (u64, u64),
@@ -24,7 +24,7 @@ pub(super) struct Faults {
     pub duplication: f64,
     pub max_delay: u64,
     pub cuts: Vec<Cut>,
-    /// Hosts that crash, and when.
+    /// Hosts that crash, and the ticks in which they do.
     pub crashes: Vec<(usize, u64)>,
 }
 
@@ -190,8 +190,8 @@ fn one_rules(group: usize, rounds: u8, faults: Faults) -> Result<(), TestCaseErr
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
-    /// Over losses, delays, copies, cuts and crashes no coordinator has a twin, at most one is accepted
-    /// by a majority, and nobody waits forever.
+    /// Over losses, delays, copies, cuts and crashes no coordinator has a twin, at most one is accepted by a
+    /// majority, and no host waits forever.
     #[test]
     fn whatever_the_network_does_one_coordinator_rules_at_any_tick(
         (group, faults) in (2usize..8).prop_flat_map(|n| (Just(n), faults(n))), rounds in 1u8..6,

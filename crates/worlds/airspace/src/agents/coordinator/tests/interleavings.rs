@@ -23,7 +23,8 @@ struct Whole {
     hosts: Vec<Hosting<Tourist>>,
     tick: u64,
     is_alive: [bool; GROUP],
-    /// Flights in order, because only what is under way matters, and not since when.
+    /// Flights in sorted order, because only the messages under way matter, not how long they have
+    /// been under way.
     flights: Vec<Flight>,
     faults_left: u8,
     /// The hosts that have ever accepted each epoch.
@@ -75,7 +76,7 @@ impl Whole {
         self.accepted.entry(promised).or_insert([false; GROUP])[k] = true;
     }
 
-    /// Returns the next tick in which something is due, and the hosts for which.
+    /// Returns the next tick in which something is due, and the hosts for which it is due.
     fn next_due(&self) -> Option<(u64, Vec<usize>)> {
         let alive = (0..GROUP).filter(|&k| self.is_alive[k]);
         let timers: Vec<(u64, usize)> =
@@ -160,14 +161,14 @@ impl Whole {
         }
     }
 
-    /// Checks that nobody goes back to an older epoch.
+    /// Checks that no host goes back to an older epoch.
     fn check_after(&self, before: &Self) {
         for (now, then) in self.hosts.iter().zip(&before.hosts) {
             assert!(now.seats[0].promised >= then.seats[0].promised);
         }
     }
 
-    /// Checks the end: whoever is alive has ended, and with a control if a majority is alive.
+    /// Checks the end: every living host has ended, and with a control if a majority is alive.
     fn check_end(&self) {
         for k in (0..GROUP).filter(|&k| self.is_alive[k]) {
             let hotel = self.hotel(k);
@@ -183,8 +184,8 @@ impl Whole {
         self.flights.is_empty() && self.next_due().is_none()
     }
 
-    /// Returns a digest of all that matters for what may come: times are told as those that are
-    /// left.
+    /// Returns a digest of everything that can affect the future: times are given as remaining
+    /// times.
     fn digest(&self) -> u128 {
         let mut bytes = Vec::with_capacity(512);
         let mut add = |piece: &dyn erased::Plain| piece.write(&mut bytes);
@@ -262,8 +263,8 @@ fn search(faults: u8) -> (usize, usize) {
     (known.len(), ends)
 }
 
-/// Half a second of processor time. The numbers of states are those of a search that has left nothing
-/// out: a protocol that does less has fewer.
+/// Half a second of processor time. The numbers of states show that the search has left nothing out: a protocol that
+/// does less has fewer.
 #[test]
 fn in_all_interleavings_of_three_hosts_and_two_faults_one_coordinator_rules_and_all_come_to_an_end()
 {

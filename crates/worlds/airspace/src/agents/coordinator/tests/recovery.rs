@@ -1,4 +1,4 @@
-//! The time in which a coordinator is brought back whose host has died.
+//! The time that it takes to bring back a coordinator after its host has died.
 
 use super::chaos::{Faults, Group};
 use super::hosts;
@@ -19,8 +19,8 @@ fn patience(group: usize, tries: u32) -> (Patience, u64) {
     (patience, 3 * (group as u64 + u64::from(tries)))
 }
 
-/// Kills the host that the coordinator is on in a tick. Returns the ticks from then on until another one
-/// has it, accepted by a majority, and until all who are alive have their controls.
+/// Kills the host that the coordinator is on in a tick. Returns the ticks from then on until another host has it,
+/// accepted by a majority, and until all living hosts have their controls.
 fn recovery(group: usize, (loss, tries): (f64, u32), seed: u64) -> Option<(u64, u64)> {
     let (patience, miss_ticks) = patience(group, tries);
     let mut hosts = hosts(group, ROUNDS, patience, miss_ticks);
