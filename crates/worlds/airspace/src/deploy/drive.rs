@@ -1,7 +1,6 @@
 //! Stations on a network, driven until all are done.
 //!
-//! Time passes in ticks. A station does what is due when a packet comes or its time has come; all that happens
-//! between is skipped.
+//! Time passes in ticks. A station acts when a packet comes or its timer is due; the ticks between are skipped.
 
 use crate::agents::packet::Packet;
 use crate::pilot::Pilot;
@@ -16,7 +15,7 @@ pub(super) trait Station {
     /// Takes a packet.
     fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64);
 
-    /// Does what is due by a tick.
+    /// Performs the actions that are due by a tick.
     fn on_timer(&mut self, tick: u64);
 
     /// Returns the tick in which something is due.
@@ -66,7 +65,7 @@ pub(super) fn drive<S: Station>(
     }
 }
 
-/// Hands a station the packets that have reached it by a tick, and sends what it answers.
+/// Hands a station the packets that have reached it by a tick, and sends its answers.
 fn step<S: Station>(transport: &mut impl Transport, station: &mut S, now: u64) {
     for Envelope { sender, payload, .. } in transport.receive(station.id(), now) {
         station.on_packet(sender, &payload, now);
@@ -76,7 +75,7 @@ fn step<S: Station>(transport: &mut impl Transport, station: &mut S, now: u64) {
     send(transport, station, now);
 }
 
-/// Sends what waits to be sent.
+/// Sends the packets that wait to be sent.
 fn send<S: Station>(transport: &mut impl Transport, station: &mut S, now: u64) {
     let sender = station.id();
     for Packet { to, sequence, payload } in station.take_packets() {

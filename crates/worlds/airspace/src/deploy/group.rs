@@ -14,7 +14,7 @@ use sidestep_kernel::ports::MemoryTransport;
 use sidestep_kernel::{Cycle, EntityId, Slot};
 use std::sync::Arc;
 
-/// Lets the pilots of a group decide. Returns what each does and what it has considered.
+/// Lets the pilots of a group decide. Returns the control of each, and the ways that it has considered.
 pub(crate) fn flown(
     turn: &mut Turn<'_>,
     flown: &Flown,
@@ -36,8 +36,8 @@ pub(crate) fn flown(
     concluded(pilots)
 }
 
-/// Returns what comes of the talks of a group. Where one waits for what never comes, all stay on their orbits, since
-/// plans that are sure are safe only if all fly them.
+/// Returns the outcome of the talks of a group. Where one waits for a message that never comes, all stay on their
+/// orbits, because plans that are sure are safe only if all fly them.
 fn concluded(pilots: Vec<Pilot>) -> Vec<(Control, Considered)> {
     let all_have_ended = pilots.iter().all(Pilot::is_done);
     let one = |pilot: Pilot| match all_have_ended {
@@ -84,8 +84,8 @@ impl AirspaceWorld {
         [(schedule.begins, starts_s), (schedule.shield_from, starts_s + deadline_s)]
     }
 
-    /// Returns the faults of what one airplane sends where each is flown by a process of its own; none where
-    /// the network is reliable.
+    /// Returns the faults of the packets that an airplane sends where each is flown by a process of its own; none
+    /// where the network is reliable.
     pub fn ether(&self) -> Option<Ether> {
         Some(Ether::new(self.network.clone()?, self.draws()))
     }
@@ -116,7 +116,8 @@ mod tests {
     use crate::{AirspaceRun, airspace_run};
     use sidestep_scenario::Source;
 
-    /// Returns the pilots of a group that looks for itself; the first one is of another build, and nobody takes it in.
+    /// Returns the pilots of a group that looks for itself; the first one is of another build, and no other takes it
+    /// in.
     fn begun(run: &AirspaceRun) -> Vec<Pilot> {
         let world = run.world();
         let pilot = |sight: Sight| {

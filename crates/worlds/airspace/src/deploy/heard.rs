@@ -35,10 +35,11 @@ fn is_alike(text: &str, cycles: u64) {
     assert!(found.beacons > 0 && found.beacon_bytes > 0, "{found:?}");
 }
 
-/// Streams that meet: long groups, in which hardly anybody sees all.
+/// Streams that meet: long groups, in which hardly any airplane sees all.
 const STREAMS: &str = "[airspace.generator]\nkind = \"streams\"\nn = 12\n";
 const CONFLICT: &str = "[airspace.generator]\nkind = \"superconflict\"\nn = 5\nradius_m = 3000.0\n";
-/// Intruders, of which two who do not see each other may see the same; one who comes in late.
+/// Intruders, the same of which may be seen by two airplanes that do not see each other, and an
+/// airplane that comes in late.
 const BESET: &str = "[airspace.generator]\nkind = \"random\"\nn = 8\nradius_m = 16000.0\n\
     [[airplanes]]\nat_m = [-9000, 0]\nheading_deg = 0\nway_points_m = [[9000, 0]]\nintruder = true\n\
     [[airplanes]]\nat_m = [0, 9000]\nheading_deg = -90\nway_points_m = [[0, -9000]]\nintruder = true\n\
@@ -114,7 +115,7 @@ fn intruders_of_any_speed_that_a_scenario_allows_are_heard_of() {
     }
 }
 
-/// A network that may lose messages, and loses none: airplanes report whom they hear.
+/// A network that may lose messages, and loses none: airplanes report those that they hear.
 #[test]
 fn who_loses_nothing_and_cannot_know_it_finds_the_same_group() {
     let network =

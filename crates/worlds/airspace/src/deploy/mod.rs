@@ -87,8 +87,8 @@ mod tests {
         airspace_run(&Source::new("s", text, ""), 1).expect("a scenario")
     }
 
-    /// Whatever is lost, all agents end in time, no airplanes come too near, and all arrive except
-    /// the one that nobody hears, which waits on its orbit.
+    /// Despite any losses all agents end in time, no airplanes come too near, and all arrive except
+    /// the silent one, which waits on its orbit.
     #[test]
     fn on_a_network_that_loses_messages_and_an_airplane_the_shield_keeps_all_apart() {
         for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {
@@ -104,7 +104,7 @@ mod tests {
         }
     }
 
-    /// Also where most messages are lost, and where time is up before anything is agreed on.
+    /// The same where most messages are lost, and where time is up before anything is agreed on.
     #[test]
     fn with_hardly_any_message_or_any_time_the_shield_keeps_all_apart() {
         let worse = [
@@ -217,7 +217,7 @@ mod tests {
         assert!(pim > 1.5 * network_s("pim", ""), "{pim} s");
     }
 
-    /// Without the shield, too, nobody waits forever; an airplane that is not heard flies on.
+    /// Without the shield, too, no agent waits forever; an airplane that is not heard flies on.
     #[test]
     fn without_the_shield_a_silent_airplane_stops_nobody() {
         for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {

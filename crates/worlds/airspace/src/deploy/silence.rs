@@ -1,5 +1,6 @@
 //! Silence of any kind, wherever and whenever: dead radios, partitions, links that work one way
-//! only, bursts of losses and a short range. Nobody who does not hear another comes near it.
+//! only, bursts of losses and a short range. No airplane comes near another one that it does not
+//! hear.
 
 use crate::airspace_run;
 use crate::shield::promise::lost_and_named;
@@ -31,7 +32,7 @@ impl Case {
         least + (most - least) * self.draws.uniform()
     }
 
-    /// Returns a while of any length, as keys.
+    /// Returns a period of any length, as keys.
     fn span(&mut self) -> String {
         let from_s = self.between(0.0, 0.7 * FLOWN_S);
         let until_s = from_s + self.between(2.0, FLOWN_S);

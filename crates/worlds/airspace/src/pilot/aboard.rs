@@ -41,7 +41,7 @@ pub struct Pilot {
 }
 
 impl Pilot {
-    /// Returns the pilot of an airplane, which has heard of others before as `contacts` say.
+    /// Returns the pilot of an airplane that remembers the `contacts` of earlier cycles.
     ///
     /// # Panics
     /// When there is no such airplane in the world.
@@ -80,7 +80,7 @@ impl Pilot {
         self.id
     }
 
-    /// Starts the talks of a cycle. What was not over of an earlier one is given up.
+    /// Starts the talks of a cycle. Unfinished talks of an earlier one are given up.
     ///
     /// # Panics
     /// When the sight is that of another airplane, or one that [`Sight::check`] refuses.
@@ -119,10 +119,10 @@ impl Pilot {
         });
     }
 
-    /// Takes a packet that came off the network from an airplane: any bytes. What is not understood is
+    /// Takes a packet that came off the network from an airplane: any bytes. Unreadable and unsound packets are
     /// counted and dropped.
     pub fn on_packet(&mut self, from: EntityId, bytes: &[u8], tick: u64) {
-        // What is due by then is done first, because afterwards it is too late for the packet.
+        // Actions due by then are done first, because they may make it too late for the packet.
         self.settle(tick);
         if let Err(why) = self.take(from, bytes, tick) {
             self.refused.count(why);
@@ -130,7 +130,7 @@ impl Pilot {
         self.settle(tick);
     }
 
-    /// Does what is due by a tick.
+    /// Performs the actions that are due by a tick.
     pub fn on_timer(&mut self, tick: u64) {
         self.settle(tick);
         if let Some(talk) = self.turn.as_mut().and_then(Turn::talk) {
@@ -175,11 +175,11 @@ impl Pilot {
         self.turn.as_ref().map_or(&[], |turn| &turn.members)
     }
 
-    /// Returns what it does in the present cycle, once that is decided.
+    /// Returns its control in the present cycle, once that is decided.
     pub fn control(&self) -> Option<Control> {
         let turn = self.turn.as_ref().filter(|turn| matches!(turn.stage, Stage::Over))?;
         let mut control = turn.control.clone();
-        // Questions were answered since.
+        // Questions have been answered since.
         for talk in self.past.iter().filter(|talk| talk.frame().id.cycle == control.cycle) {
             let traffic = match talk.frame().id.topic {
                 Topic::Group => &mut control.grouping,
@@ -191,12 +191,12 @@ impl Pilot {
         Some(control)
     }
 
-    /// Returns whether it knows with whom it decides in the present cycle.
+    /// Returns whether it knows its group in the present cycle.
     pub fn has_group(&self) -> bool {
         self.turn.as_ref().is_some_and(|turn| !matches!(turn.stage, Stage::Grouping(_)))
     }
 
-    /// Returns whether it knows what it wants in the present cycle.
+    /// Returns whether it has chosen its wishes in the present cycle.
     pub fn has_decided(&self) -> bool {
         let is_open = |turn: &Turn| matches!(turn.stage, Stage::Grouping(_) | Stage::Deciding(_));
         self.turn.as_ref().is_some_and(|turn| !is_open(turn))
@@ -207,13 +207,13 @@ impl Pilot {
         self.turn.as_ref().is_some_and(|turn| matches!(turn.stage, Stage::Over))
     }
 
-    /// Returns what it does in the present cycle, and what it has considered; `None` before that is decided.
+    /// Returns its control in the present cycle, and the ways that it has considered; `None` before that is decided.
     pub(crate) fn into_outcome(mut self) -> Option<(Control, Considered)> {
         let control = self.control()?;
         Some((control, self.turn.take()?.considered))
     }
 
-    /// Returns what it does where its group does not come to an end in the present cycle: it stays on its orbit.
+    /// Returns its control where its group does not come to an end in the present cycle: it stays on its orbit.
     ///
     /// # Panics
     /// When it has not begun a cycle.
@@ -277,7 +277,7 @@ impl Pilot {
         }
     }
 
-    /// Goes on as far as the talks have come, and the time.
+    /// Continues as far as the talks and the time have come.
     fn settle(&mut self, tick: u64) {
         while let Some(turn) = &mut self.turn {
             match &mut turn.stage {
@@ -312,7 +312,7 @@ impl Pilot {
         let Turn { sight, schedule, members, unheard, considered, .. } = turn;
         let (begins, ends) = schedule.of(topic, tick);
         let id = match topic {
-            // Nobody knows its members.
+            // Its members are not known yet.
             Topic::Group => TalkId::new(sight.cycle, topic, &[]),
             Topic::Decision | Topic::Shield => TalkId::new(sight.cycle, topic, members),
         };
@@ -348,7 +348,7 @@ impl Pilot {
         self.hear_early(id, tick);
     }
 
-    /// Starts the talk that it is in, and hands over what others have said in it already.
+    /// Starts the talk that it is in, and hands over earlier messages of others in it.
     fn hear_early(&mut self, id: TalkId, tick: u64) {
         let Some(talk) = self.turn.as_mut().and_then(Turn::talk) else { return };
         talk.start(tick, &mut self.out);

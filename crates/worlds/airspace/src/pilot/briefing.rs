@@ -1,4 +1,4 @@
-//! The knowledge with which an airplane goes into a talk: what it perceives, and the filed flights.
+//! The knowledge with which an airplane goes into a talk: its perceptions, and the filed flights.
 
 use super::sight::{Own, Sight, Sighted};
 use crate::agents::contact::{Beacon, Contact, Contacts, Orbiting};
@@ -11,8 +11,8 @@ use crate::world::AirspaceWorld;
 use sidestep_kernel::{EntityId, math};
 use std::sync::Arc;
 
-/// Returns the knowledge that all agents of a group share before they talk. Each has its own of those near who
-/// are not heard, and takes them to fly straight on.
+/// Returns the knowledge that all agents of a group share before they talk. The airplanes nearby that are `not_heard`
+/// differ between agents; each takes its own to fly straight on.
 pub(super) fn brief(world: &AirspaceWorld, sight: &Sight, not_heard: &[Sighted]) -> Arc<Briefing> {
     let straight = not_heard.iter().map(|one| unheard(world, one));
     Arc::new(Briefing {
@@ -29,7 +29,7 @@ pub(super) fn brief(world: &AirspaceWorld, sight: &Sight, not_heard: &[Sighted])
     })
 }
 
-/// Returns the knowledge of an airplane's agent; `contacts` hold what it has heard of others before.
+/// Returns the knowledge of an airplane's agent; `contacts` hold its knowledge of others from earlier cycles.
 pub(super) fn own_ship(
     world: &AirspaceWorld,
     (sight, unheard): (&Sight, &[Sighted]),
@@ -88,7 +88,7 @@ fn presumed(world: &AirspaceWorld, id: EntityId) -> Contact {
     Contact { presumed: Some(orbiting), ..Contact::heard(beacon(world, known), heard_in) }
 }
 
-/// Returns whether plans hold that all have made from the same messages.
+/// Returns whether plans that all have made from the same messages are sure to be flown.
 pub(super) fn certainty(world: &AirspaceWorld) -> Certainty {
     match world.network {
         Some(_) => Certainty::Mixable,
@@ -96,8 +96,8 @@ pub(super) fn certainty(world: &AirspaceWorld) -> Certainty {
     }
 }
 
-/// Returns the scene of the shield's exchange, as an airplane sees it: its group, and those near who are not
-/// heard.
+/// Returns the scene of the shield's exchange, as an airplane sees it: its group, and those nearby that are
+/// `unheard`.
 pub(super) fn scene(world: &AirspaceWorld, sight: &Sight, unheard: &[Sighted]) -> Scene {
     let seen = |(one, takes_part): (&Sighted, bool)| Seen {
         flyer: match one.id == sight.own.id {
@@ -107,7 +107,7 @@ pub(super) fn scene(world: &AirspaceWorld, sight: &Sight, unheard: &[Sighted]) -
         orbits: one.orbit.is_some(),
         takes_part,
         top_m_s: world.top_m_s[one.id as usize],
-        // One that was found by other means comes before those of its actions.
+        // A way that was found by other means comes before those of its actions.
         most_ways: world.actions_of(one.id).len() + 1,
     };
     let present = sight.group.iter().map(|one| (one, true));
@@ -123,8 +123,8 @@ pub(super) fn scene(world: &AirspaceWorld, sight: &Sight, unheard: &[Sighted]) -
     }
 }
 
-/// Returns another airplane as the shield knows it from what is seen of it and from its filed flight: where
-/// messages get lost, no order changes its speed or its level.
+/// Returns another airplane as the shield knows it from its visible state and its filed flight: where messages get
+/// lost, no order changes its speed or its level.
 fn other(world: &AirspaceWorld, own: &Own, one: &Sighted) -> Flyer {
     let stage = world.stage(one.id, 0);
     let named = own.named.binary_search(&one.id).map_or(&[][..], |_| std::slice::from_ref(&own.id));
@@ -145,7 +145,7 @@ fn other(world: &AirspaceWorld, own: &Own, one: &Sighted) -> Flyer {
     }
 }
 
-/// Returns an airplane that was not heard as one that flies straight on, for methods that need no more of it.
+/// Returns an airplane that was not heard as one that flies straight on, for methods that need no more than that.
 pub(super) fn unheard(world: &AirspaceWorld, one: &Sighted) -> Intruder {
     let stage = world.stage(one.id, 0);
     let v_m_s = stage.model.v_m_s;

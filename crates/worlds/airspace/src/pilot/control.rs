@@ -20,9 +20,9 @@ pub struct Control {
     pub course: Course,
     /// Outcome of the optimization; none where there was nothing to optimize.
     pub optimized: Option<Optimized>,
-    /// Packets of the talk about who decides together; none where that is announced.
+    /// Packets of the talk that finds the group; none where groups are announced.
     pub grouping: Traffic,
-    /// Packets of the talk about what each wants.
+    /// Packets of the talk about the wishes of each.
     pub deciding: Traffic,
     /// Packets of the shield's exchange.
     pub shielding: Traffic,
@@ -69,7 +69,7 @@ pub struct Memory {
 }
 
 impl Course {
-    /// Returns it as the shield decides; `fallback` is the side of the stored orbit.
+    /// Returns the course as a decision of the shield; `fallback` is the side of the stored orbit.
     pub(crate) fn decision(&self, fallback: Side) -> Decision {
         match *self {
             Self::Way { wish, side, .. } => {

@@ -1,11 +1,11 @@
-//! Packets of talks that an airplane has not come to yet: a faster neighbor is there already.
+//! Packets of talks that an airplane has not come to yet: a faster neighbor is already there.
 
 use crate::agents::packet::TalkId;
 use sidestep_kernel::EntityId;
 use sidestep_kernel::network::Refusal;
 
-/// Largest number of packets of one sender that are kept: an agent that has not heard another one says no more
-/// than a few things, and asks for them.
+/// Largest number of packets of one sender that are kept: an agent that has not heard another one sends only a few
+/// messages, and asks for missing ones.
 const MOST_OF_ONE: usize = 16;
 /// Largest number of bytes that are kept.
 const MOST_BYTES: usize = 64 << 20;

@@ -1,4 +1,4 @@
-//! Runs whose pilots are elsewhere: each cycle they are told what they perceive, and say what they do.
+//! Runs whose pilots are elsewhere: each cycle they receive their perceptions, and return their controls.
 
 use super::control::{Control, Course};
 use super::sight::Sight;
@@ -13,14 +13,14 @@ use sidestep_kernel::control::OrderError;
 use sidestep_kernel::{Cycle, EntityId, Simulation};
 use std::collections::BTreeMap;
 
-/// A run whose airplanes may be flown by pilots outside of it.
+/// A run in which airplanes may be flown by pilots outside of it.
 pub trait Fleet {
-    /// Returns what each airplane that decides in the cycle to come perceives, by rising id. No result depends on
+    /// Returns the perceptions of each airplane that decides in the cycle to come, by rising id. No result depends on
     /// it.
     fn sights(&self) -> Vec<Sight>;
 
-    /// Hands over what airplanes do in the cycle to come. One that is missing stays on its stored orbit; where no
-    /// network is given that may lose messages, so does its whole group, because then plans are safe only if
+    /// Hands over the controls of airplanes for the cycle to come. An airplane without one stays on its stored orbit;
+    /// unless a network is given that may lose messages, so does its whole group, because then plans are safe only if
     /// all fly them. A run that is recorded keeps the controls, so that it can be computed again.
     ///
     /// # Errors
@@ -63,7 +63,7 @@ impl Fleet for AirspaceRun {
 }
 
 impl AirspaceWorld {
-    /// Returns what each airplane perceives that decides in cycle `now`.
+    /// Returns the perceptions of each airplane that decides in cycle `now`.
     pub(crate) fn sights(&self, state: &AirspaceState, now: Cycle) -> Vec<Sight> {
         let mut all = Vec::new();
         self.perceived(state, now, |turn, flown, intruders| {
@@ -121,12 +121,12 @@ impl AirspaceWorld {
         Ok(())
     }
 
-    /// Returns what people call an airplane, if there is one of this id.
+    /// Returns the name that people use for an airplane, or else the id.
     fn called_if_known(&self, id: EntityId) -> String {
         self.callsign(id).unwrap_or_else(|| id.to_string())
     }
 
-    /// Reads a control, and checks that its airplane can do that.
+    /// Reads a control, and checks that its airplane can fly it.
     fn read_control(
         &self,
         id: EntityId,
@@ -162,7 +162,7 @@ impl AirspaceWorld {
             return Err(format!("its way has {found} turn rates; give {steps}, one for each step"));
         }
         let most_rad_s = self.stage(own.id, own.orders).model.omega_max_rad_s;
-        // Nothing compares with what is no number.
+        // Comparisons with NaN are false.
         let is_within = |omega: &&f64| omega.abs() <= most_rad_s;
         if let Some(omega) = omegas_rad_s.iter().find(|omega| !is_within(omega)) {
             return Err(format!(
@@ -181,7 +181,7 @@ impl AirspaceWorld {
         }
     }
 
-    /// Checks what comes with a control beside the course.
+    /// Checks the parts of a control beside the course.
     fn can_be_kept(&self, control: &Control) -> Result<(), String> {
         let is_told = |kind: EventKind| {
             use EventKind::{Deadline, GroupTooLarge, HeldBack, Unheard};

@@ -6,14 +6,14 @@
 //!              Packet  v   │  Packet               to and from the others of its group
 //! ```
 //!
-//! A [`Pilot`] knows the filed flights (the world), perceives a [`Sight`], finds out with whom it decides where that
-//! is not announced, talks with the others of its group first about what each wants and then about whether that is
-//! safe, and ends with a [`Control`]. It is a state machine without a clock, a socket or a thread. The simulator
-//! runs a group of them over a network in memory (`deploy/`); a process on a network runs one.
+//! A [`Pilot`] knows the filed flights (the world), perceives a [`Sight`], finds its group where that is not
+//! announced, talks with the others of its group first about the wishes of each and then about whether those are
+//! safe, and ends with a [`Control`]. It is a state machine without a clock, a socket or a thread. The simulator runs
+//! a group of them over a network in memory (`deploy/`); a process on a network runs one.
 //!
-//! No process sees when all are done, so each ends by its own outcome or its deadline, and goes on to answer
-//! what others ask about talks that it has ended. One that is ahead may talk about what comes next: such
-//! packets are kept until it comes, as many as there is room for.
+//! No process sees when all are done, so each ends by its own outcome or its deadline, and goes on to answer the
+//! others' questions about talks that it has ended. One that is ahead may already be in the next talk: such packets
+//! are kept until that starts, as many as there is room for.
 //!
 //! ```text
 //! sight.rs  control.rs    what goes in once a cycle, and what comes out

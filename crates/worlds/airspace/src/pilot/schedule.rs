@@ -13,9 +13,9 @@ const FOR_EVER: Patience =
 pub(crate) struct Schedule {
     /// Start of the first one.
     pub(crate) begins: u64,
-    /// End in any case of the talk about who decides together, where there is one.
+    /// End in any case of the talk that finds the group, where there is one.
     pub(crate) grouped_by: u64,
-    /// End in any case of the talk about what each wants.
+    /// End in any case of the talk about the wishes of each.
     pub(crate) decided_by: u64,
     /// Start of the shield's exchange, unless the first talk takes longer.
     pub(crate) shield_from: u64,

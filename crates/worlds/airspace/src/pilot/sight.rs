@@ -19,18 +19,18 @@ const FARTHEST_M: f64 = 2e9;
 /// wait forever.
 const REFUSED_PART: f64 = 0.125;
 
-/// Everything that an airplane perceives at the start of a cycle: one message. Whatever else it knows it has
-/// heard, remembers, or finds in the filed flights.
+/// Everything that an airplane perceives at the start of a cycle: one message. All its other knowledge it has heard,
+/// remembers, or finds in the filed flights.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Sight {
     /// The cycle for which it decides.
     pub cycle: Cycle,
     /// Its own airplane.
     pub own: Own,
-    /// Those who decide together in this cycle, itself among them, by rising id: what all see of each. Where
+    /// The airplanes that decide together in this cycle, itself among them, by rising id, as all see them. Where
     /// groups are heard rather than announced, those near it.
     pub group: Vec<Sighted>,
-    /// Airplanes near these that mind nobody, as all see them.
+    /// Airplanes near these that mind no other, as all see them.
     pub intruders: Vec<Intruder>,
 }
 
@@ -59,7 +59,7 @@ pub struct Own {
     pub refusals: u32,
     /// The others with which it is named, by rising id: the shield promises nothing for these pairs.
     pub named: Vec<EntityId>,
-    /// The wish that was ordered of it, if it is decided from outside.
+    /// The wish that was ordered for it, if it is decided from outside.
     pub wish: Option<Wish>,
 }
 
@@ -85,13 +85,13 @@ impl Own {
         }
     }
 
-    /// Returns what its group knows of it once it has told it.
+    /// Returns the state that its group knows once it has sent it.
     pub(crate) fn known(&self) -> Known {
         let &Self { id, seen, next, orders, altitude_m, .. } = self;
         Known { slot: id, pose: seen, next: next as usize, orders, altitude_m }
     }
 
-    /// Returns the part of it that the shield knows: it is where all see it.
+    /// Returns the airplane as the shield knows it: where all see it.
     pub(crate) fn flyer(&self, world: &AirspaceWorld) -> Flyer {
         let stage = world.stage(self.id, self.orders);
         Flyer {
@@ -111,9 +111,9 @@ impl Own {
         }
     }
 
-    /// Returns its rank. It is higher the nearer its goal is, so that it is soon out of
-    /// the others' way, and the more often its wish was refused, so that nobody waits forever. Whole
-    /// meters in the upper half; the id in the lower half makes it unique.
+    /// Returns its rank. It is higher the nearer its goal is, so that it is soon out of the others' way, and the more
+    /// often its wish was refused, so that no airplane waits forever. Whole meters in the upper half; the id in the
+    /// lower half makes it unique.
     fn rank(&self, dt_s: f64, stage: &Stage<'_>) -> u64 {
         let ahead = &stage.mission[(self.next as usize).min(stage.mission.len())..];
         let legs = ahead
@@ -151,7 +151,7 @@ impl Sighted {
         }
     }
 
-    /// Returns what is known of it before it has told anything: its filed flight, where it is seen.
+    /// Returns the knowledge of it before it has sent anything: its filed flight, where it is seen.
     pub(crate) fn known(&self) -> Known {
         let &Self { id, pose, altitude_m, .. } = self;
         Known { slot: id, pose, next: 0, orders: 0, altitude_m }
@@ -159,7 +159,7 @@ impl Sighted {
 }
 
 impl Sight {
-    /// Returns what each airplane of a group perceives; `intruders` are those that mind nobody.
+    /// Returns the perceptions of each airplane of a group; `intruders` are those that mind no other.
     pub(crate) fn all(turn: &Turn<'_>, flown: &Flown, intruders: &[Intruder]) -> Vec<Self> {
         let group: Vec<Sighted> = flown.ids.iter().map(|&slot| Sighted::of(turn, slot)).collect();
         let one = |(k, &slot): (usize, &Slot)| {
@@ -192,7 +192,7 @@ impl Sight {
         Unsound::Number.unless(seen.into_iter().all(f64::is_finite))
     }
 
-    /// Returns the ids of those who decide together, rising.
+    /// Returns the ids of the airplanes that decide together, rising.
     pub fn members(&self) -> Vec<EntityId> {
         self.group.iter().map(|one| one.id).collect()
     }

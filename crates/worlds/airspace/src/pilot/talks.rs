@@ -1,4 +1,4 @@
-//! The talks of a cycle: the parties to them, by deployment and method, and what comes of them.
+//! The talks of a cycle: the parties to them, by deployment and method, and their outcomes.
 
 use super::briefing::{certainty, filed, own_ship, scene};
 use super::sight::Sight;
@@ -21,11 +21,11 @@ use std::sync::Arc;
 
 /// The outcome of a talk.
 pub(super) enum Came {
-    /// Those who decide together.
+    /// The airplanes that decide together.
     Found(Found),
     /// The conclusion of an optimization.
     Decided(Conclusion),
-    /// The ways that all mean to fly.
+    /// The intentions of all.
     Told(Vec<Option<Intent>>),
     /// The result of the shield's exchange.
     Agreed(Agreed),
@@ -58,7 +58,7 @@ impl From<Agreed> for Came {
 /// A party to a talk of any subject.
 pub(super) type Speaker = dyn Concludes<Outcome = Came>;
 
-/// A party of which only that it has an outcome matters.
+/// A wrapper that turns the outcome of any party into [`Came`].
 struct Any<P>(P);
 
 impl<P: Party> Party for Any<P> {
@@ -111,7 +111,7 @@ where
     Box::new(Any(Endpoint::new(agent, radio)))
 }
 
-/// Returns the party to a talk about who decides together.
+/// Returns the party to a talk that finds the group.
 pub(super) fn looks(
     world: &AirspaceWorld,
     sight: &Sight,
@@ -131,14 +131,14 @@ pub(super) fn looks(
     endpoint(grouping::Agent::new(start), radio)
 }
 
-/// Returns of each one of a group whether it was heard lately, or is met for the first time.
+/// Returns whether each one of a group was heard lately, or is met for the first time.
 fn expected(sight: &Sight, contacts: &Contacts) -> Vec<bool> {
     let is_expected =
         |id: EntityId| contacts.get(&id).is_none_or(|contact| contact.heard_in + 1 >= sight.cycle);
     sight.group.iter().map(|one| is_expected(one.id)).collect()
 }
 
-/// Returns the party of the deployment to an optimization, beside those near who are not heard.
+/// Returns the deployment's party to an optimization, among airplanes nearby that are `unheard`.
 pub(super) fn optimizes(
     world: &AirspaceWorld,
     (sight, unheard): (&Sight, &[Sighted]),
@@ -161,7 +161,7 @@ pub(super) fn optimizes(
     }
 }
 
-/// Returns the party to a talk in which all tell where they mean to fly.
+/// Returns the party to a talk in which all tell where they intend to fly.
 pub(super) fn tells(
     world: &AirspaceWorld,
     sight: &Sight,

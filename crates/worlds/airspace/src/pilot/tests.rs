@@ -1,4 +1,4 @@
-//! Pilots outside of a run: they do what those in it do.
+//! Pilots outside of a run: they act like those in it.
 
 mod fleet;
 mod hostile;
@@ -13,7 +13,7 @@ use sidestep_kernel::{Cycle, EntityId, Simulation};
 use sidestep_scenario::Source;
 use std::sync::Arc;
 
-/// All that the shield has to do with: levels that are changed, one that comes in late, one that minds nobody, and
+/// All cases that concern the shield: changes of level, an airplane that comes in late, one that minds no other, and
 /// two that start too close.
 const TROUBLE: &str = "[airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 2600.0\n\
     [[airplanes]]\nat_m = [0, 3000]\nheading_deg = -90\nway_points_m = [[0, -6000]]\naltitude_m = 600.0\n\
@@ -44,7 +44,7 @@ impl Crew {
         Self { world, pilots }
     }
 
-    /// Lets those who perceive something decide, over the network of the scenario.
+    /// Lets the pilots that perceive something decide, over the network of the scenario.
     fn decide(&mut self, run: &AirspaceRun) -> Vec<Control> {
         let network: Option<&Network> = self.world.network.as_ref();
         let (now, schedule) = (run.cycle(), Schedule::of_cycle(run.cycle(), network));
@@ -69,7 +69,7 @@ fn over_the_wire<T: serde::Serialize + serde::de::DeserializeOwned>(value: &T) -
     postcard::from_bytes(&bytes).expect("what was written")
 }
 
-/// Everything that others cannot see of an airplane changes, and nobody perceives anything else.
+/// Everything that others cannot see of an airplane changes, and the sights of the others stay the same.
 #[test]
 fn a_sight_holds_nothing_of_others_that_cannot_be_seen() {
     let mut run = run(

@@ -1,14 +1,14 @@
 //! Errors of place and heading, as far as the shield allows for them.
 //!
 //! All see an airplane up to `position_m` from its place, and at the end of each `dt` a gust turns
-//! it by up to `heading_rad`; nobody knows the error, everybody these bounds. Airplanes that
+//! it by up to `heading_rad`; no airplane knows the error, all know these bounds. Airplanes that
 //! exceed them are named (`act/errors.rs`).
 //!
 //! **Places.** Let all be seen within `E` of their places. A plan is computed from where the
-//! airplane is seen, so what is flown is the plan, moved by at most `E`. Plans that keep
+//! airplane is seen, so the motion flown is the plan, moved by at most `E`. Plans that keep
 //! `R + 2 E` as they are seen keep `R` as they are flown. The invariant of the shield speaks of
-//! orbits as they are flown: two airplanes that stay on theirs need not be seen apart anew, and
-//! the search never asks it of them. So the induction holds with this wider gap on new plans.
+//! orbits as they are flown: two airplanes that stay on theirs need not be seen apart anew, and the
+//! search never asks it of them. So the induction holds with this wider gap on new plans.
 //!
 //! **Headings.** A way is flown for one `dt` from a heading that is seen, so no gust disturbs it.
 //! An orbit is flown forever. Airplanes orbit at less than their largest turn rate and have the
@@ -19,7 +19,7 @@
 //!   later because `hold` steers for headings within `D`, never away from them, and has
 //!   `a dt >= 2 D` to get there, and then comes one gust;
 //! - it is within `4 v dt D` of `held`. At the end of a way it is at `held`. Later `hold` leads it
-//!   back; that is looked at in each `dt`, and who is farther away is named.
+//!   back; that is checked in each `dt`, and an airplane that is farther away is named.
 //!
 //! During `dt` it heads within `2 D` of `held` all the time, so its place relative to `held`
 //! changes by at most `2 v sin(D) dt <= 2 v dt D`. So it is within `W = 6 v dt D` of its orbit, and
@@ -36,7 +36,7 @@ const SLOWEST_PART: f64 = 0.45;
 /// there no limit, a single airplane that hardly turns would put all others on circles that fill
 /// the sky.
 const ALIKE: f64 = 10.0;
-/// Part of its distance to the side that an airplane means to make good within a step.
+/// Part of its sideways distance that an airplane aims to make good within a step.
 const GAIN: f64 = 0.5;
 
 /// Bounds on errors.
@@ -142,8 +142,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever gusts do within the bound, also the worst at any time, an airplane stays so near
-        /// its orbit that it need not be named.
+        /// Under any gusts within the bound, also the worst at any time, an airplane stays so near its orbit that it
+        /// need not be named.
         #[test]
         fn whoever_holds_an_orbit_strays_no_farther_than_the_bound(
             part in 0.01f64..0.275, left in any::<bool>(), dtau in prop::sample::select(vec![1.0, 2.5, 5.0]),

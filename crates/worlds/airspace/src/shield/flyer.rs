@@ -79,7 +79,7 @@ impl Flyer {
         apart_m < self.gap_m(other) + reach_m(self) + reach_m(other)
     }
 
-    /// Returns two discs that it cannot leave, whatever way it flies for `dt_s` seconds and to
+    /// Returns two discs that it cannot leave, whichever way it flies for `dt_s` seconds and to
     /// whichever side it turns forever after that: their centers, and their radius in meters.
     ///
     /// At any time it is on the circle to its left that it would fly from there, whose center is at

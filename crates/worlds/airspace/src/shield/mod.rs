@@ -8,8 +8,8 @@
 //!
 //! Each `dt` every airplane is given a *plan*: some way for `dt`, and then an orbit from where
 //! that ends. Plans are *compatible* when they stay `R` apart during `dt` and on the orbits ever
-//! after, or when nobody has to keep the pair apart: it is named, or the levels that the two keep
-//! or pass do not meet. [`filter`] hands out plans that are pairwise compatible:
+//! after, or when the pair need not be kept apart: it is named, or the levels that the two keep or
+//! pass do not meet. [`filter`] hands out plans that are pairwise compatible:
 //!
 //! 1. *Start.* If the fallbacks are apart, staying on them for `dt` and ever after is a plan for
 //!    each, and these plans are pairwise compatible: they are the same motions as the invariant
@@ -24,19 +24,19 @@
 //! 3. *Better again.* An airplane that has fallen back may take another plan if that is compatible
 //!    with all present ones. Each such exchange keeps all pairs compatible.
 //! 4. *Step.* All fly `dt` of their plans, and store the orbit at its end. The plans were
-//!    compatible, so nobody came nearer than `R` during `dt`, and the stored orbits keep the
+//!    compatible, so no two came nearer than `R` during `dt`, and the stored orbits keep the
 //!    invariant.
 //! 5. *Changes.* Between two `dt` a pair comes under the invariant in three ways, and never without
 //!    orbits that are apart: one of the two comes in, and chooses an orbit apart from the other's,
-//!    or else the pair is named (`entry_fallbacks`); one is ordered to a level or a speed, which is
-//!    carried out only with an orbit apart from those of all that it then minds, whatever other
-//!    pairs are named (`side_apart`); or the name of the pair ends, which it does once their orbits
-//!    are apart (`act/entry.rs`). An airplane that leaves the world keeps every other pair as it was.
+//!    or else the pair is named (`entry_fallbacks`); one is ordered to a level or a speed, which is carried out only
+//!    with an orbit apart from those of all that it then minds, regardless of the other pairs that are named
+//!    (`side_apart`); or the name of the pair ends, which it does once their orbits are apart (`act/entry.rs`). An
+//!    airplane that leaves the world keeps every other pair as it was.
 //!
 //! By induction over `dt` no pair that is not named ever loses separation. A wind that all know
-//! moves everybody alike and changes no distance. `errors.rs` has what errors of place and heading
-//! add to `R`, and `avoid.rs` what holds beside airplanes that mind nobody. Each step is a
-//! property test in `tests.rs`, the whole one in `promise.rs`.
+//! moves all alike and changes no distance. `errors.rs` has the margin that errors of place and
+//! heading add to `R`, and `avoid.rs` the promise beside airplanes that mind no other. Each step is
+//! a property test in `tests.rs`, the whole one in `promise.rs`.
 //!
 //! Airplanes that turn at different rates orbit at one rate, which all can fly (`common_rates`).
 //! Then plans of airplanes that pass each other are nearly always compatible, and the shield costs

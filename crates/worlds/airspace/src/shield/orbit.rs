@@ -11,8 +11,8 @@ use sidestep_kernel::math;
 
 /// Length in seconds below which an interval is no longer halved: undecided counts as too near.
 const FINEST_S: f64 = 1e-4;
-/// The same as a part of the whole interval, so that slow orbits, whose periods are days, take no
-/// longer to compare: at most twice the inverse of it in looks at a distance.
+/// The same as a part of the whole interval, so that slow orbits, with periods of days, take no
+/// longer to compare: the number of distances looked at is at most twice its inverse.
 const FINEST_PART: f64 = 1e-6;
 
 /// The direction of an orbit.
@@ -173,7 +173,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The distance that keeps just so far that the bound decides nothing for long.
+    /// The distance stays just far enough that the bound decides nothing for long.
     #[test]
     fn no_two_orbits_take_longer_to_compare_than_a_bounded_number_of_looks() {
         for period_s in [1.0, 90.0, 1e4, 360_000.0, 1e9] {

@@ -110,7 +110,7 @@ impl Plan {
         })
     }
 
-    /// Returns whether it keeps apart from another airplane whatever that one does, for one `dt`
+    /// Returns whether it keeps apart from another airplane however that one flies, for one `dt`
     /// and on orbits ever after.
     pub(crate) fn is_clear_of(&self, other: &Flyer) -> bool {
         let dt_s = self.dtau_s * self.omegas_rad_s.len() as f64;

@@ -102,7 +102,7 @@ fn only_named_pairs_lose(airspace: &str, airplanes: &str) -> Result<(), TestCase
     let mut run = run(airspace, airplanes);
     run.advance(120);
     let (mut lost, named) = lost_and_named(&run);
-    // What intruders do among themselves is theirs.
+    // Losses among intruders do not count.
     let is_flown = |id: u32| {
         let airplane = &run.world().airplanes[id as usize];
         airplane.track.is_none() && !airplane.is_intruder
@@ -157,7 +157,7 @@ fn errors_beyond_their_bounds_are_named() {
         }
         assert_eq!(named_ones, 30, "at so few sigmas every one of them");
     }
-    // Where nobody can know where anybody is, all pairs are named.
+    // Where errors are this large, all pairs are named.
     let mut run = superconflict(&erring(100_000.0, 0.0, ""), 1);
     run.advance(100);
     assert_eq!(run.metrics().too_close.len(), 15);

@@ -24,8 +24,8 @@ pub enum Certainty {
     Mixable,
 }
 
-/// Decides for airplanes whose stored fallbacks are pairwise apart. `candidates[i]` are the ways
-/// that airplane `i` may fly, the wanted one first, each of `steps` steps of `dtau_s` seconds;
+/// Decides for airplanes with stored fallbacks that are pairwise apart. `candidates[i]` are the
+/// ways that airplane `i` may fly, the wanted one first, each of `steps` steps of `dtau_s` seconds;
 /// without any it stays on its fallback.
 pub fn filter(
     flyers: &[Flyer],

@@ -83,8 +83,8 @@ proptest! {
         prop_assert!(nearest_on_orbits(&flyers, 400) >= 500.0);
     }
 
-    /// Steps 2 to 4: whatever the wishes, the motions flown keep apart, and the stored orbits keep
-    /// the invariant. Mixable plans do in every mixture with fallbacks.
+    /// Steps 2 to 4: for any wishes, the motions flown keep apart, and the stored orbits keep the
+    /// invariant. Mixable plans do in every mixture with fallbacks.
     #[test]
     fn a_filtered_step_keeps_separation_and_the_invariant(
         flyers in some_flyers(),
@@ -131,8 +131,8 @@ proptest! {
         prop_assert!(nearest_on_orbits(&now, 400) >= 500.0);
     }
 
-    /// A plan that is clear of another airplane needs no consent of it: whatever that one flies for
-    /// `dt`, and to whichever side it turns then, the two keep apart.
+    /// A plan that is clear of another airplane does not need its consent: however that one flies
+    /// for `dt`, and to whichever side it turns then, the two keep apart.
     #[test]
     fn a_plan_clear_of_another_keeps_apart_whatever_that_one_does(
         x in 1200.0f64..3000.0, bearing in -3.1f64..3.1, psi in -3.1f64..3.1,

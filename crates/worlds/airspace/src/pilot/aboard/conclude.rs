@@ -1,4 +1,4 @@
-//! The conclusions that a pilot draws: from what it perceives, and from the talks that it has ended.
+//! The conclusions that a pilot draws: from its perception, and from the talks that it has ended.
 
 use super::Pilot;
 use super::turn::Stage;
@@ -16,7 +16,7 @@ use crate::pilot::sight::Sighted;
 use crate::pilot::talks::Came;
 
 impl Pilot {
-    /// Notes who decides together, as it has found; without an outcome it is alone.
+    /// Notes the group that it has found; without an outcome it is alone.
     fn is_grouped(&mut self, came: Option<Came>, tick: u64) {
         let Some(turn) = &mut self.turn else { return };
         let sight = &mut turn.sight;
@@ -35,7 +35,7 @@ impl Pilot {
         self.decide(tick);
     }
 
-    /// Starts to find out what it wants.
+    /// Starts to choose its wishes.
     pub(super) fn decide(&mut self, tick: u64) {
         let Some(turn) = &self.turn else { return };
         let group: Vec<Known> = turn.sight.group.iter().map(|one| one.known()).collect();
@@ -59,7 +59,7 @@ impl Pilot {
         self.is_decided(considered);
     }
 
-    /// Notes what it wants; without the shield it flies that.
+    /// Notes its wishes; without the shield it flies the first of them.
     fn is_decided(&mut self, considered: Considered) {
         let Some(turn) = &mut self.turn else { return };
         turn.considered = considered;
@@ -106,7 +106,7 @@ impl Pilot {
         }
     }
 
-    /// Notes what has come of the shield's exchange, in which it has proposed the ways that were `allowed`.
+    /// Notes the outcome of the shield's exchange, in which it has proposed the ways that were `allowed`.
     fn is_shielded(&mut self, came: Option<Came>, allowed: &[usize]) {
         let Some(turn) = &mut self.turn else { return };
         self.memory.contacts = match came {
@@ -141,7 +141,7 @@ impl Pilot {
         self.is_decided(considered);
     }
 
-    /// Finds the headings of all from what they have told; who has told nothing is taken to fly straight on.
+    /// Finds the headings of all from their messages; one without a message is taken to fly straight on.
     fn react(&mut self, told: &[Option<Intent>]) {
         let Some(turn) = &self.turn else { return };
         let (mut group, mut memory, mut me) = (Vec::new(), Vec::new(), 0);

@@ -1,4 +1,4 @@
-//! A cycle of one airplane, as far as it has come.
+//! A cycle of one airplane, up to its present stage.
 
 use crate::agents::contact::Contacts;
 use crate::agents::packet::{TalkId, Topic};
@@ -18,9 +18,9 @@ use std::sync::Arc;
 pub(super) struct Turn {
     pub(super) sight: Sight,
     pub(super) schedule: Schedule,
-    /// Ids of those who decide together as far as it knows, rising.
+    /// Ids of the airplanes that decide together as far as it knows, rising.
     pub(super) members: Arc<[EntityId]>,
-    /// Those near who are not among them, by rising id.
+    /// Airplanes near it that are not among them, by rising id.
     pub(super) unheard: Vec<Sighted>,
     pub(super) stage: Stage,
     pub(super) considered: Considered,
@@ -30,11 +30,11 @@ pub(super) struct Turn {
 
 /// The part of a cycle that an airplane is in.
 pub(super) enum Stage {
-    /// A talk about who decides together.
+    /// A talk that finds the group.
     Grouping(Talk<Speaker>),
-    /// A talk about what each wants.
+    /// A talk about the wishes of each.
     Deciding(Talk<Speaker>),
-    /// It knows what it wants, and waits until the shield's exchange starts.
+    /// It has chosen its wishes, and waits until the shield's exchange starts.
     Decided,
     /// The shield's exchange; the places of the ways that it has proposed, among all that it considers.
     Shielding(Talk<Speaker>, Vec<usize>),
@@ -46,7 +46,7 @@ pub(super) enum Stage {
 pub(super) enum Stands {
     /// It comes later.
     Before,
-    /// It comes so much later that nobody can be there.
+    /// It comes so much later that no airplane can be there.
     FarBefore,
     /// It is of the same cycle and subject, and of other members.
     Beside,
@@ -71,7 +71,7 @@ impl Turn {
             Stage::Shielding(..) | Stage::Over => Topic::Shield,
         };
         let here = TalkId { topic, ..TalkId::new(self.sight.cycle, topic, &self.members) };
-        // Nobody begins a cycle before all have ended the one before it.
+        // No airplane begins a cycle before all have ended the one before it.
         let last = self.sight.cycle.saturating_add(1);
         match () {
             () if talk.cycle > last => Stands::FarBefore,
@@ -92,14 +92,14 @@ impl Turn {
         *noted = Traffic { ticks, ..traffic };
     }
 
-    /// Notes how a talk has ended, and which others it no longer hears.
+    /// Notes how a talk has ended, and the others that it no longer hears.
     pub(super) fn note_end(
         &mut self,
         world: &AirspaceWorld,
         end: &Ended<Came>,
         contacts: &Contacts,
     ) {
-        // Who is missing where groups are found is told once it is known who is in them.
+        // Where groups are found, missing airplanes are noted once the members are known.
         let is_group = matches!(self.stage, Stage::Grouping(_));
         let missing = end.unheard.iter().filter(|_| !is_group);
         self.note_unheard(world, missing.map(|&place| self.spoken_to()[place]).collect(), contacts);
@@ -109,7 +109,7 @@ impl Turn {
         }
     }
 
-    /// Returns the ids of those that the party to the present talk knows, by their places.
+    /// Returns the ids of the airplanes that the party to the present talk knows, by their places.
     fn spoken_to(&self) -> Vec<EntityId> {
         match self.stage {
             Stage::Shielding(..) => self.in_scene(),
@@ -117,7 +117,8 @@ impl Turn {
         }
     }
 
-    /// Returns the ids of all whom the shield minds: its group, and those near who are not heard, rising.
+    /// Returns the ids of all airplanes that the shield minds: its group, and those nearby that are not heard,
+    /// rising.
     pub(super) fn in_scene(&self) -> Vec<EntityId> {
         let unheard = self.unheard.iter().map(|one| one.id);
         let mut all: Vec<EntityId> = self.members.iter().copied().chain(unheard).collect();
@@ -125,7 +126,7 @@ impl Turn {
         all
     }
 
-    /// Notes the others of whom nothing is heard any more.
+    /// Notes the others that are no longer heard.
     pub(super) fn note_unheard(
         &mut self,
         world: &AirspaceWorld,

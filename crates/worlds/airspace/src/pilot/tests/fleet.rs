@@ -29,7 +29,7 @@ fn tables(rows: &mut MemoryRecorder) -> Vec<(TableSchema, Vec<Values>)> {
     rows.take().into_iter().filter(|(schema, _)| schema.name != "controls").collect()
 }
 
-/// Returns the metrics but for what a clock has measured.
+/// Returns the metrics without those that a clock has measured.
 fn metrics(run: &AirspaceRun) -> crate::metrics::Metrics {
     crate::metrics::Metrics { optimize_cpu_s: 0.0, ..run.metrics() }
 }
@@ -46,7 +46,8 @@ fn is_flown_alike(airspace: &str, airplanes: &str, mut orders: impl FnMut(&mut A
     assert_eq!(driven.digest(), own.digest(), "{airspace}");
     assert_eq!(metrics(&driven), metrics(&own), "{airspace}");
     assert_eq!(tables(&mut found), tables(&mut expected), "{airspace}");
-    // Who believes in another group is refused, and so is what comes too early to be kept.
+    // Packets of one that believes in another group are refused, and so are those that come too
+    // early to be kept.
     let may_disagree = airspace.contains("heard") && airspace.contains("loss");
     let is_sound = |pilot: &Pilot| may_disagree || pilot.refused().total() == 0;
     assert!(crew.pilots.iter().all(is_sound), "{airspace}");
@@ -80,7 +81,7 @@ fn over_a_network_that_loses_messages_it_is_the_same_run_too() {
     }
 }
 
-/// Also by pilots of which each sees no more than those near it.
+/// Also by pilots that see no others than those near them.
 #[test]
 fn pilots_that_find_their_groups_fly_the_run_that_flies_itself() {
     let faults = "network = { loss = 0.2, max_delay_s = 0.005, range_m = 4000.0, \
@@ -104,7 +105,7 @@ fn what_was_ordered_from_outside_is_in_the_sight() {
     is_flown_alike("deployment = \"team\"\nmethod = \"external\"", FOUR, order);
 }
 
-/// The shield's filter, run once for all, and by each airplane from what it has heard.
+/// The shield's filter, run once for all, and by each airplane from the messages that it has heard.
 #[test]
 fn everybody_filters_as_one_process_does_to_the_bit() {
     let noise = "position_noise_m = 5.0\nheading_noise_deg = 0.05\nwind_m_s = [3.0, 1.0]";

@@ -1,4 +1,4 @@
-//! Whatever bytes come: they are counted and dropped, and nobody breaks off.
+//! Arbitrary bytes: they are counted and dropped, and no pilot breaks off.
 
 use super::*;
 use crate::agents::packet::Seal;
@@ -53,7 +53,7 @@ fn forged(payload: &[u8], draws: &mut Draws) -> Vec<u8> {
     Draft::of_bytes(&changed(message, draws)).sealed(&seal)
 }
 
-/// Returns a packet whose message is right and whose head is not.
+/// Returns a packet with a right message and a wrong head.
 fn misplaced(payload: &[u8], draws: &mut Draws) -> Vec<u8> {
     let fingerprint = u64::from_le_bytes(std::array::from_fn(|k| payload[4 + k]));
     let (mut seal, message) = open::<Topic>(payload, fingerprint).expect("a real packet");
@@ -106,7 +106,7 @@ fn told_more(
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(36))]
 
-    /// Damaged on the way, or meant for others: all that counts is what was really said.
+    /// Damaged on the way, or meant for others: only the real messages count.
     #[test]
     fn what_is_damaged_or_misplaced_is_counted_and_changes_nothing(
         seed in any::<u64>(), kind in 0..KINDS.len(), is_damaged in any::<bool>(),
@@ -134,7 +134,7 @@ proptest! {
         }
     }
 
-    /// Well formed, with right checksums, and senseless or lying: nobody breaks off.
+    /// Well formed, with right checksums, and senseless or lying: no pilot breaks off.
     #[test]
     fn whatever_a_packet_says_nobody_breaks_off(
         seed in any::<u64>(), kind in 0..KINDS.len(), is_only in any::<bool>(),
@@ -191,7 +191,7 @@ fn who_floods_a_pilot_fills_no_memory() {
     assert_eq!(crew.pilots[0].refused().of(Refusal::TooLarge), 1);
 }
 
-/// Each reason by itself.
+/// Each reason on its own.
 #[test]
 fn every_reason_is_told_from_the_others() {
     let run = run("deployment = \"compact-team\"", THREE);
@@ -224,7 +224,7 @@ fn every_reason_is_told_from_the_others() {
         (with(&|seal| seal.talk.cycle = 7), Refusal::NoRoom),
         (said(&[9, 9, 9]), Refusal::Unreadable),
         (said(&[message, &[0]].concat()), Refusal::Unreadable),
-        // A message numbered beyond all that there may be.
+        // A message with a number beyond all possible ones.
         (said(&[&[0, 0xFF, 0xFF, 0x03], &message[2..]].concat()), Refusal::Unsound),
     ];
     for (bytes, why) in cases {

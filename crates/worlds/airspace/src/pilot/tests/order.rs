@@ -1,4 +1,4 @@
-//! Results do not depend on the order in which packets come, nor on who is ahead.
+//! Results do not depend on the order in which packets come, nor on which pilot is ahead.
 
 use super::*;
 use proptest::prelude::*;
@@ -11,7 +11,7 @@ enum Due {
     Packet(EntityId, Vec<u8>),
 }
 
-/// Lets pilots decide a cycle. What any of them learns next is drawn, so that packets overtake each other and some
+/// Lets pilots decide a cycle. The next input of any of them is drawn, so that packets overtake each other and some
 /// are in the second talk before others have begun the first.
 fn decided(pilots: &mut [Pilot], sights: Vec<Sight>, draws: &mut Draws) -> Vec<Control> {
     let ids: Vec<EntityId> = sights.iter().map(|sight| sight.own.id).collect();
