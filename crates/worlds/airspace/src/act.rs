@@ -2,9 +2,9 @@
 //!
 //! ```text
 //! begin            airplanes come in, orders are carried out
-//! Sight            what each perceives                            pilot/sight.rs
-//!   -> Control     what each does: one process for all of them (direct.rs), their pilots (deploy/),
-//!                  or somebody outside of the run (pilot/fleet.rs)
+//! Sight            the perceptions of each                        pilot/sight.rs
+//!   -> Control     the decision for each: by one process for all (direct.rs), their pilots (deploy/),
+//!                  or pilots outside of the run (pilot/fleet.rs)
 //! obey             the controls are booked                        obey.rs, protect.rs
 //! step_all         all fly                                        step.rs
 //! ```
@@ -70,11 +70,10 @@ fn fly(turn: &mut Turn<'_>, group: &[Slot]) {
     step::step_all(turn, flights);
 }
 
-/// Does what comes before decisions: airplanes come in, names of pairs begin and end, and orders that
-/// are due are carried out. Returns the airplanes of a group that the method flies; `group` are those in
-/// the air, by id.
+/// Prepares the decisions: airplanes come in, names of pairs begin and end, and orders that are due are carried out.
+/// Returns the airplanes of a group that the method flies; `group` are those in the air, by id.
 pub(super) fn begin(turn: &mut Turn<'_>, group: &[Slot]) -> Flown {
-    // Who is near whom is as it was when the group was formed: orders change levels.
+    // Nearness is that at the time when the group was formed, because orders change levels.
     let flown = Flown::of(turn, group);
     if turn.world.shield {
         entry::release(turn, &flown.ids);
@@ -85,8 +84,8 @@ pub(super) fn begin(turn: &mut Turn<'_>, group: &[Slot]) -> Flown {
     flown
 }
 
-/// Returns the ways of the airplanes that the method flies: as those aboard decide, or as somebody has said
-/// who decides outside of the run.
+/// Returns the ways of the airplanes that the method flies: as those aboard decide, or as given by pilots outside of
+/// the run.
 fn ways(turn: &mut Turn<'_>, flown: &Flown, intruders: &[Intruder]) -> Vec<Way> {
     let Turn { world, state, now, .. } = *turn;
     let own: Vec<Own> = flown.ids.iter().map(|&slot| Own::of(turn, slot)).collect();

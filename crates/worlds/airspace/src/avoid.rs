@@ -1,15 +1,15 @@
 //! Ways that keep clear of intruders, as far as there are any.
 //!
-//! Nobody knows where an intruder wants to go, so no orbit is safe from it forever, and the
-//! invariant of the shield is about all others. What is promised beside it: **an airplane that
+//! No airplane knows where an intruder wants to go, so no orbit is safe from it forever, and the
+//! invariant of the shield is about all others. The promise about intruders: **an airplane that
 //! loses separation from an intruder is named with it before.** Within `dt` the intruder stays in a
 //! circle that grows at its greatest speed `s`. A way is *clear* if at each moment `t` of `dt` the
 //! airplane is farther than `R + s t` from where the intruder is at its start, and farther by the
-//! bounds on errors. On a clear way there is no loss in this `dt`, whatever the intruder does. If
+//! bounds on errors. On a clear way there is no loss in this `dt`, however the intruder flies. If
 //! the way that is flown in the end is not clear, the pair is named until it is again.
 //!
-//! To seldom come to that, an airplane prefers ways that would stay clear for as long as it takes to
-//! turn back, if it flew straight on after `dt`, and the intruder all the time.
+//! To avoid that as far as possible, an airplane prefers ways that would stay clear for as long as it takes to turn
+//! back, if it flew straight on after `dt`, and the intruder all the time.
 
 use crate::flight::{Point, Pose, distance_m};
 use crate::intruder::Intruder;

@@ -98,7 +98,7 @@ impl Considered {
     }
 }
 
-/// The way in which airplanes of a group find what they want.
+/// The way in which airplanes of a group find their wishes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Manner {
     /// Each alone.
@@ -130,7 +130,7 @@ impl Manner {
     }
 }
 
-/// Returns what an airplane wants that decides alone: its way-point, or what was ordered of it.
+/// Returns the wishes of an airplane that decides alone: its way-point, or its order.
 pub(super) fn alone(world: &AirspaceWorld, known: Known, wish: Option<&Wish>) -> Considered {
     match world.method {
         Method::External => external::as_ordered(world, known, wish),
@@ -138,8 +138,8 @@ pub(super) fn alone(world: &AirspaceWorld, known: Known, wish: Option<&Wish>) ->
     }
 }
 
-/// Returns what an airplane wants by probability collectives: the chosen action first, then the others by
-/// the cost that the optimizer expects of them.
+/// Returns the wishes of an airplane by probability collectives: the chosen action first, then the others by the cost
+/// that the optimizer expects of them.
 pub(super) fn as_decided(
     world: &AirspaceWorld,
     known: Known,
@@ -153,8 +153,8 @@ pub(super) fn as_decided(
     Considered { decided, ..Considered::of(world, known, actions) }
 }
 
-/// Returns what the airplanes of a group want by the world's method, if that gives them headings.
-/// `memory` are the conflicts that they resolve.
+/// Returns the wishes of the airplanes of a group by the world's method, if that gives them
+/// headings. `memory` are the conflicts that they resolve.
 pub(super) fn by_velocity(
     world: &AirspaceWorld,
     group: &[Known],
@@ -170,7 +170,7 @@ pub(super) fn possible(world: &AirspaceWorld, known: Known) -> Vec<Way> {
     wishes::ways(world, known, world.actions_of(known.slot))
 }
 
-/// Returns the way straight to its next way-point of an airplane that minds nobody.
+/// Returns the straight way to the next way-point of an airplane that minds no other.
 pub(super) fn straight_way(turn: &Turn<'_>, slot: Slot) -> Way {
     let Turn { world, state, now, .. } = *turn;
     let known = known(world, state, now, slot);

@@ -30,8 +30,8 @@ pub enum EventKind {
     /// An airplane's errors exceed the bounds for which the shield allows; the value is how many
     /// times.
     BeyondBound,
-    /// Whatever an airplane flies in this `dt`, another one that minds nobody can reach it; the
-    /// value is their distance in meters.
+    /// An airplane can be reached in this `dt`, on any way, by one that minds no other; the value
+    /// is their distance in meters.
     Intruder,
     /// An airplane that is decided outside of the run stays on its orbit, because no control of it came in time.
     Absent,
@@ -60,7 +60,7 @@ impl Measure {
 }
 
 impl EventKind {
-    /// Returns what its value measures; `None` for kinds without one.
+    /// Returns the quantity that its value measures; `None` for kinds without one.
     pub(super) fn measure(self) -> Option<Measure> {
         match self {
             Self::LossOfSeparation | Self::Intruder => Some(Measure::Distance),

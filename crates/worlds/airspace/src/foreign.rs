@@ -27,7 +27,7 @@ fn form(file: &Path) -> Form {
     }
 }
 
-/// Returns the scenario that a file of another form stands for, and a report on the rest of it.
+/// Returns the scenario of a file of another form, and a report on the rest of the file.
 ///
 /// # Errors
 /// When the file cannot be read.
@@ -46,7 +46,7 @@ pub(super) fn translate(file: &Path) -> Result<Option<Foreign>, InputError> {
         }
     };
     if scenario.is_none() {
-        // As of a scenario, because whoever counts airplanes does not ask for the reason.
+        // As for a scenario, because a reader of the number does not ask for the reason.
         json["airplanes"] = 0.into();
     }
     let scenario = scenario.ok_or_else(|| {

@@ -1,5 +1,5 @@
-//! Knowledge of an airplane, the worth of each of its actions, its choice, what the shield makes
-//! of that, and what comes of it: the cycle is tried on a copy of the state, for its group alone.
+//! Knowledge of an airplane, the worth of each of its actions, its choice, the shield's decision on
+//! that, and the outcome: the cycle is tried on a copy of the state, for its group alone.
 
 #[cfg(test)]
 mod tests;
@@ -18,7 +18,7 @@ use sidestep_kernel::view::{self, Inspection, Kind, MarkShape, Role, Section, Ta
 use sidestep_kernel::{Cycle, EntityId, Slot};
 
 impl AirspaceWorld {
-    /// Returns what is to tell of an airplane in cycle `now`; `None` for one that is not in the air.
+    /// Returns the report on an airplane in cycle `now`; `None` for one that is not in the air.
     pub(super) fn inspect(
         &self,
         state: &AirspaceState,
@@ -123,7 +123,7 @@ impl Looking<'_> {
         }
     }
 
-    /// Tells with whom it decides, and where they are seen.
+    /// Tells its group, and where the others are seen.
     fn is_in_group(&self, told: &mut Inspection) {
         let mut table = Table::new(["airplane", "distance", "minds others"]);
         let own = self.known().pose.at;
@@ -144,7 +144,7 @@ impl Looking<'_> {
         );
     }
 
-    /// Tells what it has heard of others where messages get lost, and since when.
+    /// Tells its knowledge of others where messages get lost, and the cycles in which they were heard.
     fn knows(&self, told: &mut Inspection) {
         let mut table = Table::new([
             "airplane",
@@ -170,7 +170,7 @@ impl Looking<'_> {
     }
 }
 
-/// Returns which body an airplane is.
+/// Returns the body that stands for an airplane.
 fn airplane(id: EntityId) -> Who {
     (Kind::Airplane, id, None)
 }

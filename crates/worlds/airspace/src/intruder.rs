@@ -1,4 +1,4 @@
-//! Intruders: airplanes that mind nobody, recorded or silent, which all others must avoid.
+//! Intruders: airplanes that mind no other, recorded or silent, which all others must avoid.
 //!
 //! Others see where an intruder is, how it moves now, and how fast its kind can fly; not where it
 //! wants to go. Methods take it to fly straight on. The shield knows where it can be within `dt`:
@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use sidestep_import::traffic::FASTEST_M_S;
 use sidestep_kernel::Slot;
 
-/// Bounds on what is told of an intruder: meters, meters per second and seconds beyond which nothing makes sense, or
-/// takes forever to look at. Recorded speeds are over the ground, and no wind is as fast as an airplane.
+/// Bounds on reports of an intruder: meters, meters per second and seconds beyond which nothing makes sense, or takes
+/// forever to look at. Recorded speeds are over the ground, and no wind is as fast as an airplane.
 const FARTHEST_M: f64 = 1e15;
 const FASTEST_IN_WIND_M_S: f64 = 2.0 * FASTEST_M_S;
 const LONGEST_S: f64 = 1e4;
@@ -42,10 +42,10 @@ impl Intruder {
         self.separation_m.max(separation_m) + self.top_m_s * self.dt_s
     }
 
-    /// Returns whether one can compute with what is said of it.
+    /// Returns whether its numbers can be computed with.
     pub(crate) fn is_sound(&self) -> bool {
         let Self { at, velocity_m_s, top_m_s, separation_m, error_m, levels, dt_s, .. } = self;
-        // Nothing compares with what is no number; levels may be all that there are.
+        // Comparisons with NaN are false; levels may be all that there are.
         let is_within = |most: f64| move |v: &f64| v.abs() <= most;
         at.iter().all(is_within(FARTHEST_M))
             && velocity_m_s.iter().chain([top_m_s]).all(is_within(FASTEST_IN_WIND_M_S))

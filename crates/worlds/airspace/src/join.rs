@@ -8,18 +8,18 @@ use sidestep_kernel::Slot;
 use sidestep_kernel::conflict::Groups;
 use std::ops::Range;
 
-/// The airplanes of a group that the method flies, and who of the group is near whom.
+/// The airplanes of a group that the method flies, and which of the group are near each other.
 #[derive(Debug, Default)]
 pub(super) struct Flown {
     /// Their ids, rising.
     pub(super) ids: Vec<Slot>,
-    /// Slots near each airplane, itself and those who mind nobody among them, rising; empty where groups are
+    /// Slots near each airplane, itself and those that mind no other among them, rising; empty where groups are
     /// announced, and all see all.
     near: Vec<Vec<Slot>>,
 }
 
 impl Flown {
-    /// Returns those of a group that the method flies; `group` are all in the air, by id.
+    /// Returns the airplanes of a group that the method flies; `group` are all in the air, by id.
     pub(super) fn of(turn: &Turn<'_>, group: &[Slot]) -> Self {
         let Turn { world, now, .. } = *turn;
         let is_flown = |&slot: &Slot| !world.is_intruder(slot, now);
@@ -37,8 +37,8 @@ impl Flown {
     }
 }
 
-/// Returns those of a group that are near an airplane, itself among them, by id. Who is near the same intruder is
-/// near, too: what the one does to avoid it, the other has to mind.
+/// Returns those of a group that are near an airplane, itself among them, by id. An airplane near the same intruder
+/// is near, too: it has to mind the maneuver by which the other avoids the intruder.
 fn near(turn: &Turn<'_>, group: &[Slot], own: Slot) -> Vec<Slot> {
     let Turn { world, now, .. } = *turn;
     let (mut near, mut due) = (vec![own], vec![own]);

@@ -7,10 +7,10 @@
 //! ```text
 //! scenario.rs, flight_plan.rs, generate.rs -> world.rs (immutable), state.rs (cells)
 //! perceive.rs -> join.rs -> decide.rs -> act.rs                            one cycle of dt
-//! flight/: motion, orders, tracks       objective.rs: what is minimized    behind it
-//! shield/: what is safe forever        agents/: programs aboard, and what they say to each other
-//! pilot/: an airplane from what it sees to what it does   deploy/: pilots on a network in memory
-//! intruder.rs: airplanes that mind nobody    outside.rs, wish.rs: decisions from outside
+//! flight/: motion, orders, tracks       objective.rs: the minimized cost    behind it
+//! shield/: plans that stay safe forever    agents/: programs aboard, and their messages
+//! pilot/: an airplane from sight to control    deploy/: pilots on a network in memory
+//! intruder.rs: airplanes that mind no other    outside.rs, wish.rs: decisions from outside
 //! baseline/: other methods              metrics.rs: the sums of a run
 //! ```
 
@@ -85,7 +85,7 @@ pub struct Scratch {
     /// them.
     decide_ns: u64,
     flying: Vec<Slot>,
-    /// Notes for somebody who asks about an airplane; none in a run.
+    /// Notes for an inspection of an airplane; none in a run.
     notes: Option<Box<notes::Notes>>,
 }
 

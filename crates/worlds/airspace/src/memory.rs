@@ -20,7 +20,7 @@ pub(super) fn group_takes_bytes(world: &AirspaceWorld, group: &[Known]) -> u64 {
         (Deployment::Direct | Deployment::Pim | Deployment::HierarchicalPim, _) => {
             tables + predictions
         }
-        // Each agent has the tables of its own pairs, and everybody's predictions.
+        // Each agent has the tables of its own pairs, and the predictions of all.
         (Deployment::Team | Deployment::CompactTeam, Estimator::Exact) => {
             2 * tables + members * predictions
         }

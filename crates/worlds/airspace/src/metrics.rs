@@ -20,7 +20,7 @@ pub struct Ledger {
     pub effort: Effort,
     /// Number of events of each kind.
     pub events: BTreeMap<EventKind, u64>,
-    /// Airplanes whose errors exceeded the shield's bounds, with the first cycle of each.
+    /// Airplanes with errors beyond the shield's bounds, with the first cycle of each.
     pub beyond_bound: BTreeMap<EntityId, Cycle>,
 }
 
@@ -62,7 +62,7 @@ pub struct Metrics {
     /// Number of all airplanes.
     pub airplanes: u64,
     /// Mean delay of those that have arrived: time beyond that of the flight alone, in percent of
-    /// that. Those whose flight alone would never end are left out.
+    /// that. Airplanes that would never arrive alone are left out.
     pub mean_delay_percent: Option<f64>,
     /// Number of messages between agents, or migrations of a coordinator; none where one process
     /// decides for all.
@@ -89,7 +89,7 @@ pub struct Metrics {
     pub optimizations: u64,
     /// Mean number of their rounds.
     pub rounds_mean: Option<f64>,
-    /// Number of optimizations whose rounds ran out.
+    /// Number of optimizations that ran out of rounds.
     pub unconverged: u64,
     /// Processor time in seconds spent deciding in this process's run, all workers together.
     pub optimize_cpu_s: f64,
@@ -118,11 +118,11 @@ pub struct Metrics {
     pub orders_delayed: u64,
     /// Pairs for which the shield promises nothing.
     pub too_close: Vec<TooClose>,
-    /// Airplanes whose errors exceeded the shield's bounds: it promises nothing for their pairs.
+    /// Airplanes with errors beyond the shield's bounds: it promises nothing for their pairs.
     pub beyond_bound: Vec<BeyondBound>,
 }
 
-/// An airplane whose errors exceeded the shield's bounds.
+/// An airplane with errors beyond the shield's bounds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BeyondBound {
     /// Time of the first such error, in seconds after the start of the run.
@@ -135,7 +135,7 @@ pub struct BeyondBound {
 }
 
 /// Two airplanes that were too near each other for the shield when the later one came in, or one of
-/// which minds nobody and could reach the other.
+/// which minds no other and could reach the second one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TooClose {
     /// Time when that began, in seconds after the start of the run.
@@ -217,7 +217,7 @@ pub fn airplane_metrics(
         alone_s,
         delay_percent: flown_s
             .filter(|_| alone_s > 0.0 && alone_s.is_finite())
-            // One that minds nobody is never delayed.
+            // One that minds no other is never delayed.
             .filter(|_| !world.airplanes[id as usize].is_intruder)
             .map(|s| 100.0 * (s - alone_s) / alone_s),
         shield_overrides: cell.overrides.get(),

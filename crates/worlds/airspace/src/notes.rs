@@ -12,14 +12,14 @@ use crate::shield::{Decision, Flyer, Plan, Side, Way};
 use crate::world::AirspaceWorld;
 use sidestep_kernel::{EntityId, Slot};
 
-/// Notes for somebody who asks; no run makes any.
+/// Notes for an inspection; no run makes any.
 #[derive(Debug, Default)]
 pub(crate) struct Notes {
     /// The airplane.
     pub(crate) slot: Slot,
     /// The airplanes of its group that the method flies, as all see them.
     pub(crate) group: Vec<Known>,
-    /// Those of the group that mind nobody.
+    /// Those of the group that mind no other.
     pub(crate) intruders: Vec<Intruder>,
     /// Its knowledge of others before.
     pub(crate) contacts: Contacts,
@@ -35,7 +35,7 @@ pub(crate) struct Notes {
     pub(crate) decision: Option<Decision>,
     /// Its stored orbit before.
     pub(crate) flyer: Option<Flyer>,
-    /// Those because of whom it does not fly its first wish.
+    /// The others that keep it from flying its first wish.
     pub(crate) because: Vec<EntityId>,
     /// Beacons by which those of the group have found each other.
     pub(crate) beacons: Traffic,
@@ -48,7 +48,7 @@ pub(crate) struct Notes {
 }
 
 impl Notes {
-    /// Notes what a group knows, has considered and has decided.
+    /// Notes the knowledge, the considerations and the decisions of a group.
     pub(crate) fn decided(
         &mut self,
         world: &AirspaceWorld,
@@ -88,7 +88,7 @@ impl Notes {
         of_all.get(self.place(self.group.iter().map(|known| known.slot))?)
     }
 
-    /// Notes what the shield decided, and because of whom it refused the first wish.
+    /// Notes the shield's decision, and the others because of which it refused the first wish.
     fn shielded(
         &mut self,
         (me, flyers): (usize, &[Flyer]),
@@ -112,8 +112,8 @@ impl Notes {
             let refuses = |k: &usize| *k != me && !wanted.is_compatible(&other(*k));
             (0..flyers.len()).filter(refuses).map(|k| flyers[k].id).collect()
         };
-        // It gave way to what another one flies, to what that one wanted before it gave way too, or to
-        // the orbit on which that one may always stay.
+        // It gave way to the way that another one flies, to the one that the other wanted before it gave way too, or
+        // to the orbit on which the other may always stay.
         let flown = |k: usize| plan(k, decisions[k].candidate, decisions[k].fallback);
         let first = |k: usize| plan(k, (!wishes[k].is_empty()).then_some(0), flyers[k].fallback);
         let all = [against(&flown), against(&first), against(&fallback)];

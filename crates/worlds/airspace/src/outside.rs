@@ -1,5 +1,5 @@
-//! Airplanes as a caller sees them: what they observe, and what may be ordered of those that are
-//! decided from outside.
+//! Airplanes as a caller sees them: their observations, and the orders for those that are decided
+//! from outside.
 
 mod percept;
 #[cfg(test)]
@@ -20,8 +20,8 @@ use sidestep_kernel::{Cycle, EntityId, Slot, World};
 use std::collections::BTreeMap;
 
 impl AirspaceWorld {
-    /// Returns the teams: airplanes that decide, and that turn alike. Those that mind nobody are in
-    /// none.
+    /// Returns the teams: airplanes that decide, and that turn alike. Those that mind no other are
+    /// in none.
     pub(super) fn find_teams(&self) -> Teams {
         let mut places: BTreeMap<(usize, u64), usize> = BTreeMap::new();
         let mut alike: Vec<Vec<EntityId>> = Vec::new();
@@ -48,7 +48,7 @@ impl AirspaceWorld {
         Teams::new(alike.into_iter().enumerate().map(team).collect(), Self::AGENT)
     }
 
-    /// Returns the spaces of what may be ordered of an airplane.
+    /// Returns the spaces of the orders that an airplane may be given.
     fn ordered(&self, i: usize) -> Vec<Space> {
         let actions = &self.actions[i];
         let numbered = actions.iter().enumerate().map(|(k, action)| format!("{k} {action}"));
@@ -82,7 +82,7 @@ impl AirspaceWorld {
         Wish::of(&space.name, order.values)
     }
 
-    /// Notes an order until its airplane decides. One whose flight has ended never does.
+    /// Notes an order until its airplane decides. After the end of its flight an airplane never does.
     pub(super) fn note_order(&self, state: &AirspaceState, order: &Order<'_>) {
         if let Some(wish) = self.wish(order)
             && state.airplanes[order.agent as usize].is_flying()
@@ -91,7 +91,7 @@ impl AirspaceWorld {
         }
     }
 
-    /// Writes what a team perceives.
+    /// Writes the observations of a team.
     pub(super) fn observe(
         &self,
         state: &AirspaceState,
@@ -117,9 +117,9 @@ impl AirspaceWorld {
         });
     }
 
-    /// Calls `look` with what each group perceives in cycle `now`: its airplanes that decide, and those
-    /// that mind nobody. The cycle is begun on a copy of the state, since orders that are due and
-    /// airplanes that come in change what is perceived.
+    /// Calls `look` with the perceptions of each group in cycle `now`: its airplanes that decide, and those that mind
+    /// no other. The cycle is started on a copy of the state, because orders that are due and airplanes that come in
+    /// change the perceptions.
     pub(super) fn perceived(
         &self,
         state: &AirspaceState,

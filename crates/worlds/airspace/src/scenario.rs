@@ -137,7 +137,7 @@ pub struct RecordSection {
     pub events: bool,
     /// A row per optimization.
     pub optimizations: bool,
-    /// The controls of airplanes whose pilots are outside of the run, so that it can be computed again.
+    /// The controls of airplanes with pilots outside of the run, so that it can be computed again.
     pub controls: bool,
     /// Number of cycles between two checkpoints; 0 for none.
     pub checkpoint_every: u64,
@@ -172,7 +172,7 @@ pub struct Compiled {
     pub record: RecordSection,
     /// Sides of the first fallbacks.
     pub fallbacks: Arc<Vec<Side>>,
-    /// Pairs whose first fallbacks are not apart: the shield promises nothing for them.
+    /// Pairs with first fallbacks that are not apart: the shield promises nothing for them.
     pub too_close: Vec<(u32, u32)>,
     /// The text that it was compiled from.
     recipe: Arc<Recipe>,
@@ -196,8 +196,8 @@ impl Compiled {
         Compiler::new(&Arc::new(Recipe { source: source.clone(), head, file })).compile()
     }
 
-    /// Returns the same scenario with another seed: what compiling it with that seed would give. Traffic that is
-    /// drawn, and what follows from positions with errors, is made anew; all else is shared.
+    /// Returns the same scenario with another seed, as if compiled with that seed. Traffic that is drawn, and
+    /// everything that follows from positions with errors, is made anew; all else is shared.
     ///
     /// # Errors
     /// When generated airplanes find no place with this seed, or come too near to be optimized together.

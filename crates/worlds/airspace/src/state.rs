@@ -47,7 +47,7 @@ pub struct AirspaceState {
     held: Box<[Held]>,
     /// The turn rate of each airplane in the step that it flew last, in radians per second.
     turn_rates_rad_s: Box<[Shared<f64>]>,
-    /// The wish that was ordered of each airplane; empty unless airplanes are decided from outside.
+    /// The wish that was ordered for each airplane; empty unless airplanes are decided from outside.
     wishes: Box<[Mutex<Option<Wish>>]>,
     /// The cycle for which controls were handed over, or [`NEVER`].
     handed_for: Shared<u64>,
@@ -175,14 +175,14 @@ fn held<T>(shared: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Takes out what the airplanes of a group remember; nothing where nobody remembers anything. No two
-/// groups share an airplane, so no other worker asks for the same.
+/// Takes out the memories of the airplanes of a group; nothing where airplanes have no memory. No two groups share an
+/// airplane, so no other worker asks for the same.
 fn take<T: Default>(all: &[Mutex<T>], group: &[Slot]) -> Vec<T> {
     let one = |&slot: &Slot| all.get(slot as usize).map(|one| std::mem::take(&mut *held(one)));
     group.iter().map(|slot| one(slot).unwrap_or_default()).collect()
 }
 
-/// Puts it back.
+/// Puts memories back.
 fn put<T>(all: &[Mutex<T>], group: &[Slot], memories: Vec<T>) {
     for (&slot, memory) in group.iter().zip(memories) {
         if let Some(one) = all.get(slot as usize) {
@@ -290,13 +290,13 @@ impl AirspaceState {
         *named = named.iter().copied().filter(|&other| stays(other)).collect();
     }
 
-    /// Takes out what the airplanes of a group remember.
+    /// Takes out the memories of the airplanes of a group.
     pub(super) fn take_memories(&self, group: &[Slot]) -> Vec<Memory> {
         let both = take(&self.contacts, group).into_iter().zip(take(&self.resolving, group));
         both.map(|(contacts, resolving)| Memory { contacts, resolving }).collect()
     }
 
-    /// Puts back what an airplane remembers.
+    /// Puts back the memory of an airplane.
     pub(super) fn put_memory(&self, slot: Slot, Memory { contacts, resolving }: Memory) {
         put(&self.contacts, &[slot], vec![contacts]);
         put(&self.resolving, &[slot], vec![resolving]);
@@ -307,34 +307,34 @@ impl AirspaceState {
         self.contacts.get(slot as usize).map(|all| held(all).clone()).unwrap_or_default()
     }
 
-    /// Stores what airplanes do in a cycle, because they have decided outside of the run.
+    /// Stores the controls for a cycle of airplanes that have decided outside of the run.
     pub(super) fn hand_over(&self, cycle: Cycle, controls: Vec<Control>) {
         *held(&self.handed) = controls.into_iter().map(|one| (one.id, one)).collect();
         self.handed_for.set(cycle);
     }
 
-    /// Returns whether it was handed over what airplanes do in a cycle.
+    /// Returns whether controls were handed over for a cycle.
     pub(super) fn is_handed(&self, cycle: Cycle) -> bool {
         self.handed_for.get() == cycle
     }
 
-    /// Takes out what the airplanes of a group were said to do.
+    /// Takes out the controls that were handed over for the airplanes of a group.
     pub(super) fn take_handed(&self, group: &[Slot]) -> Vec<Option<Control>> {
         let mut handed = held(&self.handed);
         group.iter().map(|slot| handed.remove(slot)).collect()
     }
 
-    /// Returns the wish that was ordered of an airplane, if there is one.
+    /// Returns the wish that was ordered for an airplane, if there is one.
     pub(super) fn wish(&self, slot: Slot) -> Option<Wish> {
         self.wishes.get(slot as usize).and_then(|wish| held(wish).clone())
     }
 
-    /// Drops the wishes that were ordered of the airplanes of a group: they have decided.
+    /// Drops the wishes that were ordered for the airplanes of a group: they have decided.
     pub(super) fn drop_wishes(&self, group: &[Slot]) {
         take(&self.wishes, group);
     }
 
-    /// Stores the wish that was ordered of an airplane, in place of any other.
+    /// Stores the wish that was ordered for an airplane, in place of any other.
     pub(super) fn put_wish(&self, slot: Slot, wish: Wish) {
         put(&self.wishes, &[slot], vec![Some(wish)]);
     }

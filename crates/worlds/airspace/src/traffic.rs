@@ -68,12 +68,12 @@ pub(crate) fn bluesky_rules(place: &str, file: &ScnFile) -> Rules {
     rules
 }
 
-/// An aircraft from the time on at which it moves.
+/// An aircraft from the time on when it moves.
 #[derive(Debug, Clone, PartialEq)]
 struct UnderWay(ScnAircraft);
 
 impl UnderWay {
-    /// Returns the least speed that it has or is told.
+    /// Returns the least speed that it has or is given.
     fn slowest_m_s(&self) -> f64 {
         let told = changes(&self.0, false).into_iter().filter_map(|(_, told)| match told {
             Told::Speed(v_m_s) => Some(v_m_s),
@@ -236,7 +236,7 @@ fn orders(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, Told)> {
         orders.push((aircraft.created_s, Told::Heading(90.0 - aircraft.heading_deg)));
     }
     routed_s.retain(|at_s| has_route && *at_s > aircraft.created_s);
-    // An aircraft that gets a way-point flies there, whatever heading it was given before.
+    // An aircraft that gets a way-point flies there, regardless of earlier headings.
     orders.extend(routed_s.into_iter().map(|at_s| (at_s, Told::Proceeds)));
     orders.extend(changes(aircraft, has_route));
     orders.sort_by(|a, b| a.0.total_cmp(&b.0));

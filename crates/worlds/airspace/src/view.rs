@@ -10,7 +10,7 @@ use sidestep_kernel::view::{
 use sidestep_kernel::{Cycle, Slot};
 
 /// Length of a drawn airplane, as a part of its zone's radius: large enough to be seen, and small
-/// enough that airplanes whose zones touch are drawn apart.
+/// enough that airplanes with touching zones are drawn apart.
 const LENGTH_OF_RADIUS: f64 = 0.6;
 /// Width of a drawn airplane, as a part of its length.
 const WIDTH_OF_LENGTH: f64 = 0.7;

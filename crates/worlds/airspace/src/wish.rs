@@ -3,7 +3,7 @@
 use super::flight::Point;
 use serde::{Deserialize, Serialize};
 
-/// An order from outside: what an airplane is to wish when it decides next.
+/// An order from outside: the wish that an airplane is to have when it decides next.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Wish {
     /// Its actions by number, the best first.
@@ -34,10 +34,10 @@ impl Wish {
         }
     }
 
-    /// Returns why it cannot be flown, and what would be right; its numbers are within their bounds.
+    /// Checks whether it can be flown; its numbers are within their bounds.
     ///
     /// # Errors
-    /// With these words.
+    /// When it cannot: the reason, and the remedy.
     pub(crate) fn check(&self) -> Result<(), String> {
         match self {
             Self::Ranking(actions) => check_ranking(actions),

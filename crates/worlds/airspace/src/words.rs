@@ -121,7 +121,7 @@ pub(super) fn poses(snapshot: &Snapshot) -> Said {
     Said { json, text }
 }
 
-/// Returns the first pairs whose first fallbacks are not apart, and the number of others.
+/// Returns the first pairs with first fallbacks that are not apart, and the number of others.
 fn too_close(world: &AirspaceWorld, pairs: &[(u32, u32)]) -> Option<(String, String)> {
     let named = |&(a, b): &(u32, u32)| format!("{} and {}", world.called(a), world.called(b));
     let told = first_named(pairs, named)?;
@@ -193,7 +193,7 @@ fn first_named<T>(all: &[T], words: impl Fn(&T) -> String) -> Option<String> {
     (!named.is_empty()).then(|| named.join(", "))
 }
 
-/// Returns the first airplanes whose errors exceeded the shield's bounds, and the number of others.
+/// Returns the first airplanes with errors beyond the shield's bounds, and the number of others.
 fn beyond_bound(all: &[BeyondBound]) -> Option<(String, String)> {
     let told = first_named(all, |one| {
         let name = one.callsign.clone().unwrap_or_else(|| one.airplane.to_string());
@@ -244,7 +244,7 @@ mod tests {
     use sidestep_kernel::{Simulation, World};
     use sidestep_scenario::Source;
 
-    /// Many airplanes in a heap.
+    /// Many airplanes close together.
     fn heap(airspace: &str) -> Source {
         let text = format!(
             "format = 1\nworld = \"airspace\"\n[airspace]\nmethod = \"none\"\n{airspace}\n\

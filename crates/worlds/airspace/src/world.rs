@@ -89,7 +89,7 @@ pub struct AirspaceWorld {
     pub orca: Reactive,
     /// The deployment of the optimizer.
     pub deployment: Deployment,
-    /// The way in which its agents know with whom they decide together.
+    /// The way in which its agents learn their groups.
     pub groups: Grouping,
     /// The network that carries its messages, if it is unreliable.
     pub network: Option<Network>,
@@ -98,8 +98,8 @@ pub struct AirspaceWorld {
     /// Whether the shield filters decisions.
     pub shield: bool,
     /// Airplanes at least this many meters above each other need not mind each other. It is
-    /// slightly less than the scenario asks for, so that levels in feet are apart when they say
-    /// they are.
+    /// slightly less than the scenario asks for, so that levels in feet are apart when they are
+    /// nominally so.
     pub vertical_m: f64,
     /// Number of cycles in which recorded airplanes follow their tracks; then the method flies
     /// them.
@@ -108,13 +108,13 @@ pub struct AirspaceWorld {
     pub origin_deg: Option<Point>,
     /// Time of the start, in seconds since 1970, UTC, where traffic has a date.
     pub start_utc_s: Option<f64>,
-    /// The wind, which everybody knows, in meters per second.
+    /// The wind, which all know, in meters per second.
     pub wind_m_s: Point,
-    /// Random errors that nobody knows.
+    /// Random errors that no airplane knows.
     pub disturbance: Disturbance,
     /// Bounds on those errors for which the shield allows.
     pub bounds: Bounds,
-    /// Digest of the scenario's text and seed, by which those who talk know that they are of one scenario.
+    /// Digest of the scenario's text and seed, by which agents recognize those of the same scenario.
     pub fingerprint: u64,
     pub(crate) streams: Streams,
     /// Actions of each airplane.
@@ -129,18 +129,18 @@ pub struct AirspaceWorld {
     pub(crate) alone_s: Arc<Vec<f64>>,
     /// Sides of the first fallbacks.
     pub(crate) first_fallbacks: Arc<Vec<Side>>,
-    /// The airplanes that decide, by what may be ordered of them.
+    /// The airplanes that decide, by the orders that they may be given.
     pub(crate) teams: Arc<Teams>,
 }
 
-/// The way in which airplanes know with whom they decide together.
+/// The way in which airplanes learn their groups.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Grouping {
-    /// It is announced, by one who sees all.
+    /// Groups are announced, by an observer that sees all.
     #[default]
     Announced,
-    /// They find it from beacons of those near them.
+    /// Airplanes find their groups from beacons of those near them.
     Heard,
 }
 
@@ -155,7 +155,7 @@ impl AirspaceWorld {
         Some([self.callsign(a)?, self.callsign(b)?])
     }
 
-    /// Returns what people call an airplane: its call sign, or else its id.
+    /// Returns the name that people use for an airplane: its call sign, or else its id.
     pub(crate) fn called(&self, id: EntityId) -> String {
         self.callsign(id).unwrap_or_else(|| id.to_string())
     }
@@ -273,7 +273,7 @@ impl AirspaceWorld {
 
     /// Returns whether the method ever flies an airplane, unless its recorded way ends before.
     pub(crate) fn decides(&self, i: usize) -> bool {
-        // Whoever minds nobody all the time never decides, and never orbits.
+        // An airplane that never minds any other never decides, and never orbits.
         !self.is_intruder(i as Slot, Cycle::MAX - 1)
     }
 
@@ -347,7 +347,7 @@ impl AirspaceWorld {
         Levels::between(known.altitude_m, self.stage(known.slot, known.orders).altitude_m)
     }
 
-    /// Returns where each action would lead an airplane, and what that costs beside intruders.
+    /// Returns where each action would lead an airplane, and the cost of that beside intruders.
     pub(crate) fn options(&self, known: Known, intruders: &[Intruder]) -> Options {
         let Stage { model, mission, .. } = self.stage(known.slot, known.orders);
         let actions = self.actions_of(known.slot);

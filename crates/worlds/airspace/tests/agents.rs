@@ -1,5 +1,5 @@
-//! Pilots are programs of their own: each in a thread, with packets through channels and at a pace of its own,
-//! they do what one process decides for all.
+//! Pilots are programs of their own: each in a thread, with packets through channels and at a pace of its own, they
+//! decide as one process does for all.
 
 use sidestep_airspace::agents::contact::Contacts;
 use sidestep_airspace::airspace_run;
@@ -14,7 +14,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 enum Told {
     /// The sight of a cycle.
     Begin(Box<Sight>),
-    /// A packet, and who sent it.
+    /// A packet, with its sender.
     Packet(EntityId, Vec<u8>),
     /// The end of the run.
     End,
@@ -34,7 +34,7 @@ fn fly(mut pilot: Pilot, told: Receiver<Told>, others: Vec<Sender<Told>>, done: 
         }
         for Packet { to, payload, .. } in pilot.take_packets() {
             to.iter().for_each(|&id| {
-                // Whoever has come to an end hears no more.
+                // A pilot that has come to an end hears no more.
                 let _ = others[id as usize].send(Told::Packet(pilot.id(), payload.clone()));
             });
         }

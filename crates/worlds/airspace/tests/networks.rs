@@ -1,5 +1,5 @@
-//! D3 for agents: what they come to over a network, faultless or not, is the same bits on every
-//! machine, and so is what they send.
+//! D3 for agents: their results over a network, faultless or not, are the same bits on every
+//! machine, and so are their messages.
 
 use sidestep_airspace::airspace_run;
 use sidestep_kernel::Simulation;
@@ -8,7 +8,7 @@ use sidestep_scenario::Source;
 const FAULTS: &str = "network = { loss = 0.15, duplication = 0.1, max_delay_s = 0.005, \
                       silent = [{ airplane = 2, from_s = 40.0 }] }";
 
-/// The digest of a run of five that meet, and what went over the network.
+/// The digest of a run of five that meet, and its traffic on the network.
 fn told(preset: &str, deployment: &str, more: &str) -> String {
     let text = format!(
         "format = 1\nworld = \"airspace\"\nseed = 11\n[airspace]\npreset = \"{preset}\"\n\

@@ -11,7 +11,7 @@ use crate::shield::{Certainty, Flyer, Way, filter};
 use crate::world::AirspaceWorld;
 use sidestep_kernel::Slot;
 
-/// Decides for the airplanes of a group. Returns what each does and what it has considered.
+/// Decides for the airplanes of a group. Returns the control of each, and the ways that it has considered.
 pub(super) fn decided(
     turn: &mut Turn<'_>,
     own: &[Own],
@@ -29,7 +29,7 @@ pub(super) fn decided(
     all
 }
 
-/// Returns what the airplanes of a group want, and controls that say all but what they fly.
+/// Returns the wishes of the airplanes of a group, and controls that lack only the course.
 fn wanted(turn: &mut Turn<'_>, own: &[Own], intruders: &[Intruder]) -> Vec<(Control, Considered)> {
     let Turn { world, state, now, .. } = *turn;
     let slots: Vec<Slot> = own.iter().map(|own| own.id).collect();
@@ -61,7 +61,7 @@ fn wanted(turn: &mut Turn<'_>, own: &[Own], intruders: &[Intruder]) -> Vec<(Cont
     controls.into_iter().zip(considered).collect()
 }
 
-/// Returns what the airplanes of a group want by a method that gives them headings.
+/// Returns the wishes of the airplanes of a group by a method that gives them headings.
 fn reacting(
     world: &AirspaceWorld,
     group: &[Known],
@@ -75,7 +75,7 @@ fn reacting(
     considered
 }
 
-/// Returns the course of an airplane that flies what it wants.
+/// Returns the course of an airplane that flies its first wish.
 fn unshielded(own: &Own, considered: &Considered) -> Course {
     let way = considered.ways.first().cloned().unwrap_or_default();
     Course::Way { wish: 0, way, side: own.fallback }

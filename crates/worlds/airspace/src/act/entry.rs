@@ -25,7 +25,7 @@ pub(super) fn release(turn: &Turn<'_>, flown: &[Slot]) {
         }
         let own = flyer(turn, slot);
         state.keep_named(slot, |other| {
-            // What intruders do is looked at anew in each `dt`, in `intruders.rs`.
+            // Pairs with intruders are checked anew in each `dt`, in `protect.rs`.
             world.is_intruder(other, now)
                 || flown.binary_search(&other).is_ok()
                     && state.named_with(other).contains(&slot)

@@ -1,7 +1,7 @@
-//! Airplanes whose errors exceed the bounds for which the shield allows: they are named.
+//! Airplanes with errors beyond the bounds for which the shield allows: they are named.
 //!
-//! The shield keeps on treating them like all others, but what it promises about their pairs holds
-//! again only once their plans were made within the bounds.
+//! The shield keeps on treating them like all others, but its promise about their pairs holds again
+//! only once their plans have been made within the bounds.
 
 use crate::Turn;
 use crate::events::{Event, EventKind};
@@ -11,7 +11,7 @@ use sidestep_kernel::Slot;
 use sidestep_kernel::math::wrap_angle;
 
 /// Names the airplanes of `flown` that are farther from where all see them, or from the orbit that
-/// they hold, than the bounds say.
+/// they hold, than the bounds allow.
 pub(super) fn name(turn: &mut Turn<'_>, flown: &[Slot]) {
     let world = turn.world;
     if world.disturbance == Default::default() {

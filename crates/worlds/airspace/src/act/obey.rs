@@ -47,7 +47,7 @@ pub(super) fn obey(
     ways
 }
 
-/// Books what came of the talks of a group, and who is missing.
+/// Books the outcome of the talks of a group, and missing controls.
 fn book(turn: &mut Turn<'_>, own: &[Own], controls: &[Option<Control>]) {
     let (now, scratch) = (turn.now, &mut *turn.scratch);
     for (own, control) in own.iter().zip(controls) {

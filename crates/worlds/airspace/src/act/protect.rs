@@ -10,7 +10,7 @@ use crate::shield::{Flyer, Way};
 use sidestep_kernel::Slot;
 use sidestep_kernel::math::wrap_angle;
 
-/// Returns the part of an airplane that the shield knows: it is where all see it.
+/// Returns an airplane as the shield knows it: where all see it.
 pub(super) fn flyer(turn: &Turn<'_>, slot: Slot) -> Flyer {
     Own::of(turn, slot).flyer(turn.world)
 }
@@ -40,7 +40,7 @@ pub(super) fn name_intruders(turn: &mut Turn<'_>, own: &Own, all: &[Intruder], w
     }
 }
 
-/// Stores the course of an airplane, and records it as an event where it is not what it wants.
+/// Stores the course of an airplane, and records it as an event where it is not its first wish.
 pub(super) fn note(turn: &mut Turn<'_>, slot: Slot, course: &Course) {
     if *course == Course::Orbit {
         move_held(turn, slot);

@@ -14,7 +14,7 @@ use sidestep_kernel::{Slot, math};
 /// Closest approaches nearer than this have no direction of their own, so every airplane turns to the
 /// left of the line of sight.
 const HEAD_ON_M: f64 = 10.0;
-/// Factor on the zone out of which the closest point is moved (`RFACH`), as BlueSky comes.
+/// Factor on the zone out of which the closest point is moved (`RFACH`), BlueSky's default.
 const RESOLVES: f64 = 1.05;
 /// Difference of headings in radians below which two airplanes near each other fly side by side: they
 /// would soon be in conflict again.
@@ -66,7 +66,7 @@ pub(in super::super) fn headings(
     };
     let found: Vec<Vec<(usize, Closest)>> = all.iter().map(conflicts).collect();
     let by_slot = by_slot(all);
-    // As in BlueSky, the headings are kept only while nobody is in conflict.
+    // As in BlueSky, the headings are kept only while no airplane is in conflict.
     let is_anybody_in_conflict = found.iter().any(|conflicts| !conflicts.is_empty());
     for ((own, conflicts), memory) in all.iter().zip(&found).zip(&mut *resolving) {
         if is_anybody_in_conflict {
@@ -211,7 +211,7 @@ mod tests {
         let mut memory = [Resolving::default(), Resolving::default()];
         let far = [moving(0, [0.0, 0.0], 0.0), moving(1, [4000.0, 0.0], std::f64::consts::PI)];
         assert!(looked(&far, &mut memory).iter().all(Option::is_some));
-        // Both have turned away, so nothing is predicted any more.
+        // Both have turned away, so no conflict is predicted any more.
         let turned =
             [moving(0, [1000.0, 0.0], 0.5), moving(1, [3000.0, 0.0], 0.5 - std::f64::consts::PI)];
         let kept = looked(&turned, &mut memory);

@@ -42,7 +42,7 @@ pub(in super::super) fn heading_rad<'a>(
     if excess(own.preferred_rad) >= 0.0 {
         return None;
     }
-    // Any allowed heading before all others, and then the nearest.
+    // Prefers any allowed heading to all others, and then the nearest.
     let worth = |off_rad: f64| {
         let excess = excess(own.preferred_rad + off_rad);
         (excess >= 0.0, excess.min(0.0) - TURN_M_S * off_rad.abs())
@@ -60,7 +60,7 @@ fn half_plane(own: &Moving, other: &Moving, settings: Reactive, step_s: f64) -> 
     let radius_m = own.zone_m(other, settings);
     let distance2 = dot(apart, apart);
     let is_too_near = distance2 <= radius_m * radius_m;
-    // Who is too near already has to be out of the zone by the next look.
+    // A pair that is already too near has to be out of the zone by the next look.
     let within_s = if is_too_near { step_s } else { settings.look_ahead_s };
     let from_center = [relative[0] - apart[0] / within_s, relative[1] - apart[1] / within_s];
     let (size, along) = (length(from_center).max(1e-9), dot(from_center, apart));
@@ -115,8 +115,7 @@ mod tests {
     }
 
     proptest! {
-        /// With its velocity free, an airplane would choose the nearest one of the half-plane: what a
-        /// library chooses.
+        /// With its velocity free, an airplane would choose the nearest one of the half-plane, as a library does.
         #[test]
         fn the_half_planes_are_those_of_the_paper(
             x in -4000.0f64..4000.0, y in -4000.0f64..4000.0, heading_rad in -3.1f64..3.1,

@@ -9,8 +9,8 @@ use crate::wish::Wish;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::math;
 
-/// Returns what an airplane considers: the way that was ordered, and then the others by rank, or by how little
-/// they differ from it. Without an order it follows its flight plan.
+/// Returns the ways that an airplane considers: the ordered one, and then the others by rank, or by how little they
+/// differ from it. Without an order it follows its flight plan.
 pub(super) fn as_ordered(world: &AirspaceWorld, known: Known, wish: Option<&Wish>) -> Considered {
     match wish {
         Some(&Wish::TurnRate(omega_rad_s)) => {

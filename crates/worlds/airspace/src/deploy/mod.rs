@@ -147,7 +147,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(12))]
         /// Whichever airplane falls silent, wherever and whenever, met before or not, and whichever
-        /// comes in later: all airplanes whose orbits were apart when they came in stay apart.
+        /// comes in later: all airplanes that had orbits apart when they came in stay apart.
         #[test]
         fn nobody_comes_near_a_silent_airplane(
             seed in any::<u32>(), n in 3usize..9, loss in 0.0f64..0.6, deployment in 0usize..2,

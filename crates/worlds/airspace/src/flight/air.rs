@@ -18,7 +18,7 @@ pub struct Air {
     pub timing: Timing,
     /// Rule by which way-points count as reached.
     pub passing: Passing,
-    /// The wind, which everybody knows, in meters per second.
+    /// The wind, which all know, in meters per second.
     pub wind_m_s: Point,
 }
 

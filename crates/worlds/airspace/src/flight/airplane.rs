@@ -32,7 +32,7 @@ pub struct Airplane {
 }
 
 impl Airplane {
-    /// Returns whether the last one of its first `done` orders about where to fly leads to no
+    /// Returns whether, of its first `done` orders, the last one about its way leads to no
     /// way-point.
     pub(crate) fn keeps_a_heading(&self, done: usize) -> bool {
         let is_about_the_way = |order: &&FlightOrder| {

@@ -84,7 +84,7 @@ impl Leg {
         self.altitude_m + self.climb_m_s * (t_s - self.from_s)
     }
 
-    /// Returns the same motion from its start on, with other times.
+    /// Returns the same motion from its start, with other times.
     #[must_use]
     pub fn timed(self, from_s: f64, until_s: f64) -> Self {
         Self { from_s, until_s, ..self }
@@ -153,14 +153,14 @@ pub struct Zone {
 }
 
 impl Approach {
-    /// Returns nothing yet. `since_s` is a time up to which two airplanes are known to have been too
+    /// Returns an approach without any leg. `since_s` is a time up to which two airplanes are known to have been too
     /// near each other, so that a loss from then on is no new one.
     pub fn new(since_s: Option<f64>) -> Self {
         let lost_until_s = since_s.unwrap_or(f64::NEG_INFINITY);
         Self { nearest_m: f64::INFINITY, lost_s: 0.0, losses: 0, lost_until_s }
     }
 
-    /// Adds the time that two legs have in common; it must not lie before what was added already.
+    /// Adds the time that two legs have in common; it must not lie before times that were added already.
     pub fn add(&mut self, a: &Leg, b: &Leg, zone: Zone) {
         let (from_s, until_s) = (a.from_s.max(b.from_s), a.until_s.min(b.until_s));
         let Some((from_s, until_s)) = on_one_level(a, b, (from_s, until_s), zone.vertical_m) else {
@@ -277,7 +277,7 @@ impl Pair<'_> {
         let cos_part = -omega_rad_s * dot(at, [vx, vy]);
         let sin_part = omega_rad_s * dot(at, [-vy, vx]) + dot([vx, vy], [vx, vy]);
         let half_turn_s = std::f64::consts::PI / omega_rad_s.abs();
-        // Half the squared distance varies by no more than this: in a formation by nothing but rounding.
+        // Half the squared distance varies by no more than this: in a formation only by rounding.
         let steepest_m2_s = math::hypot(cos_part, sin_part) / omega_rad_s.abs();
         if is_flat(steepest_m2_s * long_s.min(half_turn_s), math::hypot(at[0], at[1])) {
             return;

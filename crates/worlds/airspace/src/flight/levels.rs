@@ -1,4 +1,4 @@
-//! Levels: the part of the height that an airplane occupies.
+//! Levels: the range of altitudes that an airplane occupies.
 
 use serde::{Deserialize, Serialize};
 

@@ -18,7 +18,7 @@ pub enum After {
 
 /// The rule by which an airplane is done with a way-point.
 ///
-/// It is reached within a tolerance. But an airplane whose way-point lies inside one of its two
+/// It is reached within a tolerance. But an airplane with a way-point inside one of its two
 /// tightest turning circles would orbit it forever, because steering for it keeps the airplane on
 /// that circle. Such a way-point counts as *passed* when it is abeam on the near side. That happens
 /// within one turn round the circle, and there the airplane is as near as it can be without flying

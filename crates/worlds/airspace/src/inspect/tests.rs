@@ -26,7 +26,7 @@ fn chances(told: &Inspection) -> Option<Vec<f64>> {
     Some(table.column("probability").expect("a column").map(share).collect())
 }
 
-/// With sampled and with exact expectations, whoever computes them.
+/// With sampled and with exact expectations, in every deployment.
 #[test]
 fn probabilities_of_the_actions_sum_to_1_and_the_chosen_one_is_flown_unless_the_shield_objects() {
     for preset in ["default", "paper"] {

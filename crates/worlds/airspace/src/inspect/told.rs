@@ -1,4 +1,4 @@
-//! Actions with what they would bring, the shield, the talk, and what comes of it.
+//! Actions with their expected results, the shield, the talk, and the outcome.
 
 use super::{Looking, airplane};
 use crate::agents::traffic::Traffic;
@@ -9,7 +9,7 @@ use sidestep_kernel::view::{Inspection, MarkShape, Place, Role, Section, Table, 
 
 /// Points of a predicted way that are drawn, at most, beside those of the next `dt`.
 const MOST_POINTS: usize = 32;
-/// Weight of predicted ways whose probability is not known.
+/// Weight of predicted ways without a known probability.
 const UNKNOWN: f64 = 0.2;
 
 impl Looking<'_> {
@@ -75,7 +75,7 @@ impl Looking<'_> {
         MarkShape::Line { points_m: kept.map(|(_, at)| self.place(*at)).collect() }
     }
 
-    /// Tells what the shield makes of the wish, and because of whom.
+    /// Tells the shield's decision on the wish, and the others that it depends on.
     pub(super) fn is_shielded(&self, told: &mut Inspection) {
         let (Some(decision), Some(flyer)) = (self.notes.decision, &self.notes.flyer) else {
             return;
@@ -143,7 +143,7 @@ impl Looking<'_> {
         told.tell(Section::new("Talk of the group").fact("deployment", deployment).table(table));
     }
 
-    /// Tells what comes of it.
+    /// Tells the outcome.
     pub(super) fn comes_out(&self, told: &mut Inspection) {
         let (cell, way) = (&self.after.airplanes[self.id as usize], &self.notes.flown);
         let turn = way.as_ref().and_then(|way| way.omegas_rad_s.first().copied());

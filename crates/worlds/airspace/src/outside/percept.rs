@@ -88,7 +88,7 @@ impl Seen {
 }
 
 impl Percept {
-    /// Returns what one of a group perceives.
+    /// Returns the percept of one of a group.
     pub(super) fn of(turn: &Turn<'_>, own: &Known, all: &[Seen]) -> Self {
         let Turn { world, state, .. } = turn;
         let Stage { model, mission, .. } = world.stage(own.slot, own.orders);
@@ -133,7 +133,7 @@ impl Percept {
         }
     }
 
-    /// Returns a value of each neighbor, and `none` where there are no more.
+    /// Returns a value of each neighbor, then `none` for the places that are left.
     fn each<T: Copy>(&self, none: T, of: impl Fn(&Neighbor) -> T) -> [T; MOST_NEIGHBORS] {
         from_fn(|k| self.neighbors.get(k).map_or(none, &of))
     }
@@ -210,7 +210,7 @@ fn minus(a: Point, b: Point) -> Point {
     [a[0] - b[0], a[1] - b[1]]
 }
 
-/// Returns the spaces of what the airplanes of a team perceive.
+/// Returns the spaces of the percepts of a team's airplanes.
 pub(super) fn spaces(world: &AirspaceWorld, agents: &[EntityId]) -> Vec<Space> {
     let most_rad_s = world.airplanes[agents[0] as usize].model.omega_max_rad_s;
     let goals = |&id: &EntityId| {
@@ -256,7 +256,7 @@ const FREE: Bounds = Bounds::Real { least: f64::NEG_INFINITY, most: f64::INFINIT
 const POSITIVE: Bounds = Bounds::Real { least: 0.0, most: f64::INFINITY };
 const ANGLE: Bounds = Bounds::Real { least: -PI, most: PI };
 
-/// Returns the spaces of what airplanes perceive of others.
+/// Returns the spaces of the neighbors in percepts.
 fn neighbor_spaces(world: &AirspaceWorld) -> Vec<Space> {
     let is = || Bounds::Choice(["no", "yes"].map(String::from).into());
     let ids = Bounds::Whole { least: -1, most: world.airplanes.len() as i64 - 1 };

@@ -14,9 +14,9 @@ use std::collections::BTreeMap;
 
 const CYCLES: u64 = 50;
 
-/// Five airplanes that meet, and five of which one turns slower and comes later, one has orders of its
-/// flight plan, one minds nobody, and two are recorded: one until the method takes over, one to the end
-/// of its track. Everything errs.
+/// Five airplanes that meet, and five of which one turns slower and comes later, one has orders of its flight plan,
+/// one minds no other, and two are recorded: one until the method takes over, one to the end of its track. Positions
+/// and headings have errors.
 const MIXED: &str = r#"
 format = 1
 world = "airspace"
@@ -94,7 +94,7 @@ fn observed(run: &dyn Simulation, team: usize) -> BTreeMap<String, Vec<f64>> {
     values.collect()
 }
 
-/// A policy that depends on all it observes, and orders in all forms; who is alone gets no order.
+/// A policy that depends on all it observes, and orders in all forms; an airplane that is alone gets no order.
 fn order_all(run: &mut AirspaceRun) {
     for (k, team) in run.teams().to_vec().iter().enumerate() {
         let seen = observed(run, k);
@@ -169,7 +169,7 @@ fn a_run_is_the_same_from_its_recorded_orders_whatever_the_workers() {
 fn a_run_that_is_resumed_at_any_cycle_goes_on_with_the_order_that_was_given() {
     let mut whole = run(1);
     for at in 0..CYCLES {
-        // The policy sees what the checkpoint has: an order is given, and lies in it.
+        // The policy sees the state of the checkpoint: an order is given, and lies in it.
         order_all(&mut whole);
         let checkpoint = whole.checkpoint();
         let mut after = run(2);
@@ -200,8 +200,8 @@ fn going_back_gives_the_same_orders_again() {
     }
 }
 
-/// Returns what the group of an airplane knows when it decides in the present cycle; nothing if the
-/// airplane does not.
+/// Returns the knowledge of an airplane's group when it decides in the present cycle; nothing if
+/// the airplane does not.
 fn known_in(run: &AirspaceRun, id: Slot) -> (Vec<Known>, Vec<Intruder>) {
     let (world, now) = (run.world(), run.cycle());
     let copy = crate::state::AirspaceState::restore(world, &run.state().snapshot(now));
@@ -215,7 +215,7 @@ fn known_in(run: &AirspaceRun, id: Slot) -> (Vec<Known>, Vec<Intruder>) {
 /// Values of one airplane's row.
 type Row<'a> = &'a dyn Fn(&str, usize) -> f64;
 
-/// Compares what an airplane observes of itself with what its group knows.
+/// Compares an airplane's observation of itself with the knowledge of its group.
 fn compare_own(run: &AirspaceRun, of: Row<'_>, me: &Known) {
     let Pose { at: [x, y], heading_rad } = me.pose;
     let pose = [of("place_m", 0), of("place_m", 1), of("heading_rad", 0)];
@@ -227,8 +227,8 @@ fn compare_own(run: &AirspaceRun, of: Row<'_>, me: &Known) {
     assert_eq!([of("way_point_m", 0), of("way_point_m", 1)], [goal_x - x, goal_y - y]);
 }
 
-/// Compares what an airplane observes of others with what its group knows; returns how many there are
-/// who mind others, and who do not.
+/// Compares an airplane's observation of others with the knowledge of its group; returns how many there are that mind
+/// others, and that do not.
 fn compare_others(of: Row<'_>, me: &Known, group: &[Known], intruders: &[Intruder]) -> [usize; 2] {
     let [x, y] = me.pose.at;
     let flying = group.iter().map(|known| (known.slot, known.pose.at, true));

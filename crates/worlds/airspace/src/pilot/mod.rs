@@ -16,10 +16,10 @@
 //! are kept until that starts, as many as there is room for.
 //!
 //! ```text
-//! sight.rs  control.rs    what goes in once a cycle, and what comes out
+//! sight.rs  control.rs    the input of a cycle, and its output
 //! aboard.rs               the state machine
 //! schedule.rs  early.rs   when talks start and end; packets of talks to come
-//! briefing.rs  talks.rs   the knowledge with which it goes into a talk; which talk it is
+//! briefing.rs  talks.rs   the knowledge with which it goes into a talk; the parties to the talks
 //! fleet.rs                runs whose pilots are elsewhere
 //! ```
 

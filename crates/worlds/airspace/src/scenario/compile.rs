@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 /// Meters by which levels that are far enough apart may seem nearer because they were rounded.
 const ROUNDED_M: f64 = 1e-6;
-/// Smallest limit on the cycles of a run whose length is not given.
+/// Smallest limit on the cycles of a run, unless its length is given.
 const FEWEST_CYCLES: u64 = 400;
 /// Factor on the time that the last airplane to come in would need alone, which gives a larger
 /// limit: there is room for detours and orbits.
@@ -90,8 +90,8 @@ impl<'a> Compiler<'a> {
         Ok(compiled)
     }
 
-    /// Returns what another seed changes: traffic, errors and faults of messages are drawn; samples
-    /// of the optimizer only guide its search.
+    /// Returns the effect of another seed: traffic, errors and faults of messages are drawn;
+    /// samples of the optimizer only guide its search.
     fn seeds(&self, world: &AirspaceWorld) -> Seeds {
         let Disturbance { position_m, heading_rad } = world.disturbance;
         let is_drawn = self.file.airspace.generator.is_some()
@@ -309,8 +309,8 @@ impl<'a> Compiler<'a> {
         Ok(points as usize)
     }
 
-    /// Refuses sets of actions that are too large for one pair of airplanes: a run looks whether it
-    /// is to stop after every pair.
+    /// Refuses sets of actions that are too large for one pair of airplanes: a run checks after
+    /// every pair whether it is to stop.
     fn fits_a_pair(&self, world: &AirspaceWorld) -> Result<(), InputError> {
         let actions = world.actions.iter().map(Vec::len).max().unwrap_or(0);
         let horizon = world.timing.horizon;
@@ -326,8 +326,8 @@ impl<'a> Compiler<'a> {
     }
 }
 
-/// Returns a number of cycles in which all should arrive. Of flights that never end it counts what is
-/// known of them: that they begin, and their last order.
+/// Returns a number of cycles in which all should arrive. Of flights that never end it counts their start and their
+/// last order.
 fn enough_cycles(world: &AirspaceWorld) -> u64 {
     let ends_s = |i: usize| match world.ends_alone_s(i) {
         s if s.is_finite() => s,
@@ -337,7 +337,7 @@ fn enough_cycles(world: &AirspaceWorld) -> u64 {
     FEWEST_CYCLES.max((TIMES_ALONE * longest_s / world.timing.dt_s).ceil() as u64)
 }
 
-/// Returns the time until which something is told of an airplane that flies on forever.
+/// Returns the time of the last known change of an airplane that flies on forever.
 fn told_until_s(world: &AirspaceWorld, i: usize) -> f64 {
     let airplane = &world.airplanes[i];
     let last_s = airplane.orders.last().map_or(0.0, |order| order.at_s);

@@ -8,7 +8,7 @@ use sidestep_scenario::{AboveBelow, Number, Rule, refused, schema_by_hand};
 /// A separation.
 pub(crate) type Measure = Number<AboveBelow<0, 1_000_000>>;
 
-/// Defines rules for numbers with bounds, whose errors give the reason for the bounds.
+/// Defines rules for numbers with bounds, with errors that give the reason for the bounds.
 macro_rules! bounds {
     ($($name:ident, $least:expr, $most:expr, $words:literal, $reason:literal;)*) => {$(
         #[doc = concat!("Numbers from ", $words, ": ", $reason, ".")]

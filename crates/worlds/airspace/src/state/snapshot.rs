@@ -65,9 +65,9 @@ pub struct Snapshot {
     pub named: Vec<(EntityId, EntityId)>,
     /// Each airplane's pose on its stored orbit; empty where no gust takes it off that.
     pub held: Vec<Pose>,
-    /// The wish that was ordered of each airplane; empty unless airplanes are decided from outside.
+    /// The wish that was ordered for each airplane; empty unless airplanes are decided from outside.
     pub wishes: Vec<Option<Wish>>,
-    /// Controls of airplanes for the cycle that comes next, if that was handed over by those who decide outside.
+    /// Controls of airplanes for the next cycle, if pilots outside of the run have handed them over.
     pub handed: Option<Vec<Control>>,
 }
 
@@ -101,7 +101,7 @@ impl Snapshot {
         if !self.resolving.is_empty() {
             hash_data(&mut hasher, &self.resolving);
         }
-        // Turn rates say nothing about what comes next, unless somebody outside decides by them.
+        // Turn rates do not affect the future, unless a caller outside decides by them.
         if !self.wishes.is_empty() {
             self.airplanes.iter().for_each(|a| hasher.u64(a.turn_rate_rad_s.to_bits()));
             hash_data(&mut hasher, &self.wishes);

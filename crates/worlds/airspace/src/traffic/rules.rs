@@ -1,5 +1,5 @@
-//! The settings of a BlueSky file that hold for all its aircraft: what is flown of them, and what
-//! cannot be.
+//! The settings of a BlueSky file that hold for all its aircraft: those that are flown, and those
+//! that cannot be.
 
 use super::{KNOT_M_S, under_way};
 use sidestep_import::bluesky::{Resolution, ScnAircraft, ScnFile, Traffic, Wind};
@@ -67,7 +67,7 @@ fn resolution(traffic: &Traffic) -> (Option<&'static str>, bool) {
 /// Returns the one wind of a file, if it has any.
 ///
 /// # Errors
-/// The cause, when winds differ from place to place, or nobody could fly against it.
+/// The cause, when winds differ from place to place, or no aircraft could fly against it.
 fn wind_m_s(traffic: &Traffic) -> Result<Option<[f64; 2]>, String> {
     let Some(first) = traffic.wind.first() else { return Ok(None) };
     let alike = |other: &Wind| (other.from_deg, other.speed_kt) == (first.from_deg, first.speed_kt);

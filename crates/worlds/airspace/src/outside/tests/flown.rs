@@ -69,7 +69,7 @@ fn the_first_of_a_ranking_is_flown() {
     assert!((heading_rad(&run, 0) + 20_f64.to_radians()).abs() < 1e-12);
 }
 
-/// Everybody is ordered to where the others come from, always.
+/// In every cycle all are ordered to where the others come from.
 fn ordered_into_each_other(shield: &str) -> AirspaceRun {
     let text = format!(
         "format = 1\nworld = \"airspace\"\n[airspace]\nmethod = \"external\"\nshield = \"{shield}\"\n\
