@@ -1,7 +1,7 @@
 //! Speed of the airspace world and of its optimizer.
 //!
-//! `cargo bench -p sidestep-airspace [-- PART ...]` with the parts `exact`, `sampled` and
-//! `many`; CPU time, and ratios taken in one run, since the machine may be noisy.
+//! `cargo bench -p sidestep-airspace [-- PART ...]` with the parts `exact`, `sampled` and `many`;
+//! CPU time, and ratios taken in one run, because the machine may be noisy.
 
 use cpu_time::ProcessTime;
 use sidestep_airspace::airspace_run;

@@ -265,7 +265,7 @@ fn mean(sum: f64, n: usize) -> Option<f64> {
 
 /// Returns the number of airplanes that were not in the air before a cycle, because they come in later.
 fn not_appeared(world: &AirspaceWorld, now: Cycle) -> u64 {
-    // At the very start those are there that begin with it.
+    // At the very start, the airplanes that begin with it are there.
     let later = |&i: &usize| world.appears_in(i) >= now.max(1);
     (0..world.airplanes.len()).filter(later).count() as u64
 }

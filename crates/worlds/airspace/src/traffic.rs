@@ -68,7 +68,7 @@ pub(crate) fn bluesky_rules(place: &str, file: &ScnFile) -> Rules {
     rules
 }
 
-/// An aircraft from the time on when it moves.
+/// An aircraft from the time when it starts to move.
 #[derive(Debug, Clone, PartialEq)]
 struct UnderWay(ScnAircraft);
 
@@ -408,7 +408,7 @@ mod tests {
             let told = crate::words::contents(&compiled).text;
             assert!(told.contains(&format!("decides every 10 s, looks {s} s ahead")), "{told}");
         }
-        // MVP that the file does not ask for, but `--set`, looks as far.
+        // MVP that is chosen by `--set` instead of the file looks as far.
         assert_eq!(compiled(&format!("{flights}DTLOOK 120")).world.mvp.look_ahead_s, 120.0);
     }
 

@@ -53,7 +53,7 @@ fn check_ranking(actions: &[u16]) -> Result<(), String> {
     let mut times = vec![0_usize; actions.len()];
     actions.iter().for_each(|&action| times[usize::from(action)] += 1);
     let with = |is: &dyn Fn(usize) -> bool| times.iter().position(|&times| is(times));
-    // Where none stands in it twice, none is missing.
+    // Where no action occurs twice, none is missing.
     let (Some(double), Some(missing)) = (with(&|times| times > 1), with(&|times| times == 0))
     else {
         return Ok(());

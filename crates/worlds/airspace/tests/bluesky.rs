@@ -1,5 +1,5 @@
-//! MVP flies as BlueSky's: on the same super-conflicts, losses of separation, closest approaches and
-//! flight times agree within the spread of the runs.
+//! MVP flies like BlueSky's: on the same super-conflicts, losses of separation, closest approaches and flight times
+//! agree within the spread of the runs.
 //!
 //! `fixtures/bluesky.json` are our own measurements, made with `python/fly_bluesky.py`, BlueSky 1.1.1
 //! and Python 3.11: runs 0 to 39 of [`cases`] for each number of airplanes. The interpreter of
@@ -83,9 +83,8 @@ fn ours(airplanes: &[[f64; 5]]) -> Flown {
     }
 }
 
-/// Fails unless two samples have the same mean within the spread of their runs, but for an amount
-/// that follows from the motion: in BlueSky, an airplane turns at once and then flies straight for a
-/// second.
+/// Fails unless two samples have the same mean within the spread of their runs, except for an amount that follows
+/// from the motion: in BlueSky, an airplane turns at once and then flies straight for a second.
 fn agree(what: &str, of: fn(&Flown) -> f64, (ours, theirs): (&[Flown], &[Flown]), motion: f64) {
     let moments = |all: &[Flown]| {
         let n = all.len() as f64;

@@ -17,9 +17,9 @@
 //!    those that go before it have accepted it, else its fallback. It does not ask those that it
 //!    goes before, nor those from which its plan keeps apart in any case.
 //!
-//! The order of going first follows from ids, time and visible state, and so both know it without a word. It cannot
-//! follow from anything that was heard: the other may not know that the one has heard it, and both might believe that
-//! they go first.
+//! The order of going first follows from ids, time and visible state, and so both know it without a message. It
+//! cannot follow from anything that was heard: the other may not know that the one has heard it, and both might
+//! believe that they go first.
 //!
 //! Airplanes nearby can be seen, heard or not: their place, whether they are on an orbit, and the
 //! side to which they then turn. Not visible are the wishes of an airplane, and the fallback of one

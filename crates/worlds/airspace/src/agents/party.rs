@@ -1,5 +1,5 @@
-//! Parties to a talk: programs aboard that take messages and give messages, without a clock, a network, or the
-//! packets around the messages.
+//! Parties to a talk: programs aboard that accept and produce messages, without a clock, a network, or the packets
+//! around the messages.
 
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
@@ -34,7 +34,7 @@ pub trait Party: Send {
     /// Returns the largest number of bytes that a message to it may have.
     fn most_bytes(&self) -> usize;
 
-    /// Returns how far it has come, for people.
+    /// Returns its progress, for display.
     fn progress(&self) -> Progress {
         Progress::default()
     }

@@ -20,7 +20,7 @@ pub struct Frame {
     pub fingerprint: u64,
     /// The tick in which it starts.
     pub begins: u64,
-    /// The tick in which it ends in any case.
+    /// The tick in which it ends at the latest.
     pub ends: u64,
     /// Whether the radio is dead.
     pub is_silent: bool,

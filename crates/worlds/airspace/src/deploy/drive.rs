@@ -47,7 +47,7 @@ impl Station for Pilot {
     }
 }
 
-/// Drives stations, which have started in tick `begin`, until all are done, or nothing can happen any more.
+/// Drives stations, which have started in tick `begin`, until all are done, or nothing more can happen.
 pub(super) fn drive<S: Station>(
     transport: &mut impl Transport,
     stations: &mut [S],

@@ -5,8 +5,8 @@
 //! second derivative changes. Where these show that the first derivative only rises or only falls,
 //! it has at most one zero, which is found to rounding; else the interval is halved. So no approach
 //! is missed, however short. Two straight legs need neither halving nor a second guess: the zero of
-//! a linear function has a closed form. So do two legs of one turn rate, and have to: the distance
-//! in a formation never changes, so that no halving would show which way it turns.
+//! a linear function has a closed form. The same holds for two legs of one turn rate, which need
+//! it: the distance in a formation never changes, so that no halving would show which way it turns.
 
 use super::motion::{Point, Pose, sinc};
 use sidestep_kernel::math;

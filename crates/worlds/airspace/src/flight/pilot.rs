@@ -92,7 +92,7 @@ pub struct Prediction {
 }
 
 /// An airplane on a predicted way: a pose, and values that save computing its sine and cosine anew
-/// in every step. Equal to [`Pose::step`] but for rounding (a test compares them).
+/// in every step. Equal to [`Pose::step`] except for rounding (a test compares them).
 #[derive(Debug, Clone, Copy)]
 struct Flight {
     pose: Pose,

@@ -201,7 +201,7 @@ fn delay_s(turn: &Turn<'_>, own: &Known, ahead: &[Point]) -> f64 {
     flown_s + left_s.sum::<f64>() - alone_s
 }
 
-/// Returns a heading between half a turn to either side; one that is, to the bit.
+/// Returns a heading within half a turn to either side; one that already is stays the same to the bit.
 fn within_a_turn(heading_rad: f64) -> f64 {
     if heading_rad.abs() <= PI { heading_rad } else { wrap_angle(heading_rad) }
 }

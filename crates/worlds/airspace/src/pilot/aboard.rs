@@ -160,7 +160,7 @@ impl Pilot {
         present.into_iter().chain(past).min()
     }
 
-    /// Returns the tick in which the talks of the present cycle end in any case.
+    /// Returns the tick in which the talks of the present cycle end at the latest.
     pub fn deadline(&self) -> u64 {
         self.turn.as_ref().map_or(u64::MAX, |turn| turn.schedule.ends)
     }

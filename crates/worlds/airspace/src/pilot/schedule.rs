@@ -13,13 +13,13 @@ const FOR_EVER: Patience =
 pub(crate) struct Schedule {
     /// Start of the first one.
     pub(crate) begins: u64,
-    /// End in any case of the talk that finds the group, where there is one.
+    /// Latest end of the talk that finds the group, where there is one.
     pub(crate) grouped_by: u64,
-    /// End in any case of the talk about the wishes of each.
+    /// Latest end of the talk about the wishes of each.
     pub(crate) decided_by: u64,
     /// Start of the shield's exchange, unless the first talk takes longer.
     pub(crate) shield_from: u64,
-    /// Its end in any case.
+    /// Its latest end.
     pub(crate) ends: u64,
 }
 

@@ -15,7 +15,7 @@ use sidestep_scenario::network::{Names, Wrong, check_once, check_sides, during, 
 
 pub(super) type NetworkSection = sidestep_scenario::network::NetworkSection<Airplanes>;
 
-/// A while in which an airplane's radio is dead: it sends nothing, hears nothing, and knows it.
+/// A period in which an airplane's radio is dead: it sends nothing, hears nothing, and knows it.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Silence {
@@ -29,7 +29,7 @@ pub(super) struct Silence {
     until_s: f64,
 }
 
-/// A while in which no message gets from one side to another. Airplanes on no side hear all, and
+/// A period in which no message gets from one side to another. Airplanes on no side hear all, and
 /// are heard by all.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -44,18 +44,18 @@ pub(super) struct Partition {
     until_s: f64,
 }
 
-/// A while in which a link works one way only.
+/// A period in which a link works one way only.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct OneWay {
     /// Id of the airplane that is heard by the other.
     sender: EntityId,
-    /// Id of the airplane whose messages do not reach the other.
+    /// Id of the airplane that the other does not hear.
     receiver: EntityId,
-    /// Start of that while, in seconds after the start of the run.
+    /// Start of the period, in seconds after the start of the run.
     #[serde(default)]
     from_s: f64,
-    /// End of that while, in seconds after the start of the run; infinite unless given.
+    /// End of the period, in seconds after the start of the run; infinite unless given.
     #[serde(default = "for_ever")]
     until_s: f64,
 }

@@ -54,7 +54,7 @@ impl Flyer {
     }
 
     /// Returns whether two airplanes are on levels that do not meet, or have fallbacks that stay
-    /// apart: the pair needs no name any more.
+    /// apart: the pair no longer needs a name.
     pub(crate) fn is_safe_with(&self, other: &Self) -> bool {
         let fallback = |flyer: &Self| flyer.orbit(flyer.fallback);
         !self.is_on_level(other) || fallback(self).stays_apart(&fallback(other), self.gap_m(other))

@@ -6,21 +6,21 @@
 //! **Invariant.** The stored fallbacks of any two airplanes that are not *named* as a pair are at
 //! least `R` apart, from now on and for all time, unless the two are on levels that do not meet.
 //!
-//! Each `dt` every airplane is given a *plan*: some way for `dt`, and then an orbit from where
-//! that ends. Plans are *compatible* when they stay `R` apart during `dt` and on the orbits ever
-//! after, or when the pair need not be kept apart: it is named, or the levels that the two keep or
-//! pass do not meet. [`filter`] hands out plans that are pairwise compatible:
+//! Each `dt` every airplane is given a *plan*: some way for `dt`, and then an orbit from where that
+//! ends. Plans are *compatible* when they stay `R` apart during `dt` and on the orbits forever
+//! after it, or when the pair need not be kept apart: it is named, or the levels that the two keep
+//! or pass do not meet. [`filter`] hands out plans that are pairwise compatible:
 //!
-//! 1. *Start.* If the fallbacks are apart, staying on them for `dt` and ever after is a plan for
-//!    each, and these plans are pairwise compatible: they are the same motions as the invariant
-//!    speaks of. So an assignment of compatible plans exists.
+//! 1. *Start.* If the fallbacks are apart, staying on them for `dt` and forever after is a plan for
+//!    each, and these plans are pairwise compatible: they are the motions of which the invariant
+//!    speaks. So an assignment of compatible plans exists.
 //! 2. *Search.* Each airplane starts with the plan that the method proposes. While some pair is
-//!    not compatible, one of the two, the one with the lower rank unless it is on its fallback
-//!    already, takes another plan that is compatible with all present ones, or its fallback; or it
-//!    and those with which it is not compatible turn to one side together, if that makes them
-//!    compatible with all. The first and the last lower the number of incompatible pairs, the second raises the number of airplanes on
-//!    fallbacks, and none leaves a fallback during the search, so it ends. It can only end without
-//!    an incompatible pair, because two airplanes on fallbacks are compatible by the invariant.
+//!    not compatible, one of the two, the one with the lower rank unless it is on its fallback already, takes another
+//!    plan that is compatible with all present ones, or its fallback; or it and those with which it is not compatible
+//!    turn to one side together, if that makes them compatible with all. The first and the last lower the number of
+//!    incompatible pairs, the second raises the number of airplanes on fallbacks, and none leaves a fallback during
+//!    the search, so it ends. It can only end without an incompatible pair, because two airplanes on fallbacks are
+//!    compatible by the invariant.
 //! 3. *Better again.* An airplane that has fallen back may take another plan if that is compatible
 //!    with all present ones. Each such exchange keeps all pairs compatible.
 //! 4. *Step.* All fly `dt` of their plans, and store the orbit at its end. The plans were

@@ -1,4 +1,4 @@
-//! Plans: a way for one `dt`, and an orbit ever after.
+//! Plans: a way for one `dt`, and then an orbit forever.
 
 use super::flyer::Flyer;
 use super::orbit::{Orbit, Side, stays_apart};
@@ -69,7 +69,7 @@ impl Plan {
         Self { flyer, poses, omegas_rad_s, dtau_s, orbit, candidate: None, side }
     }
 
-    /// Returns the stored fallback as a plan, for some steps and ever after.
+    /// Returns the stored fallback as a plan, for some steps and forever after them.
     pub(crate) fn fallback(flyer: Flyer, steps: usize, dtau_s: f64) -> Self {
         let omega = flyer.fallback.sign() * flyer.orbit_rad_s;
         let side = flyer.fallback;
@@ -86,7 +86,7 @@ impl Plan {
         self.side
     }
 
-    /// Returns whether two plans stay apart during `dt` and on the orbits ever after.
+    /// Returns whether two plans stay apart during `dt` and on the orbits forever after it.
     pub(crate) fn is_compatible(&self, other: &Self) -> bool {
         if !self.flyer.minds(&other.flyer) {
             return true;
@@ -111,7 +111,7 @@ impl Plan {
     }
 
     /// Returns whether it keeps apart from another airplane however that one flies, for one `dt`
-    /// and on orbits ever after.
+    /// and on orbits forever after it.
     pub(crate) fn is_clear_of(&self, other: &Flyer) -> bool {
         let dt_s = self.dtau_s * self.omegas_rad_s.len() as f64;
         let (centers, radius_m) = other.reach(dt_s);

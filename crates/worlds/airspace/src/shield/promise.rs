@@ -112,7 +112,7 @@ fn only_named_pairs_lose(airspace: &str, airplanes: &str) -> Result<(), TestCase
     Ok(())
 }
 
-/// Random traffic that errs, seen with errors of so many meters and turned by so many degrees.
+/// Random traffic with errors: of places in meters, and of headings in degrees (standard deviations).
 fn erring(sigma_m: f64, sigma_deg: f64, more: &str) -> String {
     format!(
         "position_noise_m = {sigma_m:?}\nheading_noise_deg = {sigma_deg:?}\nmethod = \"none\"\n{more}"

@@ -69,7 +69,7 @@ impl Alone<'_> {
         let before = self.pose;
         self.pose = air.blown(before.step(model.v_m_s, omega, world.timing.dtau_s));
         let next = pilot.next((before, self.pose), self.next);
-        // Where rounding swallows a step it swallows all that come.
+        // Where rounding swallows a step, it swallows all later ones.
         let is_stuck = is_told_nothing && self.pose == before && self.next == next;
         self.next = next;
         self.steps = if is_stuck { usize::MAX } else { self.steps.saturating_add(1) };

@@ -75,7 +75,7 @@ fn the_slowest_flights_are_followed_to_their_end() {
     // To within 100 m.
     assert!((slow(1000.0) - 900_000.0).abs() < 1000.0, "{}", slow(1000.0));
     assert_eq!(slow(1e9), f64::INFINITY);
-    // A headwind that leaves no speed over the ground that counts.
+    // A headwind that leaves hardly any speed over the ground.
     let held = "[[airplanes]]\nat_m = [-1e9, 0]\nheading_deg = 0\nway_points_m = [[1e9, 0]]\n";
     assert_eq!(alone_s("wind_m_s = [-34.9999999999999, 0.0]", held), f64::INFINITY);
 }

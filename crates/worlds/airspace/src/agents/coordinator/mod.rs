@@ -43,8 +43,8 @@
 //!
 //! # Why one rules at any time
 //!
-//! *(a) No coordinator has a twin in its epoch.* The owner begins an epoch once, since its numbers rise. From then on
-//! a token moves: the host that sends hop `k + 1` has taken hop `k` and stops running it in the same step; hop
+//! *(a) No coordinator has a twin in its epoch.* The owner begins an epoch once, because its numbers rise. From then
+//! on a token moves: the host that sends hop `k + 1` has taken hop `k` and stops running it in the same step; hop
 //! `k + 1` has one receiver, which takes it once. So at most one host runs it.
 //!
 //! *(b) At most one is accepted by a majority.* A host has accepted one epoch at a time, and accepted epochs

@@ -11,7 +11,7 @@ pub(super) enum Step {
     Hop(usize),
     /// It waits here for another one.
     Stay,
-    /// It has done all that it had to do.
+    /// It has completed all its tasks.
     Over,
 }
 
@@ -60,8 +60,7 @@ pub(super) trait Ship {
     /// Returns whether the host misses a coordinator that is not heard of.
     fn watches(&self, seat: usize) -> bool;
 
-    /// Returns whether a coordinator has left news for another one on the host, since it was asked
-    /// before.
+    /// Returns whether a coordinator has left news for another one on the host since the last call.
     fn has_news(&mut self) -> bool {
         false
     }

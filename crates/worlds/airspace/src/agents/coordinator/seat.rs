@@ -77,7 +77,7 @@ pub(super) struct Seat<P> {
     pub stood: u32,
     /// Tick of the last sign of life.
     pub heard_at: u64,
-    /// Tick before which it does not stand for election, since another one does.
+    /// Tick before which it does not stand for election, because another one does.
     pub quiet_until: u64,
     pub copy: Option<Copy>,
     pub post: Post<P>,

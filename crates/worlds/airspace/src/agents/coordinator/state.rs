@@ -63,7 +63,7 @@ pub(super) enum Task {
 pub(super) struct Overview {
     /// The newest known epoch of each part's coordinator, which says where that one is at home.
     pub epochs: Vec<Epoch>,
-    /// Whether each part is left out, since its coordinator is not to be found.
+    /// Whether each part is left out, because its coordinator cannot be found.
     pub missing: Vec<bool>,
     /// Places of hosts that could not be reached.
     pub unreachable: Vec<usize>,
@@ -74,7 +74,7 @@ pub(super) struct Overview {
 pub(super) struct Coordinator {
     pub task: Task,
     pub gathered: Gathered,
-    /// None but for the one above others.
+    /// Present only in the coordinator above others.
     pub overview: Option<Overview>,
 }
 

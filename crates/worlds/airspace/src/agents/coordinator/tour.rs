@@ -68,7 +68,7 @@ impl Coordinator {
     /// Brings the airplanes of its part their controls, from number `k` on.
     fn deliver(&mut self, k: usize, ship: &mut Aboard) -> Option<Step> {
         let me = ship.own.me;
-        // Also one that was passed over because it could not be reached then.
+        // This includes an airplane that was passed over because it could not be reached then.
         self.tell(ship);
         let is_due = |airplane: &&Visited| !airplane.is_presumed && airplane.place != me;
         let mut left = self.gathered.airplanes.iter().skip(k).filter(is_due);

@@ -49,7 +49,7 @@ pub enum Item {
 }
 
 impl Item {
-    /// The airplane that it is about.
+    /// Returns the airplane that it is about.
     pub(super) fn about(&self) -> EntityId {
         match self {
             Self::Beacon(beacon) => beacon.own.id,

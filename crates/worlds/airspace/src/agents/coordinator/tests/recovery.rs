@@ -7,12 +7,12 @@ use sidestep_kernel::network::Patience;
 /// Rounds that a coordinator makes, so that its host dies in any of them.
 const ROUNDS: u8 = 20;
 
-/// Chances that a message is lost, and the number of tries after which it is given up: as networks with such
-/// a loss have it by default.
+/// Chances that a message is lost, and the number of tries after which it is given up: the defaults of networks with
+/// such a loss.
 const LOSSES: [(f64, u32); 3] = [(0.0, 1), (0.1, 14), (0.3, 32)];
 
 /// Returns the patience of hosts where a message takes a tick, and the ticks after which a group misses its
-/// coordinator: as networks have them by default.
+/// coordinator: the defaults of networks.
 fn patience(group: usize, tries: u32) -> (Patience, u64) {
     let bits_per_tick = f64::INFINITY;
     let patience = Patience { ticks: 3, bits_per_tick, tries, first_tries: tries };
