@@ -11,8 +11,8 @@ use sidestep_kernel::InputError;
 use sidestep_scenario::Spanned;
 
 impl<const D: usize> Compiler<'_, D> {
-    /// Refuses a task that moves a connector which is fixed or has failed, and targets off the line, the
-    /// plane or the box on which it belongs, unless a change may let it go.
+    /// Refuses a task that moves a fixed or failed connector, and targets off the line, the plane or the
+    /// box on which it belongs, unless a change may let it go.
     pub(super) fn can_lead(
         &self,
         s: &ChainSection<D>,
@@ -130,7 +130,7 @@ mod tests {
         assert!(cause.starts_with("target 1 is 0.3000 m off"), "{cause}");
     }
 
-    /// Compiles the shipped arm with a task, and what it is given beside that.
+    /// Compiles the shipped arm with a task and further keys.
     fn told_of_arm(beside: &str, task: &str) -> Option<String> {
         let text = format!(
             "format = 1\nworld = \"chain\"\n[chain]\ndimensions = 3\n[[chains]]\n\

@@ -103,7 +103,7 @@ pub(super) struct NavigatorSection {
     leave_rule: Option<bool>,
     /// Way to turn.
     turning: TurningWord,
-    /// The answer to something that moves ahead.
+    /// The answer to a body that moves ahead.
     movers: MoversWord,
     /// Number of beams of the laser.
     beams: Option<usize>,
