@@ -58,7 +58,7 @@ impl Goal {
     }
 
     /// Returns the point of the line at which a navigator at `at` begins: the first one beside which it is in the
-    /// corridor, since a corridor may come back to where it was; the nearest one if it is outside.
+    /// corridor, because a corridor may come back to where it was; the nearest one if it is outside.
     pub(crate) fn begins(&self, at: Point<2>) -> usize {
         let Self::EndOf { line, width_m } = self else { return 0 };
         match line.iter().position(|&p| distance(p, at) <= 0.5 * width_m) {

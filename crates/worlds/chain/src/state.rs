@@ -370,7 +370,7 @@ impl<const D: usize> ChainState<D> {
         self.leading(slot)
     }
 
-    /// Locks one chain for reading whose connectors, but the initiator, may have motions to follow.
+    /// Locks one chain for reading, of which all connectors except the initiator may have motions to follow.
     pub(crate) fn leading(&self, slot: usize) -> RwLockReadGuard<'_, Body<D>> {
         self.cells[slot].body.read().unwrap_or_else(PoisonError::into_inner)
     }

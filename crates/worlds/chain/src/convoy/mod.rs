@@ -112,7 +112,7 @@ pub struct Tick {
     pub is_vetoed: bool,
     /// Followers that were held back by their sensors.
     pub held: usize,
-    /// Followers whose bumper is pressed.
+    /// Followers with a pressed bumper.
     pub bumped: usize,
 }
 

@@ -22,7 +22,7 @@ use sidestep_kernel::Seed;
 use sidestep_kernel::network::Network;
 use sidestep_kernel::stream::Streams;
 
-/// A network with some faults, whose talks have all the time they need.
+/// A network with some faults and all the time that talks need.
 fn network(loss: f64, delay: f64, duplication: f64, deadline: f64) -> Network {
     Network {
         loss,

@@ -2,7 +2,7 @@
 //!
 //! Every rod once measured the distance of the parts that could be in its way. Since then none has come
 //! nearer to it by more than twice the longest way of any connector, which an odometer sums up. Rods
-//! whose room is used up measure again; most need not do so for many motions.
+//! that have used up their room measure again; most need not do so for many motions.
 
 use super::chain::Chain;
 use super::geometry::{

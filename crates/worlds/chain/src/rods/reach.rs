@@ -16,7 +16,7 @@ use sidestep_kernel::{InputError, interrupt};
 
 /// Most double passes before the search is given up.
 const MAX_DOUBLE_PASSES: usize = 40;
-/// Most double passes where several connectors are held, whose return passes disturb each other.
+/// Most double passes where several connectors are held, because their return passes disturb each other.
 const MAX_MUTUAL_PASSES: usize = 400;
 /// Least relative gain of a double pass; one that brings the connector nearer by less ends the
 /// search.

@@ -447,8 +447,8 @@ impl<const D: usize> Compiler<'_, D> {
         Ok((chain.map_err(|error| self.source.error_of(at, &error))?, Some(Arc::new(arm))))
     }
 
-    /// Refuses an arm whose base may move, and changes that take it apart: its joints determine the places of its
-    /// connectors.
+    /// Refuses an arm with a base that may move, and changes that take it apart: its joints determine the places
+    /// of its connectors.
     fn stays_whole(
         &self,
         s: &ChainSection<D>,

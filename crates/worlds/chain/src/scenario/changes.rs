@@ -44,7 +44,7 @@ pub(super) struct ChangeSection<const D: usize> {
 }
 
 impl<const D: usize> ChangeSection<D> {
-    /// Returns the cycle at whose start it takes effect.
+    /// Returns the cycle at the start of which it takes effect.
     fn cycle(&self, dt_s: f64) -> u64 {
         (self.at_s.get() / dt_s).round() as u64
     }

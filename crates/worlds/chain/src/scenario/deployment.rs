@@ -1,4 +1,4 @@
-//! Scenarios whose chains can be moved by agents that know only their neighbors and their own perception.
+//! Scenarios in which agents that know only their neighbors and their own perception can move the chains.
 
 use super::{ChainSpec, Compiler};
 use crate::deploy::kind::Deployment;

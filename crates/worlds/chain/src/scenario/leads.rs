@@ -1,4 +1,4 @@
-//! Refusals of tasks whose connector can never do them.
+//! Refusals of tasks that their connector can never do.
 
 use super::super::arms::arm::Arm;
 use super::super::driver::{Driver, Task};
@@ -88,7 +88,7 @@ mod tests {
     use crate::scenario::Compiled;
     use sidestep_scenario::Source;
 
-    /// Compiles a chain of four whose first connector is limited, with a task.
+    /// Compiles a chain of four with a limited first connector and a task.
     fn told(limit: &str, task: &str, change: &str) -> Option<String> {
         let text = format!(
             "format = 1\nworld = \"chain\"\n[[chains]]\nconnectors = 4\nrod_m = 0.5\n\

@@ -141,7 +141,7 @@ pub(super) struct RobotsSection {
 }
 
 impl<const D: usize> Compiler<'_, D> {
-    /// Returns a navigator that drives with `speed_m_s`.
+    /// Returns a navigator that drives at `speed_m_s`.
     pub(super) fn navigator(
         &self,
         section: Option<&Spanned<NavigatorSection>>,
@@ -184,7 +184,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(middle.map(|(line, width_m)| Goal::EndOf { line, width_m }))
     }
 
-    /// Returns the robots of a swarm whose leader drives with `speed_m_s`.
+    /// Returns the robots of a swarm with a leader that drives at `speed_m_s`.
     pub(super) fn robots(
         &self,
         section: &Spanned<RobotsSection>,

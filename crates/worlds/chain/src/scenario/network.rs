@@ -53,7 +53,7 @@ pub(super) struct Partition {
 pub(super) struct OneWay {
     /// Number of the connector that is heard by the other.
     sender: u32,
-    /// Number of its neighbor, whose messages do not reach it.
+    /// Number of its neighbor, which it does not hear.
     receiver: u32,
     /// Number of the chain.
     #[serde(default)]

@@ -14,7 +14,7 @@ use crate::rods::obstacle::Obstacles;
 use crate::rods::veto::Veto;
 use sidestep_kernel::InputError;
 
-/// Meets `goal`, whose target is within the shell that the rods reach.
+/// Meets `goal`, with a target within the shell that the rods reach.
 pub(super) fn solve<const D: usize>(
     solver: &mut Solver<D>,
     chain: &Chain<D>,

@@ -1,5 +1,5 @@
-//! Inverse kinematics: a posture of a chain whose connector `k` is at a target while its base
-//! keeps its place.
+//! Inverse kinematics: a posture of a chain with connector `k` at a target while its base keeps its
+//! place.
 //!
 //! ```text
 //! goal       a goal, and its answer

@@ -12,7 +12,7 @@ use super::step::{Bounds, Stepper};
 use sidestep_kernel::geometry::{norm, sub};
 use std::f64::consts::PI;
 
-/// Speed of joints whose model gives none.
+/// Speed of joints without one in the model.
 const TURNS_RAD_S: f64 = PI;
 const SLIDES_M_S: f64 = 1.0;
 /// Weight of a connector's place in the guide.

@@ -60,8 +60,8 @@ impl Asked {
     /// Position and orientation.
     pub const POSE: Self = Self { along: [true; 3], turn: Turn::Whole };
 
-    /// Returns the part of a target that counts, whose orientation is asked for or not, where some axes of its frame
-    /// are free: `along` them, and the turn `about` them. Errors name the option `--free` of the command.
+    /// Returns the part of a target that counts, with or without its orientation, where some axes of its frame are
+    /// free: `along` them, and the turn `about` them. Errors name the option `--free` of the command.
     ///
     /// # Errors
     /// When a turn is free and none is asked for, two turns are free, or everything is.
