@@ -2,7 +2,7 @@
 //!
 //! `cargo bench -p sidestep-chain [-- PART ...]` with the parts `open`, `middle`, `wavefront`,
 //! `own`, `field`, `corridor`, and `corridors` for the table of all pinned corridors; CPU time. In brackets
-//! what the prototype took.
+//! the prototype's time.
 
 use cpu_time::ProcessTime;
 use sidestep_chain::geometry::{Point, add, along, first_axis, norm, scaled, sub, unit};
@@ -68,7 +68,7 @@ fn open() {
     }
 }
 
-/// The same by a connector in the middle: both sweeps in one loop.
+/// The same led by a connector in the middle: both sweeps in one loop.
 fn middle() {
     for ((n, motions, ..), before_us) in SIZES.into_iter().zip([4.5, 100.0, 10_100.0]) {
         pull_open("middle", n, n / 2, motions, before_us, |home, k| {
@@ -324,7 +324,7 @@ fn corridor() {
 }
 
 /// Every width with every rod: vetoes, clearance, jumps. Rods of 1.5 m as thick as the robots
-/// cannot go round the narrowest bend of the narrowest corridor; that veto is right.
+/// cannot go around the narrowest bend of the narrowest corridor; that veto is right.
 fn corridors() {
     println!(
         "width m | rods m    | radius m | followers | vetoes | clearance m | slave step / leader step | turns per step"

@@ -18,7 +18,7 @@ pub(crate) fn claim<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, slot: us
 /// Claims the box that a chain may enter.
 pub(crate) fn claim_box<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, slot: usize) {
     let &mut Turn { world, state, now, .. } = turn;
-    // A chain alone is in nobody's way, wherever it goes.
+    // A chain alone is in no other's way, wherever it goes.
     if !world.is_open() {
         state.set_claim(slot, reach(world, &world.chains[slot], &state.body(slot), now));
     }

@@ -7,10 +7,10 @@ use super::rods::geometry::{
 use super::rods::obstacle::Obstacles;
 use super::rods::own_body::OwnBody;
 
-/// Distance by which searches go beyond what counts, meters: far more than rounding.
+/// Distance by which searches go beyond the one that counts, meters: far more than rounding.
 const SPARE_M: f64 = 1e-9;
 
-/// The surroundings of a connector and of the rod behind it, as far as somebody looks.
+/// The surroundings of a connector and of the rod behind it, as far as a search looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Near<const D: usize> {
     /// Gap between the connector and the nearest obstacle, meters; negative inside it.
@@ -21,7 +21,7 @@ pub(crate) struct Near<const D: usize> {
     pub(crate) rod_gap_m: f64,
 }
 
-/// Returns what is nearer than `look_m` to connector `k`, and to the rod behind it if rods count.
+/// Returns the surroundings nearer than `look_m` to connector `k`, and to the rod behind it if rods count.
 pub(crate) fn near<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
@@ -35,7 +35,7 @@ pub(crate) fn near<const D: usize>(
     let end = if with_rods { (k + 1).min(points.len() - 1) } else { k };
     let (at, radii_m) = (points[k], [k, end].map(|i| connectors[i].radius_m));
     let rod_m = chain.rods().get(k).map_or(0.0, |rod| rod.radius_m);
-    // Who is inside looks only for what it is in deeper.
+    // A part that is inside looks only for obstacles that it is deeper in.
     let room_m = (radii_m[0].max(radii_m[1]) + look_m).max(0.0) + SPARE_M;
     let room = Bounds::of(&[at, points[end]]).grown(room_m);
     obstacles.visit(&room, |o| {
@@ -66,7 +66,7 @@ pub(crate) fn least_clearance<const D: usize>(
     }
     let mut least = (look_m, 0);
     for k in 0..chain.points().len() {
-        // What is farther than the nearest so far changes nothing.
+        // Obstacles farther away than the nearest so far change nothing.
         let near = near(chain, obstacles, k, least.0, with_rods);
         let apart_m = near.gap_m.min(near.rod_gap_m);
         if apart_m < least.0 {

@@ -1,5 +1,5 @@
-//! Tasks of a chain's initiator, carried out one after the other: what moves the chain, and where
-//! to (slides R4, R9).
+//! Tasks of a chain's initiator, carried out one after the other: its source of motion, and its
+//! destination (slides R4, R9).
 
 pub(crate) mod errand;
 pub(crate) mod external;
@@ -47,7 +47,7 @@ pub(crate) enum Driver<const D: usize> {
     Wander(Wander<D>),
     /// Go where a script says, as an operator would.
     Script(Arc<Script>),
-    /// Go to places one after the other, as a planner would, but around what is in the way.
+    /// Go to places one after the other, as a planner would, but around anything in the way.
     Targets(Targets<D>),
     /// Find the way on wheels, with a laser; in the plane.
     Navigate(Arc<Navigator>),
@@ -118,7 +118,7 @@ pub struct Driving {
     pub ahead: [f64; 3],
     /// Smallest distance to its present target so far, meters.
     pub nearest_m: f64,
-    /// Kind of the last event reported since a motion went as wanted.
+    /// Kind of the last event reported since a motion went as wished.
     pub told: Option<EventKind>,
     /// The last objection in this part of the task.
     pub objection: Option<Objection>,
@@ -195,10 +195,10 @@ impl Driving {
         self.begin(agent, points);
     }
 
-    /// Returns all motions of a script that started here.
+    /// Returns all motions of a script started here.
     ///
     /// # Errors
-    /// When the script contains something that is no motion, or too many motions.
+    /// When the script contains an entry that is no motion, or too many motions.
     pub fn motions(&self, script: &Script) -> Result<Vec<Motion>, InputError> {
         let motions = script.motions(self.start);
         let motions: Vec<Motion> = motions.take(MAX_MOTIONS + 1).collect::<Result<_, _>>()?;

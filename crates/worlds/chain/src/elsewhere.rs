@@ -1,13 +1,13 @@
-//! The agents of a chain elsewhere: what a world shows them in a cycle, and what it takes from them.
+//! The agents of a chain elsewhere: their perception in a cycle, and the decisions that a world takes from them.
 //!
-//! Whoever runs agents in processes of their own asks for [`ChainWorld::sights_at`], sends each
+//! A caller that runs agents in processes of their own asks for [`ChainWorld::sights_at`], sends each
 //! connector's sight to its agent, hands the decisions over ([`ChainWorld::hand_over`]), and repeats
-//! that until nobody is shown anything more: chains that may meet move one after the other. Then it
-//! advances the run by a cycle. A chain for which nothing was handed over talks in memory.
+//! that until no sights are left: chains that may meet move one after the other. Then it advances the
+//! run by a cycle. A chain for which nothing was handed over talks in memory.
 //!
-//! A run that is to be recorded and computed again is handed over all that was decided in a cycle, as bytes, before it
-//! advances ([`sidestep_kernel::Simulation::hand_over`]): in such a cycle no chain talks in memory, and one whose
-//! connectors said nothing stands.
+//! A run that is to be recorded and computed again is handed all decisions of a cycle, as bytes, before it advances
+//! ([`sidestep_kernel::Simulation::hand_over`]): in such a cycle no chain talks in memory, and one whose connectors
+//! said nothing stands.
 
 use super::agents::{Control, Handed, Shown};
 use super::deploy::Deployment;
@@ -23,9 +23,9 @@ use sidestep_kernel::{Cycle, EntityId, InputError, Slot, Turn};
 use std::collections::BTreeSet;
 
 impl<const D: usize> ChainWorld<D> {
-    /// Returns what the connectors of chains perceive in the cycle to come, `now`: of those chains whose
-    /// turn it is, as those before them have handed over their decisions. Nothing changes. Where no
-    /// team is deployed nobody perceives anything.
+    /// Returns the perception of chains' connectors in the cycle to come, `now`: of those chains whose
+    /// turn it is, because those before them have handed over their decisions. Nothing changes. Where no
+    /// team is deployed there is no perception.
     pub fn sights_at(&self, state: &ChainState<D>, now: Cycle) -> Vec<Shown<D>> {
         let (state, clock) = (&state.copied(), &ManualClock::default());
         let mut scratch = Scratch::new(self);
@@ -55,8 +55,8 @@ impl<const D: usize> ChainWorld<D> {
         scratch.shown.unwrap_or_default()
     }
 
-    /// Hands over the decisions of a chain's agents for the cycle to come. Unless all who take part in a motion
-    /// agree, nobody moves; nor does anybody where an agent is gone.
+    /// Hands over the decisions of a chain's agents for the cycle to come. Unless all that take part in a
+    /// motion agree, no connector moves; nor does any where an agent is gone.
     ///
     /// # Errors
     /// When the chain does not exist, or a decision is not that of its connector in this cycle.
@@ -135,7 +135,7 @@ impl<const D: usize> ChainWorld<D> {
         Ok(all)
     }
 
-    /// Notes what connectors do in cycle `now`, by their ids on the network: no chain talks in memory in it.
+    /// Notes the decisions of connectors in cycle `now`, by their ids on the network: no chain talks in memory in it.
     ///
     /// # Errors
     /// When the chains are not deployed as teams, or a decision is none of its connector; nothing is noted then.
@@ -178,7 +178,7 @@ impl<const D: usize> ChainWorld<D> {
         None
     }
 
-    /// Returns what people call a connector.
+    /// Returns the name of a connector for people.
     fn called(&self, id: EntityId) -> String {
         match self.connector_of(id) {
             Some((chain, k)) => format!("connector {k} of chain {chain}"),

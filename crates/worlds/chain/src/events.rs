@@ -16,8 +16,8 @@ pub enum EventKind {
     Penetration,
     /// The chain is clear of obstacles again.
     Clear,
-    /// A part got out of the way of something, after a cycle in which none had to; the value is the
-    /// number of motions that took.
+    /// A part got out of an obstacle's way, after a cycle in which none had to; the value is the number
+    /// of motions needed.
     Escape,
     /// A robot's body touches something; the value is its distance from its connector in meters.
     Bumper,
@@ -90,7 +90,7 @@ impl EventKind {
         Self::TargetGivenUp,
     ];
 
-    /// Returns the kind that it is for viewers, which know no world.
+    /// Returns its kind for viewers, which know no world.
     pub(crate) fn happening(self) -> Happening {
         match self {
             Self::Veto => Happening::Veto,

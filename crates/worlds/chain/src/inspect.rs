@@ -1,5 +1,5 @@
-//! The wish of a chain's initiator, who objects and why, what the ladder makes of that, and what comes of
-//! it for one connector: the cycle is tried on a copy of the state, for its group alone.
+//! The wish of a chain's initiator, the objections and their reasons, the ladder's response, and the
+//! outcome for one connector: the cycle is tried on a copy of the state, for its group alone.
 
 mod motion;
 #[cfg(test)]
@@ -21,8 +21,8 @@ use sidestep_kernel::view::{Inspection, Kind, MarkShape, Role, Section, Table, V
 use sidestep_kernel::{Cycle, Slot, Turn};
 
 impl<const D: usize> ChainWorld<D> {
-    /// Returns what is to tell of a connector, or of its robot, in cycle `now`; `None` for one that is
-    /// not there.
+    /// Returns the inspection of a connector, or of its robot, in cycle `now`; `None` for one that does
+    /// not exist.
     pub(crate) fn inspect(
         &self,
         state: &ChainState<D>,
@@ -53,7 +53,7 @@ impl<const D: usize> ChainWorld<D> {
         Some(told)
     }
 
-    /// Returns what people call a connector, or its robot.
+    /// Returns the name of a connector, or of its robot, for people.
     fn title(&self, (kind, slot, part): Who) -> String {
         let name = &self.chains[slot as usize].name;
         let chain = if name.is_empty() { format!("chain {slot}") } else { name.clone() };
@@ -95,7 +95,7 @@ impl<const D: usize> ChainWorld<D> {
     }
 }
 
-/// Tells what a leader on wheels perceives, and the layer that acts.
+/// Tells the perception of a leader on wheels, and the layer that acts.
 fn navigates<const D: usize>(looking: &mut Looking<'_, D>, slot: Slot, told: &mut Inspection) {
     let Some(sight) = looking.sight(slot) else { return };
     let leader = &sight.navigator.leader;
@@ -153,7 +153,7 @@ impl<const D: usize> Asked<'_, D> {
         (Kind::Connector, self.slot, Some(k as u32))
     }
 
-    /// Returns where the body is in a state of the chain.
+    /// Returns the place of the connector or robot in a state of the chain.
     fn place(&self, body: &Body<D>) -> [f64; 3] {
         match self.kind {
             Kind::Robot => in_dimensions(body.robots[self.k].pose.at),
@@ -220,7 +220,7 @@ impl<const D: usize> Asked<'_, D> {
         }
     }
 
-    /// Tells who objected, why, because of what, and how far the initiator could have gone.
+    /// Tells the objecting connector, its reason, the obstacle, and how far the initiator could have gone.
     fn is_vetoed(&self, told: &mut Inspection) {
         let before = self.before.chain.points();
         let far_m = |veto: &Veto<D>| distance(veto.reached, before[veto.from]);

@@ -70,8 +70,8 @@ impl<const D: usize> AnyCompiled for Compiled<D> {
     }
 
     fn seeds(&self) -> Seeds {
-        // Where the start does not follow from the seed, little draws, and only on occasion: a leader that wanders,
-        // a laser that errs, parts that are thrown about, a way that is planned.
+        // Where the start does not follow from the seed, few parts draw, and only on occasion: a leader that
+        // wanders, a laser that errs, parts that are thrown about, a way that is planned.
         match &self.recipe {
             Some(recipe) if !recipe.draws_start() => Seeds::Perhaps,
             _ => Seeds::Decide,

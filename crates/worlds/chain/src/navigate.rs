@@ -57,8 +57,8 @@ impl Goal {
         }
     }
 
-    /// Returns the point of the line at which a navigator begins that stands at `at`: the first one beside which it is
-    /// in the corridor, since a corridor may come back to where it was; the nearest one if it is outside.
+    /// Returns the point of the line at which a navigator at `at` begins: the first one beside which it is in the
+    /// corridor, because a corridor may come back to where it was; the nearest one if it is outside.
     pub(crate) fn begins(&self, at: Point<2>) -> usize {
         let Self::EndOf { line, width_m } = self else { return 0 };
         match line.iter().position(|&p| distance(p, at) <= 0.5 * width_m) {
@@ -84,7 +84,8 @@ impl Goal {
     pub(crate) fn is_reached(&self, at: Point<2>, index: usize) -> bool {
         match self {
             Self::Target { at: target, tolerance_m } => distance(at, *target) <= *tolerance_m,
-            // All that is left of the line is near its end: near it alone is also where a line begins that comes back.
+            // All the rest of the line is near its end: near it alone is also the start of a line that comes
+            // back.
             Self::EndOf { line, .. } => {
                 let end = line[line.len() - 1];
                 line[index..].iter().all(|&p| distance(p, end) <= BEFORE_THE_END_M)

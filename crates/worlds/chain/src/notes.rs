@@ -5,7 +5,7 @@ use crate::rods::geometry::Point;
 use crate::rods::veto::Veto;
 use sidestep_kernel::Slot;
 
-/// Notes for somebody who asks; no run makes any.
+/// Notes for an inspection; no run makes any.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Notes<const D: usize> {
     /// The chain.

@@ -1,5 +1,5 @@
-//! Chains as a caller sees them: what they observe, and what may be ordered of those whose driver is
-//! outside. An agent is a chain, by its number.
+//! Chains as a caller sees them: their observations, and the orders for those whose driver is outside.
+//! An agent is a chain, by its number.
 
 use super::clearance::near;
 use super::driver::external::{Came, Orders};
@@ -18,9 +18,9 @@ use sidestep_kernel::{Cycle, EntityId, Slot};
 #[cfg(test)]
 mod tests;
 
-/// The noun for who observes and takes orders.
+/// The noun for an agent that observes and takes orders.
 const CHAIN: &str = "chain";
-/// Sorts of things because of which there are vetoes.
+/// Sorts of causes of vetoes.
 const CAUSES: [&str; 3] = ["none", "obstacle", "chain"];
 
 impl<const D: usize> ChainSpec<D> {
@@ -62,7 +62,7 @@ impl<const D: usize> ChainWorld<D> {
         Teams::new(alike.into_iter().map(team).collect(), CHAIN)
     }
 
-    /// Returns the spaces of what a chain of `n` connectors perceives, in the order of [`Self::observe`].
+    /// Returns the spaces of the perception of a chain of `n` connectors, in the order of [`Self::observe`].
     fn observed(&self, n: usize) -> Vec<Space> {
         let look_m = self.look_m;
         let up_to_look = || Bounds::Real { least: f64::NEG_INFINITY, most: look_m };
@@ -89,7 +89,7 @@ impl<const D: usize> ChainWorld<D> {
         ]
     }
 
-    /// Returns why no rod of a chain can ever be as an order wants it, and what would be right.
+    /// Returns an error, with the remedy, if no rod of a chain can ever be as an order wants it.
     pub(super) fn is_possible(&self, order: &Order<'_>) -> Result<(), String> {
         if self.name_of(order) != Orders::ROD_TO {
             return Ok(());
@@ -119,7 +119,7 @@ impl<const D: usize> ChainWorld<D> {
         external.orders.note(self.name_of(order), order.values);
     }
 
-    /// Writes what a team perceives.
+    /// Writes a team's perception.
     pub(super) fn observe(
         &self,
         state: &ChainState<D>,
@@ -201,7 +201,7 @@ impl<const D: usize> ChainWorld<D> {
     }
 }
 
-/// Returns the spaces of what a chain that takes orders is answered.
+/// Returns the spaces of the answers to a chain that takes orders.
 fn answered<const D: usize>() -> Vec<Space> {
     let number = Bounds::Whole { least: -1, most: i64::from(u32::MAX) };
     let share = Bounds::Real { least: 0.0, most: 1.0 };
@@ -228,7 +228,7 @@ fn answered<const D: usize>() -> Vec<Space> {
     ]
 }
 
-/// Returns the spaces of what may be ordered of a chain of `n` connectors.
+/// Returns the spaces of the orders for a chain of `n` connectors.
 fn ordered<const D: usize>(n: usize) -> Vec<Space> {
     let place = || Bounds::Real { least: -MAX_COORDINATE_M, most: MAX_COORDINATE_M };
     let number = |most: usize| Bounds::Whole { least: 0, most: most as i64 };

@@ -1,5 +1,5 @@
-//! Perception and decisions of navigators at the start of a cycle, with everybody else where they
-//! are at that moment.
+//! Perception and decisions of navigators at the start of a cycle, with all other bodies where they are
+//! at that moment.
 
 use super::driver::Driver;
 use super::navigate::{Goal, Navigator};
@@ -10,10 +10,10 @@ use super::swarm::leader::{Decision, LeaderState, Percept, Surroundings};
 use super::world::{ChainWorld, purpose};
 use sidestep_kernel::{Cycle, Slot};
 
-/// Time for which a navigator stands for what moves ahead before it takes that for a wall, s.
+/// Time for which a navigator stands for a body that moves ahead before it takes that for a wall, s.
 const STANDS_S: f64 = 10.0;
 
-/// A worker's read-only look at a state that nobody changes meanwhile.
+/// A worker's read-only look at a state that does not change meanwhile.
 pub(crate) struct Looking<'a, const D: usize> {
     pub(crate) world: &'a ChainWorld<D>,
     pub(crate) state: &'a ChainState<D>,
@@ -116,7 +116,7 @@ mod tests {
         }
     }
 
-    /// Returns what a look at each part of each chain shows to the first connector of one of them.
+    /// Returns the parts of all chains that the first connector of one of them sees by a look at each.
     fn seen_of_all(state: &ChainState<2>, slot: usize) -> Vec<Seen> {
         let at = state.body(slot).chain.points()[0];
         let mut seen = Vec::new();
@@ -150,7 +150,7 @@ mod tests {
         ) {
             let (world, state) = crowd(count);
             assert_all_is_seen(&world, &state);
-            // Then everybody is elsewhere, also on the very edge of what is seen.
+            // Then all are elsewhere, also on the very edge of sight.
             for stretch in [1.0, 0.5] {
                 let at = |part: f64, axis: usize| {
                     let m = part * stretch * spread_m[axis];

@@ -2,8 +2,8 @@
 //!
 //! Where nothing can object, a chain follows its initiator in one way only, and following several
 //! motions at once is much faster ([`pull_measured`]). So the chain is put off until enough motions
-//! wait or somebody looks at it. Every bit is as if it had followed each at once, and so is every
-//! measure; therefore it does not matter who looks when.
+//! wait or it is looked at. Every bit is as if it had followed each at once, and so is every measure;
+//! therefore it does not matter when it is looked at.
 
 use super::metrics::Tally;
 use super::rods::chain::Chain;

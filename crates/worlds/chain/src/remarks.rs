@@ -1,4 +1,4 @@
-//! Remarks on a valid scenario: what will surprise its author. `sidestep check` shows them.
+//! Remarks on a valid scenario: effects that will surprise its author. `sidestep check` shows them.
 
 use super::arms::kinematics::{Motion, Variable};
 use super::rods::chain::{Connector, Mobility};

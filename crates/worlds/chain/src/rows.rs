@@ -88,7 +88,7 @@ fn events() -> Table<Event> {
         .u32("missing", "parts missing in a gap that is too long; else 0", |e| e.missing)
 }
 
-/// Rows that wait to be recorded.
+/// Rows waiting to be recorded.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
     record: RecordSection,
@@ -100,7 +100,7 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// Returns no rows yet; later they hold the tables that `record` asks for.
+    /// Returns no rows yet; later they hold the tables in `record`.
     pub(super) fn new(record: RecordSection) -> Self {
         Self { record, ..Self::default() }
     }

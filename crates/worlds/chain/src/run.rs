@@ -24,7 +24,7 @@ use std::sync::Arc;
 pub type ChainRun<const D: usize> = Run<ChainWorld<D>>;
 
 /// Returns a run of a scenario at its start, in the plane or in space: a [`ChainRun`] behind the face that all worlds
-/// share. Generic code is compiled again wherever it is named, and this is the name for it that is not generic.
+/// share. Generic code is compiled again wherever it is named, and this is its name that is not generic.
 ///
 /// # Errors
 /// When the scenario is wrong; the error points at the place.

@@ -153,7 +153,7 @@ impl<const D: usize> Room<D> {
     }
 }
 
-/// The part of a scenario that says how its points are to be read.
+/// The part of a scenario by which its points are to be read.
 #[derive(Debug, Deserialize, JsonSchema)]
 struct Shape {
     #[serde(default)]
@@ -449,7 +449,7 @@ impl<const D: usize> Compiler<'_, D> {
 
     /// Returns the longest way of a slave in a sub-step, meters. The limit of escaping chains holds for led
     /// ones too; where nothing escapes, the usual one is some times the longest sub-step of an initiator,
-    /// because rods that turn aside throw what hangs on them much farther.
+    /// because rods that turn aside throw the parts that hang on them much farther.
     fn slave_step_max_m(
         &self,
         chains: &[ChainSpec<D>],

@@ -51,7 +51,7 @@ pub(super) fn convoy(lead_m: f64, followers: usize, rod: Rod, radius_m: f64) -> 
         .expect("a straight chain is right")
 }
 
-/// A wandering leader: every step goes somewhere into a cone around the last direction.
+/// A wandering leader: every step goes in a random direction within a cone around the last one.
 pub(super) struct Wanderer<const D: usize> {
     numbers: Numbers,
     u: Point<D>,

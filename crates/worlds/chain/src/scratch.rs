@@ -47,9 +47,9 @@ pub struct Scratch<const D: usize> {
     pub(crate) escaped: Vec<Point<D>>,
     /// Events of this task.
     pub(crate) events: Vec<Event>,
-    /// Notes for somebody who asks about a chain; none in a run.
+    /// Notes for an inspection of a chain; none in a run.
     pub(crate) notes: Option<Box<Notes<D>>>,
-    /// Perceptions of connectors, for somebody who asks; none in a run.
+    /// Perceptions of connectors, for a caller that asks; none in a run.
     pub(crate) shown: Option<Vec<Shown<D>>>,
 }
 

@@ -30,7 +30,7 @@ const FEW: usize = 16;
 /// Room for rounding between boxes and distances, meters.
 const ROUNDING_M: f64 = 1e-6;
 
-/// The state of a world of chains; slots are ids.
+/// State of a world of chains; slots are ids.
 #[derive(Debug)]
 pub struct ChainState<const D: usize> {
     cells: Box<[Cell<D>]>,
@@ -73,7 +73,7 @@ pub struct Body<const D: usize> {
     pub tally: Tally,
     /// Cycles that its navigator has stood because something moves ahead.
     pub(crate) stood: u32,
-    /// Memory of how it gets out of where it was caught.
+    /// Memory of its way out of where it was caught.
     pub(crate) way_out: WayOut,
     /// The motions of the present script, which follow from the place where it started.
     pub(crate) motions: Vec<Motion>,
@@ -83,11 +83,11 @@ pub struct Body<const D: usize> {
     pub joints: Option<Vec<f64>>,
     /// The way that it follows because local rules came no nearer.
     pub(crate) plan: Option<Plan<D>>,
-    /// The nearest lost connectors below and above, as each connector knows; empty while nobody is lost.
+    /// The nearest lost connectors below and above, as each connector knows; empty while none is lost.
     pub(crate) missing: Vec<Missing>,
     /// Decisions of its agents for a cycle, if they run elsewhere.
     pub(crate) handed: Option<Handed<D>>,
-    /// Motions that the chain has yet to follow; none whenever somebody looks.
+    /// Motions that the chain has yet to follow; none whenever it is looked at.
     pub(crate) put_off: PutOff<D>,
 }
 
@@ -154,11 +154,11 @@ pub struct Snapshot {
     pub(crate) ways_out: Vec<(u32, WayOut)>,
     /// Cycles for which navigators have stood because something moves ahead, where they have, by id.
     pub(crate) stood: Vec<(EntityId, u32)>,
-    /// Cycles for which scattered parts have waited for what is in their way, where they have, by id.
+    /// Cycles for which scattered parts have waited for an obstacle in their way, where they have, by id.
     pub(crate) waited: Vec<(EntityId, Cycle)>,
     /// Orders from outside and answers, of chains that have any, by id.
     pub(crate) externals: Vec<(u32, External)>,
-    /// Lost connectors, as those of their chain know, of chains in which somebody is lost; by id.
+    /// Lost connectors, as known to those of their chain, of chains in which one is lost; by id.
     pub(crate) missing: Vec<(u32, Vec<Missing>)>,
     /// Decisions for the cycle that comes next, by id, if those were handed over by agents elsewhere; serialized.
     pub(crate) handed: Vec<(u32, Vec<u8>)>,
@@ -370,7 +370,7 @@ impl<const D: usize> ChainState<D> {
         self.leading(slot)
     }
 
-    /// Locks one chain for reading whose connectors, but the initiator, may have motions to follow.
+    /// Locks one chain for reading, of which all connectors except the initiator may have motions to follow.
     pub(crate) fn leading(&self, slot: usize) -> RwLockReadGuard<'_, Body<D>> {
         self.cells[slot].body.read().unwrap_or_else(PoisonError::into_inner)
     }
@@ -395,7 +395,7 @@ impl<const D: usize> ChainState<D> {
         *self.cells[slot].claim.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns the claims by where they begin; valid while nobody claims anything.
+    /// Returns the claims by their lower ends; valid while no chain claims anything.
     pub(crate) fn neighbors(&self) -> RwLockReadGuard<'_, Neighbors<D>> {
         let made = self.claims.load(Relaxed);
         renewed(
@@ -406,7 +406,7 @@ impl<const D: usize> ChainState<D> {
     }
 
     /// Lists the chains, in order, of which some solid part may be within a distance of a place, among them all of
-    /// which one is; valid while nobody changes a body.
+    /// which one is; valid while no body changes.
     pub(crate) fn list_near(&self, at: Point<2>, range_m: f64, slots: &mut Vec<Slot>) {
         slots.clear();
         if self.len() <= FEW {
@@ -470,7 +470,7 @@ impl<const D: usize> ChainState<D> {
     }
 }
 
-/// Returns what a lock holds, renewed by the first worker that comes if it is out of date.
+/// Returns the content of a lock, renewed by the first worker that comes if it is out of date.
 fn renewed<T>(
     lock: &RwLock<T>,
     is_current: impl Fn(&T) -> bool,
@@ -490,7 +490,7 @@ fn renewed<T>(
     read()
 }
 
-/// Gives bodies back what is told to their agents from outside, and what those know of each other.
+/// Gives bodies back the orders and decisions from outside, and their agents' knowledge of each other.
 fn restore_agents<const D: usize>(
     bodies: &mut [Body<D>],
     snapshot: &Snapshot,
@@ -560,7 +560,7 @@ impl Snapshot {
     pub fn digest(&self) -> Digest {
         let mut hasher = Hasher::default();
         add(&mut hasher, &(self.cycle, &self.chains));
-        // Nothing is added for nobody, so that worlds without plans, ways out and orders keep their digests.
+        // Empty lists add nothing, so that worlds without plans, ways out and orders keep their digests.
         add_any(&mut hasher, &self.joints);
         add_any(&mut hasher, &self.plans);
         add_any(&mut hasher, &self.ways_out);

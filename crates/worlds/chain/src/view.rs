@@ -39,7 +39,7 @@ impl<const D: usize> ChainWorld<D> {
             bodies: still.chain(goals).collect(),
             names: (0..)
                 .zip(self.chains.iter())
-                // Those without a name go by their number.
+                // Those without a name are known by their number.
                 .filter(|(_, spec)| !spec.name.is_empty())
                 .map(|(id, spec)| (Kind::Connector, id, spec.name.clone()))
                 .collect(),
@@ -170,13 +170,13 @@ fn push_chain<const D: usize>(
     }));
 }
 
-/// Returns the connector that the present task moves, or moved if all are done; none where nobody leads.
+/// Returns the connector that the present task moves, or moved if all are done; none where no connector leads.
 fn leader<const D: usize>(spec: &ChainSpec<D>, body: &ChainBody<D>) -> Option<usize> {
     let present = spec.tasks.get(body.driving.task as usize).or(spec.tasks.last())?;
     (!matches!(present.driver, Driver::Rest)).then_some(present.agent)
 }
 
-/// Returns runs of connectors that are joined, because a broken chain has rods that hold nothing.
+/// Returns runs of connectors that are joined, because a broken chain's rods hold nothing.
 fn whole_parts<const D: usize>(chain: &Chain<D>) -> Vec<RangeInclusive<usize>> {
     let (mut parts, mut first) = (Vec::new(), 0);
     for rod in 0..chain.rods().len() {
@@ -281,7 +281,7 @@ fn told(event: &Event) -> (Level, &'static str, String) {
     }
 }
 
-/// Returns which body an obstacle is: another chain stands for all of its parts.
+/// Returns the body of an obstacle: another chain stands for all of its parts.
 pub(crate) fn who_of_obstacle(id: u32) -> Who {
     match id.checked_sub(OTHER_CHAIN) {
         Some(chain) => (Kind::Rods, chain, None),

@@ -98,7 +98,7 @@ fn rods(violation_m: f64) -> String {
     }
 }
 
-/// Returns how far the chains came, at what cost, and what they kept.
+/// Returns the chains' progress, its cost, and the limits that they kept.
 fn motion(m: &Metrics) -> Lines {
     let clearance = match m.min_clearance_m {
         None => "nothing came near".into(),

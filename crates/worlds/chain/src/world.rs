@@ -212,7 +212,7 @@ impl<const D: usize> ChainSpec<D> {
 }
 
 impl<const D: usize> ChainWorld<D> {
-    /// Returns whether nothing is in the way of the only chain, not even itself.
+    /// Returns whether nothing is in the way of the only chain, not even the chain itself.
     pub(crate) fn is_open(&self) -> bool {
         let is_empty = self.obstacles.is_empty() && self.movers.is_empty();
         is_empty && self.chains.len() == 1 && !self.rules.self_collision

@@ -30,8 +30,8 @@ const MOST_HELD: usize = 64;
 /// The program aboard one connector of a chain.
 ///
 /// Packets and ticks go in, packets come out; [`Self::control`] is there when its cycle is over. It
-/// never panics on what comes from the network. It keeps nothing from one cycle to the next that a
-/// result depends on, so one that was killed may be started anew.
+/// never panics on anything from the network. It keeps nothing from one cycle to the next that a result
+/// depends on, so a killed agent may be started anew.
 #[derive(Debug, Clone)]
 pub struct ConnectorAgent<const D: usize> {
     /// Number of its connector in its chain of `n`, and the id of connector 0 on the network.
@@ -75,7 +75,7 @@ pub struct ConnectorAgent<const D: usize> {
     refused: Refused,
 }
 
-/// The time that it waits for others, where messages may get lost.
+/// The time for which it waits for others, where messages may get lost.
 #[derive(Debug, Clone, Copy)]
 struct Radio {
     patience: Patience,
@@ -132,8 +132,8 @@ impl<const D: usize> Track<D> {
 }
 
 impl<const D: usize> ConnectorAgent<D> {
-    /// Returns the agent of a connector in a compiled world, all of which it is told being its own
-    /// limits, its rods and the rules of its chain.
+    /// Returns the agent of a connector in a compiled world, of which it learns only its own limits,
+    /// its rods and the rules of its chain.
     ///
     /// # Panics
     /// When the world has no such connector.
@@ -150,7 +150,7 @@ impl<const D: usize> ConnectorAgent<D> {
         agent
     }
 
-    /// Returns the same agent, which talks with those of the same build alone.
+    /// Returns the same agent, which talks only with agents of the same build.
     #[must_use]
     pub fn of_build(self, build: &str) -> Self {
         let fingerprint = digest([build.as_bytes(), &self.fingerprint.to_le_bytes()]);
@@ -230,7 +230,8 @@ impl<const D: usize> ConnectorAgent<D> {
         let [below, above] = sight.neighbors;
         let track = |side| if side == Side::Below { below } else { above };
         self.beside = Both::of(|side| track(side).map(|place| Track::at(place.0)));
-        // Where messages never get lost nobody finds out that somebody is back: who was gone is there again.
+        // Where messages never get lost no agent finds out that another is back: those that were gone are
+        // there again.
         let [below, above] = self.radio.map_or([None; 2], |_| sight.missing);
         self.missing = Both::of(|side| if side == Side::Below { below } else { above });
         (self.following, self.leading, self.climbing) = (None, None, None);
@@ -291,7 +292,7 @@ impl<const D: usize> ConnectorAgent<D> {
         self.now = self.now.max(tick);
         let Err(why) = self.receive(from, bytes) else { return };
         self.refused.count(why);
-        // What comes too late is of no use, and nobody's fault.
+        // A packet that comes too late is of no use, and no sender's fault.
         self.traffic.dropped += u64::from(why != Refusal::Stale);
     }
 
@@ -352,7 +353,7 @@ impl<const D: usize> ConnectorAgent<D> {
         }
     }
 
-    /// Notes who is lost on one side, and tells the other side if that is news. A leader stops.
+    /// Notes the lost connector on one side, and tells the other side if that is news. A leader stops.
     fn misses(&mut self, side: Side, missing: Option<u32>) {
         if self.missing[side] == missing {
             return;
@@ -389,7 +390,7 @@ impl<const D: usize> ConnectorAgent<D> {
         }
     }
 
-    /// Does what can be done before the next message.
+    /// Does all that is possible before the next message.
     fn run(&mut self) {
         while self.go_on_leading() || self.climb_on() {}
     }

@@ -41,7 +41,7 @@ pub enum Goes<const D: usize> {
         #[serde(with = "crate::rods::wire")]
         to: Point<D>,
     },
-    /// It has consented to a motion and heard no more of it: it goes if its master goes.
+    /// It has consented to a motion and heard nothing further of it: it goes if its master goes.
     WithItsMaster {
         /// The number of the motion.
         request: u32,

@@ -21,7 +21,7 @@ impl<const D: usize> Handed<D> {
     /// The bytes that stand for the decision of an agent that is gone: too few for any decision.
     pub const GONE: &'static [u8] = &[0];
 
-    /// Returns the decisions of a chain of `n` of whose agents nothing was heard.
+    /// Returns the decisions of a chain of `n` whose agents were not heard.
     pub fn nothing(cycle: Cycle, n: usize) -> Self {
         Self { cycle, controls: vec![None; n], gone: Vec::new() }
     }

@@ -1,9 +1,9 @@
 //! Messages between two neighbors over a network that loses, delays, doubles and reorders packets:
 //! each arrives once, and in the order in which they were sent.
 //!
-//! Messages are numbered, and kept until the neighbor has confirmed them. What is not confirmed in
-//! time is sent again; a neighbor that does not confirm anything, although sent to so often that it
-//! can hardly be alive and in touch, counts as lost, until something comes from it.
+//! Messages are numbered, and kept until the neighbor has confirmed them. Those not confirmed in time
+//! are sent again; a neighbor that does not confirm anything, although sent to so often that it can
+//! hardly be alive and in touch, counts as lost, until something comes from it.
 
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::network::Patience;
@@ -11,8 +11,8 @@ use std::collections::{BTreeMap, VecDeque};
 
 /// Most messages that are kept because an earlier one is missing.
 const MOST_EARLY: u32 = 256;
-/// Most messages that wait for a confirmation: far more than agents say that do not lie. Who makes an
-/// agent say more is no longer answered in the cycle.
+/// Most messages that wait for a confirmation: far more than honest agents ever cause. A neighbor that
+/// makes an agent say more is no longer answered in the cycle.
 const MOST_SAID: usize = 4096;
 
 /// One end of a link, for the time of a cycle.
@@ -30,7 +30,7 @@ pub(super) struct Link<M> {
     /// Number of the next message to come, and those that came before their time.
     next: u32,
     early: BTreeMap<u32, M>,
-    /// Whether to confirm what has come, and whether to send everything again.
+    /// Whether to confirm the messages received, and whether to send everything again.
     owes: bool,
     again: bool,
     /// Tick since which it waits for a confirmation, and the number of repetitions since something came.

@@ -1,5 +1,5 @@
-//! The messages of neighbors, and their form on the network. Whatever comes from there is checked
-//! here, once, before an agent sees it.
+//! The messages of neighbors, and their form on the network. All packets from there are checked here,
+//! once, before an agent sees them.
 
 use super::link::Parcel;
 use crate::rods::chain::is_in_range;
@@ -43,13 +43,13 @@ pub(super) struct Packet<const D: usize> {
 /// A message between neighbors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) enum Message<const D: usize> {
-    /// "I am here." The packet around it says who is lost.
+    /// "I am here." The packet around it names the lost connectors.
     Here,
     /// A master's "I am to go there. Can you follow?"
     Prepare(Prepare<D>),
     /// A slave's "I can, and so can all beyond me that have to."
     Consent(Consent<D>),
-    /// A slave's "I cannot, or somebody beyond me cannot."
+    /// A slave's "I cannot, or one beyond me cannot."
     Object(Objection),
     /// A master's "All of that motion is carried out", or none of it.
     Settle {
@@ -93,7 +93,7 @@ pub(super) struct Prepare<const D: usize> {
     pub(super) all_lengths: bool,
 }
 
-/// A slave's consent to a sub-step, with sums over all that react from it outward.
+/// A slave's consent to a sub-step, with sums over all connectors that react from it outward.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Consent<const D: usize> {
     /// The slave's place after the sub-step.

@@ -1,8 +1,8 @@
 //! Agents: the programs aboard the connectors of a chain, each with its own data.
 //!
-//! An agent knows its own connector, what its two neighbors tell it, and what its own sensors see
+//! An agent knows its own connector, its two neighbors' messages, and the perception of its own sensors
 //! ([`Sight`]). It is a state machine without a clock, a socket or a thread: packets and ticks in,
-//! packets out, and at the end of a cycle what its connector does ([`Control`]).
+//! packets out, and at the end of a cycle the motion of its connector ([`Control`]).
 //!
 //! ```text
 //! sight.rs, control.rs     in and out of a cycle; handed.rs: all decisions of a chain
@@ -19,9 +19,9 @@
 //!
 //! A motion is a wave. Its initiator asks one neighbor, which asks the next, until one need not
 //! move or the chain ends; consent or a veto comes back the same way. Then it asks the other one.
-//! So it prepares sub-step after sub-step, and nobody moves. Once all have consented it says
-//! "go", after a veto "stay". Who has consented and hears neither goes if its master goes: it feels
-//! the rod. So a vetoed motion leaves every connector where it was, whatever is lost.
+//! So it prepares sub-step after sub-step, and no connector moves. Once all have consented it says
+//! "go", after a veto "stay". One that has consented and hears neither goes if its master goes: it
+//! feels the rod. So a vetoed motion leaves every connector where it was, whatever is lost.
 
 mod connector;
 pub(crate) mod control;

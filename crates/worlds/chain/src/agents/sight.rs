@@ -21,7 +21,7 @@ pub struct Sight<const D: usize> {
     pub neighbors: [Option<Place<D>>; 2],
     /// Its bend limit in this cycle, rad.
     pub max_bend_rad: f64,
-    /// Obstacles that its sensors see: all that a motion of this cycle may bring it near to.
+    /// Obstacles that its sensors see: all those to which a motion of this cycle may bring it near.
     pub seen: Vec<Seen>,
     /// Whether its radio is dead in this cycle.
     pub is_silent: bool,
@@ -48,7 +48,7 @@ pub enum Role<const D: usize> {
 /// A leader's wish in a cycle: on its own account, or on the order of a planner or an operator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Wish<const D: usize> {
-    /// Its target: where it wants to be at the end of the cycle, meters.
+    /// Its target: its wished place at the end of the cycle, meters.
     pub to: Place<D>,
     /// The source of the wish.
     pub source: Source,
@@ -75,7 +75,7 @@ pub struct Seen {
 }
 
 impl Seen {
-    /// Returns an obstacle as it is seen.
+    /// Returns an obstacle as sensors see it.
     pub fn of<const D: usize>(obstacle: &Obstacle<D>) -> Self {
         let core = match &obstacle.core {
             Core::Point(at) => at.to_vec(),
@@ -110,7 +110,7 @@ impl<const D: usize> Sight<D> {
         self.neighbors.map(|place| place.map(|Place(at)| distance(self.at.0, at)))
     }
 
-    /// Returns the obstacles that are seen.
+    /// Returns the obstacles in sight.
     ///
     /// # Errors
     /// When some number of the sight makes no sense for connector `me` of `n`.

@@ -6,9 +6,9 @@ use crate::rods::geometry::{Point, in_dimensions, sub};
 use sidestep_kernel::InputError;
 use std::f64::consts::PI;
 
-/// Least length of rods whose joint can bring their ends together.
+/// Least length of rods with a joint that can bring their ends together.
 const LEAST_ROD_M: f64 = 1e-6;
-/// Greatest length of rods whose joint has no limits.
+/// Greatest length of rods with a joint without limits.
 const MOST_ROD_M: f64 = 1e6;
 
 /// An arm: its joints, its connectors, and the place of its base.
@@ -33,7 +33,7 @@ impl Arm {
         Self { values: follower.inside(values), skeleton, serial, at_m, follower }
     }
 
-    /// Returns the arm as a chain whose base is fixed: the guide of its joints. Joint limits become bend limits if
+    /// Returns the arm as a chain with a fixed base: the guide of its joints. Joint limits become bend limits if
     /// those are equivalent; the joints themselves keep to all of them.
     ///
     /// # Errors

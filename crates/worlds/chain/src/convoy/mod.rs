@@ -1,7 +1,7 @@
 //! A convoy: a leader on wheels and its followers, without a scenario, a tick at a time.
 //!
-//! It is a world of one chain that is simulated as every other (`act/`); a tick is a cycle. What is
-//! here is its design, and measures of its run.
+//! It is a world of one chain that is simulated as every other (`act/`); a tick is a cycle. This module
+//! holds its design, and measures of its run.
 
 mod measures;
 #[cfg(test)]
@@ -45,7 +45,7 @@ pub struct Plan {
     pub followers: usize,
     /// Distances that neighbors keep.
     pub rod: Rod,
-    /// Amount by which followers' connectors are larger than their bodies, meters.
+    /// Amount by which the followers' connectors are larger than their bodies, meters.
     pub margin_m: f64,
     /// Lag of a follower at which the leader stops, meters; from half of it on the leader slows
     /// down. Infinite for a leader that never waits.
@@ -112,7 +112,7 @@ pub struct Tick {
     pub is_vetoed: bool,
     /// Followers that were held back by their sensors.
     pub held: usize,
-    /// Followers whose bumper is pressed.
+    /// Followers with a pressed bumper.
     pub bumped: usize,
 }
 
@@ -185,7 +185,7 @@ impl Convoy {
         }
     }
 
-    /// Reads where everything is.
+    /// Reads the places of all robots.
     fn look(&mut self) {
         let body = self.run.state().body(0);
         self.chain.points_mut().copy_from_slice(body.chain.points());

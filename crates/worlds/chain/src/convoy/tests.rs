@@ -161,7 +161,7 @@ fn fifteen_followers_pass_the_corridor_and_no_bumper_is_pressed() {
     }
 }
 
-/// In 3 m the inner wall of a bend has a radius of 0.1 m, round which connectors are pulled three
+/// In 3 m the inner wall of a bend has a radius of 0.1 m, around which connectors are pulled three
 /// times as fast as the leader goes.
 #[test]
 fn a_leader_waits_for_late_followers_and_would_lose_them_otherwise() {
@@ -231,7 +231,7 @@ fn the_same_seed_gives_the_same_bits_and_another_seed_others() {
 
 #[test]
 fn a_leader_that_is_blocked_stands_or_turns_on_the_spot() {
-    // A box that leaves no room to swing round.
+    // A box that leaves no room to swing around.
     let corners = [[-0.3, -0.3], [0.3, -0.3], [0.3, 0.3], [-0.3, 0.3]];
     let walls = crate::rods::obstacle::outline(0, &corners, 0.0);
     let course = Course {

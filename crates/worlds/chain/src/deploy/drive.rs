@@ -41,7 +41,7 @@ impl<const D: usize> ChainWorld<D> {
         (first_tick(self.network.as_ref(), now), self.starts_s(now))
     }
 
-    /// Returns the faults of what one connector sends where each has a process of its own; none where the
+    /// Returns the faults of one connector's packets where each has a process of its own; none where the
     /// network is reliable.
     pub fn ether(&self) -> Option<Ether> {
         Some(Ether::new(self.network.clone()?, draws(self.streams)))
@@ -86,7 +86,7 @@ impl Air<'_> {
         }
     }
 
-    /// Lets an agent take what has arrived, look at the clock, and answer.
+    /// Lets an agent take the arrived packets, look at the clock, and answer.
     fn step<const D: usize>(&mut self, k: usize, agent: &mut ConnectorAgent<D>, tick: u64) {
         let is_due = agent.next_timer().is_some_and(|due| due <= tick);
         if self.busy_until[k] >= tick {

@@ -2,13 +2,12 @@
 //!
 //! - `direct`: one process moves a whole chain. The reference.
 //! - `team`: an agent per connector ([`crate::agents`]), which knows its own connector, its two
-//!   neighbors and what its sensors see. On a faultless network every connector is where `direct`
-//!   puts it, bit for bit, because nobody needs to know more: scenarios in which somebody would are
-//!   refused (`crate::scenario::deployment`).
+//!   neighbors and its sensors' view. On a faultless network every connector is where `direct` puts it,
+//!   bit for bit, because no agent needs to know more: scenarios in which one would are refused
+//!   (`crate::scenario::deployment`).
 //!
-//! A deployment shows the connectors of a chain what they perceive (`sense.rs`), lets their agents
-//! talk over a network in memory (`drive.rs`) or elsewhere (`elsewhere.rs` of the world), and carries their decisions
-//! out (`outcome.rs`).
+//! A deployment gives the connectors of a chain their perception (`sense.rs`), lets their agents talk over a network
+//! in memory (`drive.rs`) or elsewhere (`elsewhere.rs` of the world), and carries their decisions out (`outcome.rs`).
 
 mod drive;
 pub(crate) mod kind;

@@ -6,8 +6,7 @@ use crate::rods::geometry::{Point, distance};
 use crate::rods::scene::fits;
 
 /// Returns the new places of a chain's connectors. At most one motion is carried out, all of it: where
-/// the decision of somebody who takes part in it is missing, is another one, or would tear a rod,
-/// nobody moves.
+/// a participant's decision is missing, is another one, or would tear a rod, no connector moves.
 pub(crate) fn settled<const D: usize>(
     chain: &Chain<D>,
     controls: &[Option<Control<D>>],

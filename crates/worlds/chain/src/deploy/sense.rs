@@ -10,7 +10,7 @@ use crate::world::{ChainSpec, ChainWorld};
 use sidestep_kernel::network::Network;
 use sidestep_kernel::{Cycle, EntityId};
 
-/// Distance beyond all that a motion needs, meters: far more than tolerances and rounding.
+/// Distance beyond that needed by any motion, meters: far more than tolerances and rounding.
 const SPARE_M: f64 = 1e-3;
 
 impl<const D: usize> ChainWorld<D> {
@@ -20,7 +20,7 @@ impl<const D: usize> ChainWorld<D> {
         before.sum::<usize>() as EntityId
     }
 
-    /// Returns what the connectors of a chain perceive; `leader` has a part of its own.
+    /// Returns the perception of a chain's connectors; `leader` has a part of its own.
     pub(crate) fn sights(
         &self,
         (chain, now): (EntityId, Cycle),
@@ -54,9 +54,9 @@ impl<const D: usize> ChainWorld<D> {
         (0..n).map(sight).collect()
     }
 
-    /// Returns the distance in which a connector's sensors see all that a motion of a cycle may bring
-    /// its rods near to, meters. Its master is at most a rod's length away, its own place at most
-    /// another one, and both go on for as many sub-steps as the initiator makes.
+    /// Returns the distance in which a connector's sensors see everything to which a motion of a cycle
+    /// may bring its rods near, meters. Its master is at most a rod's length away, its own place at
+    /// most another one, and both go on for as many sub-steps as the initiator makes.
     fn sees_m(&self, spec: &ChainSpec<D>) -> f64 {
         let chain = &spec.start;
         let longest_m = chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);

@@ -1,4 +1,4 @@
-//! A team does what one process does, bit for bit, and nothing at all where it cannot be sure.
+//! A team moves as one process does, bit for bit, and not at all where it cannot be sure.
 
 mod hostile;
 mod scenarios;
@@ -22,7 +22,7 @@ use sidestep_kernel::Seed;
 use sidestep_kernel::network::Network;
 use sidestep_kernel::stream::Streams;
 
-/// A network with some faults, whose talks have all the time they need.
+/// A network with some faults and all the time that talks need.
 fn network(loss: f64, delay: f64, duplication: f64, deadline: f64) -> Network {
     Network {
         loss,
@@ -86,7 +86,7 @@ fn talked<const D: usize>(
     run(talk, &mut agents, sights(chain, obstacles, leader, &wish))
 }
 
-/// Makes random motions by both; returns the number of those that moved something, and of the vetoes.
+/// Makes random motions in both ways; returns the number of those that moved something, and of the vetoes.
 fn compared<const D: usize>(seed: u64, network: Option<&Network>, tries: usize) -> (usize, usize) {
     let mut world = AnyWorld::<D>::new(seed);
     let rules = Rules { self_collision: false, backtracks: 0, ..world.rules };

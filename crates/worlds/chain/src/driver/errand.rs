@@ -8,7 +8,7 @@ use crate::rods::geometry::{
 use crate::rods::veto::Motion;
 use sidestep_kernel::math::{cos, sin};
 
-/// One request of a cycle: what moves, from where, and to where.
+/// One request of a cycle: the moving part, its start and its destination.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Errand<const D: usize> {
     /// The connector, or the first of a rod's two.

@@ -1,9 +1,9 @@
-//! Orders from outside, and what came of the last ones.
+//! Orders from outside, and the outcome of the last ones.
 
 use super::Objection;
 use serde::{Deserialize, Serialize};
 
-/// The share of the state that belongs to whoever decides from outside.
+/// The share of the state that belongs to a caller that decides from outside.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct External {
     /// Orders for the next cycle.
@@ -21,11 +21,11 @@ pub(crate) struct Orders {
     pub(crate) rod: Option<u32>,
     /// The last target of either sort; without one nothing moves.
     pub(crate) target: Option<Target>,
-    /// Whether the chain goes as far as it can where it cannot go all the way.
+    /// Whether the chain goes as far as possible where it cannot go all the way.
     pub(crate) goes_far: bool,
 }
 
-/// Places to which something shall go; in the plane the last coordinate is 0.
+/// Places to which a connector or a rod shall go; in the plane the last coordinate is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Target {
     /// A connector.
@@ -47,7 +47,7 @@ pub(crate) struct Answer {
     pub(crate) done_share: f64,
     /// The objection, if there was one.
     pub(crate) veto: Option<Objection>,
-    /// The obstacle because of which.
+    /// The obstacle that caused it.
     pub(crate) obstacle: Option<u32>,
 }
 
@@ -98,7 +98,7 @@ impl Orders {
     pub(crate) const ROD: &str = "rod";
     /// The order that gives the targets of its ends.
     pub(crate) const ROD_TO: &str = "rod_to_m";
-    /// The order that says what a veto on the way does.
+    /// The order that gives the effect of a veto on the way.
     pub(crate) const REACH: &str = "reach";
 
     /// Notes an order by its name.

@@ -8,7 +8,7 @@ use sidestep_kernel::math::{cos, sin};
 
 /// Approximate length of a piece of wall: bends are polygons of such pieces.
 pub const WALL_PIECE_M: f64 = 0.16;
-/// Longest corridor; longer ones are taken for a mistake.
+/// Longest corridor; longer ones are taken as a mistake.
 const MAX_LENGTH_M: f64 = 1e6;
 
 /// A part of a corridor's center line.
@@ -40,7 +40,7 @@ impl Leg {
         }
     }
 
-    /// Returns what is wrong with it, if anything.
+    /// Returns its fault, if it has one.
     fn fault(self) -> Option<String> {
         let is_good = |x: f64| x > 0.0 && x <= MAX_LENGTH_M;
         let is_good_turn = |deg: f64| deg != 0.0 && deg.abs() <= 3600.0;

@@ -1,7 +1,7 @@
 //! Courses of moving obstacles, as functions of time.
 //!
 //! Every course is a closed formula of time: nothing keeps a state, any worker computes any
-//! obstacle at any moment, and a checkpoint needs nothing but the time.
+//! obstacle at any moment, and a checkpoint needs only the time.
 
 use crate::rods::geometry::{Bounds, Point, between, distance, is_finite, norm, scaled, sub, unit};
 use crate::rods::obstacle::Obstacle;
@@ -22,7 +22,7 @@ pub enum Course<const D: usize> {
         /// The room that its whole body never leaves.
         room: Bounds<D>,
     },
-    /// A round from way point to way point. The middle of the body is at the first one at time 0.
+    /// A tour from way point to way point. The middle of the body is at the first one at time 0.
     Patrol {
         /// Way points, at least two; neighbors lie apart.
         way_points: Vec<Point<D>>,

@@ -9,7 +9,7 @@ use sidestep_kernel::{InputError, Seed};
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
-/// Largest number of obstacles; more are taken for a mistake.
+/// Largest number of obstacles; more are taken as a mistake.
 const MAX_OBSTACLES: f64 = 1e7;
 /// Attempts to find a place for an obstacle before the search fails.
 const ATTEMPTS: u64 = 1000;
@@ -157,15 +157,15 @@ struct Clear<const D: usize> {
     keep_m: f64,
 }
 
-/// Room around a query, meters, so that no rounding leaves out what is just as far as it may be.
+/// Room around a query, meters, so that no rounding leaves out a body exactly as far away as allowed.
 const ROUNDING_M: f64 = 1e-6;
 
 impl<const D: usize> Clear<D> {
-    /// Returns bodies from which things of about `size_m` keep a distance.
+    /// Returns bodies from which obstacles of about `size_m` keep a distance.
     fn new(bodies: &[Core<D>], keep_m: f64, size_m: f64) -> Result<Self, InputError> {
         let body = |(k, core): (u32, &Core<D>)| Obstacle::still(k, *core, 0.0);
         let bodies = (0..).zip(bodies).map(body).collect();
-        // Sets the cells of a grid, never the result.
+        // Determines the cells of a grid, never the result.
         let reach_m = size_m + 2.0 * keep_m;
         let reach_m = if reach_m.is_finite() { reach_m.max(1e-3) } else { 1.0 };
         Ok(Self { bodies: Obstacles::new(bodies, reach_m)?, keep_m })

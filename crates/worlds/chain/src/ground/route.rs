@@ -42,7 +42,7 @@ pub(crate) struct Start {
     pub(crate) points: Vec<Point<2>>,
 }
 
-/// Counts of what was missing if no start was found.
+/// Counts that explain why no start was found.
 #[derive(Debug, Default)]
 struct Wanting {
     free_places: u32,
@@ -53,11 +53,10 @@ struct Wanting {
 /// Returns a start for a chain on a site, from the seed and the chain's `number` alone; `obstacles` are all obstacles
 /// there.
 /// Random places are tried. From a free one, a breadth-first search finds the places that are the
-/// most steps away within the chain's reach; the way to one of them, pulled straight, is where the
-/// chain lies.
+/// most steps away within the chain's reach; the chain lies on the way to one of them, pulled straight.
 ///
 /// # Errors
-/// When sizes are not positive, or there is no room, with what was missing.
+/// When sizes are not positive, or there is no room, with the cause.
 pub(crate) fn find(
     site: &Site,
     obstacles: &Obstacles<2>,
@@ -186,7 +185,7 @@ impl Search<'_> {
     }
 
     /// Returns connectors along a way, each at the spacing from the one before; `None` if it is too
-    /// short, or a rod would come too near to something.
+    /// short, or a rod would come too near to an obstacle.
     fn lay(&self, way: &[Point<2>]) -> Option<Vec<Point<2>>> {
         let Wanted { connectors, spacing_m, rod_clearance_m, .. } = *self.wanted;
         let (mut points, mut leg, mut part) = (vec![way[0]], 0, 0.0);

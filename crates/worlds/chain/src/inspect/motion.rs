@@ -1,4 +1,4 @@
-//! The rung of the ladder, who moved, the robots that follow, and what comes of it.
+//! The rung of the ladder, the connectors that moved, the robots that follow, and the outcome.
 
 use super::{Asked, line};
 use crate::motion::replan::Climbed;
@@ -104,7 +104,7 @@ impl<const D: usize> Asked<'_, D> {
         );
     }
 
-    /// Tells what comes of it.
+    /// Tells the outcome.
     pub(super) fn comes_out(&self, told: &mut Inspection) {
         let mut table = Table::new(["event", "connector", "with", "value"]);
         for event in &self.scratch.events {

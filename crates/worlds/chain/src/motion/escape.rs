@@ -35,7 +35,7 @@ pub(crate) use threat::Part;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// All constraints of a tick are solved at once; who is caught is led out.
+    /// All constraints of a tick are solved at once; caught parts are led out.
     #[default]
     Simultaneous,
     /// One part after the other becomes an initiator, the deepest first (slide P2).
@@ -50,8 +50,8 @@ pub struct Escape {
     /// Greatest speed: no connector is farther from its place at the start of the tick than this
     /// times the tick; infinite for no limit.
     pub speed_max_m_s: f64,
-    /// Number of ticks before contact at which parts give way, with 0.05 m to spare; 0 for only on
-    /// contact.
+    /// Number of ticks before contact at which parts give way, with 0.05 m to spare; 0 to give way only
+    /// on contact.
     pub ticks_ahead: f64,
     /// Most violations that the literal escape handles in a tick; at least half of them are
     /// contacts.
@@ -107,13 +107,13 @@ pub struct Escaped<const D: usize> {
     pub capped: usize,
     /// Depth of the deepest part still in a moving obstacle, meters; 0 if none is.
     pub deepest_m: f64,
-    /// The part that is left.
+    /// The part that is still in one.
     pub left: Option<Left<D>>,
     /// The first part that got away: its connector, or the one at the start of its rod, and the
     /// obstacle that it got away from.
     pub first: Option<(usize, u32)>,
-    /// Whether the chain is pressed: it needs all its speed to get away, so whoever leads should
-    /// give way. Only the simultaneous escape tells.
+    /// Whether the chain is pressed: it needs all its speed to get away, so its leader should give way.
+    /// Only the simultaneous escape tells.
     pub is_pressed: bool,
 }
 
@@ -128,8 +128,8 @@ pub struct Left<const D: usize> {
     pub veto: Option<Veto<D>>,
 }
 
-/// Leads chains out of the way. It owns its buffers and remembers nothing from tick to tick; what
-/// has to be remembered of a chain is in its [`WayOut`].
+/// Leads chains out of the way. It owns its buffers and remembers nothing from tick to tick; a chain's
+/// memory is in its [`WayOut`].
 #[derive(Debug, Clone)]
 pub struct Escaper<const D: usize> {
     rules: Escape,
@@ -185,8 +185,8 @@ impl<const D: usize> Escaper<D> {
         chooses.then(|| (CHOOSES_EVERY_S / dt_s).round().max(1.0) as u64)
     }
 
-    /// Lets the leader of a chain choose between its wish and resting: for what brings parts of the chain inside of
-    /// what moves for the least time. The choice is in `way_out`.
+    /// Lets the leader of a chain choose between its wish and resting, whichever keeps parts of the chain
+    /// inside moving obstacles for less time. The choice is in `way_out`.
     pub(crate) fn choose(
         &self,
         (chain, obstacles): (&Chain<D>, &Obstacles<D>),

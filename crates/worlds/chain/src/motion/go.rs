@@ -1,4 +1,4 @@
-//! One motion of a chain: by propagation, or by a reach if a connector objects that is held.
+//! One motion of a chain: by propagation, or by a reach if a held connector objects.
 
 use crate::arms::ik::{Engine, Goal, Solver};
 use crate::rods::chain::{Chain, Connector, Mobility};
@@ -89,7 +89,7 @@ fn held<const D: usize>(
     order: &Reach<D>,
     objection: &Veto<D>,
 ) -> Result<Outcome<D>, InputError> {
-    // A connector that has failed is no base of an arm: what hangs on it swings as it did.
+    // A connector that has failed is no base of an arm: the parts that hang on it swing as they did.
     let joints_m = match objection.reason {
         Reason::Fixed => propagator.rules.joint_step_max_m,
         _ => f64::INFINITY,
@@ -100,9 +100,9 @@ fn held<const D: usize>(
     })
 }
 
-/// Tries a motion that goes as much less far as it takes for no connector to go farther than `joints_m`.
-/// Near a singular posture connectors go much farther than the initiator. An attempt also returns the
-/// longest way of a connector for which its outcome counts as a motion, meters.
+/// Tries a motion, shortened until no connector goes farther than `joints_m`. Near a singular posture
+/// connectors go much farther than the initiator. An attempt also returns the longest way of a connector
+/// for which its outcome counts as a motion, meters.
 fn slowed<const D: usize>(
     chain: &mut Chain<D>,
     (k, to): (usize, Point<D>),
@@ -173,7 +173,7 @@ fn reached<const D: usize>(
     })
 }
 
-/// Most attempts to find how far an initiator may go.
+/// Most attempts to find the distance that an initiator may go.
 const MOST_SLOWED: usize = 16;
 /// Part of the limit that an attempt aims at, because near singular postures joints slow down less
 /// than the initiator.
@@ -196,7 +196,7 @@ fn by_posture<const D: usize>(
     }
     let goal = Goal { engine: Engine::Dls, restarts: 0, tolerance_m, ..Goal::new(k, base, target) };
     let answer = Solver::new(rules).solve(chain, obstacles, &goal)?;
-    // The solver knows of no other connector than the base that is held.
+    // The solver knows of no held connector other than the base.
     let is_held = |c: &Connector<D>, at: Point<D>, to: Point<D>| match c.is_still() {
         true => at == to,
         false => c.mobility.allows(to, at),
@@ -225,7 +225,7 @@ fn out_of_reach<const D: usize>(chain: &Chain<D>, order: &Reach<D>) -> Option<us
         let (connector, at) = (&chain.connectors()[*i], chain.points()[*i]);
         let [from, to] = [order.k.min(*i), order.k.max(*i)];
         let reach_m: f64 = chain.rods()[from..to].iter().map(|rod| rod.max_m).sum();
-        // What has failed may be repaired, so it is told as such.
+        // A failed connector may be repaired, so it is reported as failed.
         !connector.failed
             && distance(connector.mobility.project(order.target, at), order.target)
                 > reach_m + order.tolerance_m
@@ -240,7 +240,7 @@ const LONGEST_JUMP: f64 = 0.5;
 /// Distance at which a connector's step counts as complete, meters.
 pub(crate) const TOLERANCE_M: f64 = 1e-7;
 
-/// Returns what has moved, by comparison.
+/// Returns the connectors that have moved, by comparison.
 fn moved_since<const D: usize>(before: &[Point<D>], chain: &Chain<D>, k: usize) -> Moved<D> {
     let ways_m = before.iter().zip(chain.points()).map(|(a, b)| distance(*a, *b));
     let slaves = ways_m.enumerate().filter(|(i, _)| *i != k);
@@ -270,7 +270,7 @@ mod tests {
     }
 
     /// Drags the tool out to 0.1 mm less than the reach; returns the longest way of any connector in a
-    /// request, and how far from the base the tool comes.
+    /// request, and the greatest distance of the tool from the base.
     fn dragged_out(joint_step_max_m: f64) -> (f64, f64) {
         let (mut chain, step_m) = (arm(), 0.01);
         let mut propagator = Propagator::new(Rules { joint_step_max_m, ..Rules::default() });
@@ -308,8 +308,8 @@ mod tests {
         }
     }
 
-    /// Leads connector `k` of seven to places one after the other; returns what is left to the farthest
-    /// from its place, and the longest way of a connector in a request.
+    /// Leads connector `k` of seven to places one after the other; returns the remaining distance of
+    /// the one farthest from its place, and the longest way of a connector in a request.
     fn led(held: &[(usize, Mobility<2>)], k: usize, places: &[Point<2>]) -> (f64, f64) {
         let points = vec![
             [0.0, 0.0],

@@ -1,4 +1,4 @@
-//! Ways for a chain to get somewhere, made of motions of its rods.
+//! Ways of a chain to a place, made of motions of its rods.
 //!
 //! ```text
 //! go.rs:     one motion; the objection of a fixed base is answered by a reach

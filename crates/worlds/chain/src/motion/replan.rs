@@ -2,7 +2,7 @@
 //!
 //! A ladder with six rungs: shorter steps, other headings, a turn on the spot, waiting, letting the
 //! other end of the chain lead for a while, and the report that it is stuck. Each rung is tried
-//! once in a tick, and the first that works ends the climb. The slides do not say what follows a
+//! once in a tick, and the first that works ends the climb. The slides leave open the reaction to a
 //! veto; the other end leads because a chain can be pulled out of a fold that it was pushed into. A
 //! planner or an operator gets the veto and no ladder.
 
@@ -33,7 +33,7 @@ const FAN_RAD: [f64; 5] = [0.4, 0.8, 1.2, 1.6, 2.0];
 pub struct Rungs {
     /// Turns on the spot in a row before this rung is given up.
     pub turns: u32,
-    /// Ticks of waiting in a row while something moves nearby.
+    /// Ticks of waiting in a row while an obstacle moves nearby.
     pub waits: u32,
     /// Ticks for which the other end leads.
     pub pull_back: u32,
@@ -57,7 +57,7 @@ pub struct Situation {
     /// Distance of its goal, if it has one, meters. Without a goal there is no progress to miss,
     /// and detours through the same place are not counted.
     pub goal_distance_m: Option<f64>,
-    /// Whether something moves nearby, so that waiting may help.
+    /// Whether an obstacle moves nearby, so that waiting may help.
     pub movers_near: bool,
     /// Whether its drive can turn on the spot.
     pub can_turn: bool,
@@ -231,7 +231,7 @@ impl<M: Moves<D>, const D: usize> Climb<'_, M, D> {
 }
 
 impl Ladder {
-    /// Returns a ladder whose initiator has met nothing yet.
+    /// Returns a ladder whose initiator has met no veto yet.
     pub fn new(rungs: Rungs) -> Self {
         Self { rungs, memory: Memory::default() }
     }
@@ -385,8 +385,7 @@ impl Ladder {
     ) -> Result<Climbed<D>, M::Failure> {
         self.memory.starts_afresh();
         if climb.vetoes.is_empty() {
-            // Its detours have led nowhere, and it has tried nothing since, so ask what is in the
-            // way.
+            // Its detours have led nowhere, and it has tried nothing since, so ask for the objection.
             let request = Request { mode: Mode::Exact, ..climb.wanted };
             climb.by.objection(&request)?.into_iter().for_each(|veto| climb.note(veto));
         }
@@ -419,7 +418,7 @@ pub(crate) fn farther_end(k: usize, n: usize) -> usize {
 
 /// Returns planes and turns in the order in which they are tried. If no side is known to be good,
 /// the least turn comes first; otherwise all of that side before the other, so that the chain does
-/// not alternate between two ways round.
+/// not alternate between two ways around.
 fn fan(memory: &Memory, planes: usize) -> impl Iterator<Item = (usize, f64)> + use<> {
     let side = f64::from(memory.side_or_left());
     let keeps_side = memory.side != 0;

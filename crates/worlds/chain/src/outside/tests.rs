@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 
 mod answers;
 
-/// Two chains under orders among discs, a wall and what moves, one that decides for itself, and one
-/// that takes orders once it has rested.
+/// Two chains under orders among discs, a wall and moving obstacles, one that decides for itself, and
+/// one that takes orders once it has rested.
 const MIXED: &str = r#"
 [[obstacles]]
 at_m = [1.0, 0.2]
@@ -99,8 +99,8 @@ fn order(run: &mut dyn Simulation, order: &str, agent: u32, values: &[f64]) {
         .unwrap_or_else(|error| panic!("{error}"));
 }
 
-/// A policy that depends on what it observes: away from what is near, else ahead; every third cycle it turns
-/// a rod instead, every fifth the tail leads.
+/// A policy that depends on its observations: away from anything near, else ahead; every third cycle it
+/// turns a rod instead, every fifth the tail leads.
 fn decide(run: &mut dyn Simulation, team: usize) {
     let (seen, now) = (observed(run, team), run.cycle());
     let agents = run.teams()[team].agents.clone();
@@ -122,7 +122,7 @@ fn decide(run: &mut dyn Simulation, team: usize) {
     }
 }
 
-/// Decides for all that take orders, for `cycles` cycles.
+/// Decides for all chains that take orders, for `cycles` cycles.
 fn decided(run: &mut dyn Simulation, cycles: u64) {
     for _ in 0..cycles {
         let teams: Vec<usize> =
@@ -250,7 +250,7 @@ fn gaps_are_observed_as_the_chain_itself_meets_them() {
         let measured_m = run.agent_metrics()[0]["min_clearance_m"].as_f64();
         let look_m = run.world().look_m;
         assert_eq!(measured_m.unwrap_or(look_m), least_m.min(look_m), "cycle {}", run.cycle());
-        // The way to what is near is as long as the gap and the radius, 0.05 m.
+        // The way to a near surface is as long as the gap and the radius, 0.05 m.
         let ways = seen["nearest_m"].as_chunks::<2>().0.iter().zip(&seen["gap_m"]);
         for (way, gap_m) in ways.filter(|(_, gap_m)| **gap_m < look_m) {
             assert!((norm(*way) - 0.05 - gap_m).abs() < 1e-9, "{way:?} {gap_m}");
@@ -273,7 +273,7 @@ fn another_chain_is_observed_where_it_is() {
     assert!(seen["nearest_m"][6] == 0.0 && (seen["nearest_m"][7] - 0.15).abs() < 1e-12);
 }
 
-/// Refusals, and a part of the message that says what would be right.
+/// Refusals, and a part of the message that names the remedy.
 #[test]
 fn what_cannot_be_obeyed_is_refused_and_nothing_of_it_noted() {
     let mut run = plane(MIXED, 1);

@@ -70,7 +70,7 @@ pub(super) fn clamped(d: f64, min_m: f64, max_m: f64) -> f64 {
     if t < max_m { t } else { max_m }
 }
 
-/// Most rounds that bring a place into a box and back onto a rod's lengths.
+/// Most rounds of bringing a place into a box and back to an allowed length of the rod.
 const TURNS_INTO_A_BOX: usize = 200;
 
 /// Relative rounding of ways.
@@ -212,7 +212,7 @@ impl<const D: usize> Scene<'_, D> {
     }
 
     /// Applies the union rule: for the rod's length, and for others it may have, finds the nearest
-    /// directions that are free of everything.
+    /// directions free of all obstacles.
     fn rotate(
         &self,
         step: &Step<D>,
@@ -297,8 +297,8 @@ impl<const D: usize> Scene<'_, D> {
         distance(step.so, at) > self.rules.slave_step_max_m * (1.0 + ROUNDING)
     }
 
-    /// Collects everything that a rod of a length may meet on any side. The order is that of the
-    /// grid or the tree, and must not matter, so ties go to the lower name.
+    /// Collects all blocks that a rod of a length may meet on any side. The order is that of the grid
+    /// or the tree, and must not matter, so ties go to the lower name.
     fn collect(&self, step: &Step<D>, length_m: f64, work: &mut Work<D>) {
         let reach_m = length_m + step.rod.radius_m.max(step.tip_radius_m) + 2.0 * SKIN_M;
         work.blocks.clear();

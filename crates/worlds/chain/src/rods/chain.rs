@@ -13,8 +13,8 @@ pub(crate) const LENGTH_TOLERANCE_M: f64 = 1e-9;
 /// Largest coordinate: farther from the origin, rounding is no longer small against the tolerances.
 pub(crate) const MAX_COORDINATE_M: f64 = 1e6;
 
-/// Returns whether a connector may be at a point at all: it must be finite, and at most 1e6 m from the
-/// origin along every axis.
+/// Returns whether a connector may be at a point at all: the point must be finite, and at most 1e6 m
+/// from the origin along every axis.
 pub(crate) fn is_in_range<const D: usize>(point: &Point<D>) -> bool {
     point.iter().all(|x| x.abs() <= MAX_COORDINATE_M)
 }
@@ -136,7 +136,7 @@ pub struct Chain<const D: usize> {
 /// Part of its greatest length below which the least length of a rod means that its ends can come together.
 const CLOSED: f64 = 1e-3;
 
-/// Returns the least of radii and rods. Rods that can close say nothing about how long a step may be; they count only
+/// Returns the least of radii and rods. Rods that can close give no measure for the length of a step; they count only
 /// where there is nothing else.
 fn least_m(rods: &[Rod], radii: impl Iterator<Item = f64>) -> f64 {
     let least = |all: &mut dyn Iterator<Item = f64>| all.fold(f64::INFINITY, f64::min);
@@ -231,7 +231,7 @@ impl<const D: usize> Chain<D> {
         Self::new(points, vec![connector; n_rods + 1], vec![rod; n_rods])
     }
 
-    /// Returns a chain of connector `k` alone, to which moves and steps count as in this one.
+    /// Returns a chain of connector `k` alone, in which moves and steps count as in this one.
     pub(super) fn alone(&self, k: usize) -> Self {
         let connector = self.connectors[k];
         Self {
@@ -309,8 +309,8 @@ impl<const D: usize> Chain<D> {
         1e-12 * self.still.longest_m
     }
 
-    /// Returns how far an initiator goes at once if something may be in the way, meters: a quarter
-    /// of the least rod or radius; rods that can close do not count.
+    /// Returns the distance that an initiator goes at once if anything may be in the way, meters: a
+    /// quarter of the least rod or radius; rods that can close do not count.
     pub fn step_m(&self) -> f64 {
         0.25 * self.still.least_m
     }

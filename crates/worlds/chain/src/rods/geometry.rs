@@ -200,8 +200,8 @@ impl<const D: usize> Core<D> {
         }
     }
 
-    /// Returns whether no point of the core is nearer than `reach_m` to a segment. The answer is that of
-    /// the distance, but faster in the usual case.
+    /// Returns whether no point of the core is nearer than `reach_m` to a segment. It agrees with the
+    /// distance, but is faster in the usual case.
     #[inline]
     pub fn is_clear_of_segment(&self, [p, q]: [Point<D>; 2], reach_m: f64) -> bool {
         if reach_m <= 0.0 {

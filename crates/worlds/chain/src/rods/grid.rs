@@ -18,8 +18,8 @@ const ENTRIES_PER_BOX: usize = 64;
 const CELLS_PER_BOX: usize = 64;
 
 impl<const D: usize> Grid<D> {
-    /// Builds the grid anew, in the memory it has. Queries measure about `reach_m`, which sets the
-    /// size of the cells, never the result.
+    /// Builds the grid anew, in the memory it has. Queries measure about `reach_m`, which determines
+    /// the size of the cells, never the result.
     pub(crate) fn rebuild(&mut self, bounds: impl Iterator<Item = Bounds<D>>, reach_m: f64) {
         self.bounds.clear();
         self.bounds.extend(bounds);

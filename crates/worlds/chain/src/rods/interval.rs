@@ -3,7 +3,7 @@
 //! A rod turns about its master. The directions in which a rod of one length meets one convex
 //! obstacle are one interval: how wide the obstacle, grown by the rod's radius and cut to the reach
 //! of the rod, looks from the master. A thicker connector at the rod's end adds arcs, a bend limit
-//! one more interval. The rod turns to the free direction nearest to where the slave was, on either
+//! one more interval. The rod turns to the free direction nearest to the slave's old place, on either
 //! side. That is the smallest turn that clears everything at once; avoiding one obstacle after the
 //! other would lead from one into the next.
 
@@ -420,7 +420,7 @@ mod tests {
         run(cases(1_000_000));
     }
 
-    /// Returns how deep the rod, or its end, would be in any core, meters.
+    /// Returns the depth of the rod, or its end, in any core, meters.
     fn depth_m(reach: &Reach, cores: &[Core<2>], [rod_m, tip_m]: [f64; 2], angle_rad: f64) -> f64 {
         let end = tip(reach, angle_rad);
         let depth_m = |core: &Core<2>| {

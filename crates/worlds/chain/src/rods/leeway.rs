@@ -1,8 +1,8 @@
 //! Proof that a motion brings no two parts of a chain near each other, without a look at each.
 //!
-//! Every rod once measured how far away the parts are that could be in its way. Since then nothing
-//! has come nearer to it than twice the longest way of any connector, which an odometer sums up.
-//! Rods whose room is used up measure again; most need not for many motions.
+//! Every rod once measured the distance of the parts that could be in its way. Since then none has come
+//! nearer to it by more than twice the longest way of any connector, which an odometer sums up. Rods
+//! that have used up their room measure again; most need not do so for many motions.
 
 use super::chain::Chain;
 use super::geometry::{
@@ -12,7 +12,7 @@ use super::own_body::OwnBody;
 
 /// Rods between which no distance is measured: they touch by construction, or nearly so.
 const NEIGHBORS: usize = 2;
-/// Distance that is kept beyond what is needed, meters: far more than rounding.
+/// Distance that is kept beyond the one needed, meters: far more than rounding.
 const SPARE_M: f64 = 1e-8;
 /// Distance up to which parts are searched, in lengths of the longest rod.
 const LOOK_LENGTHS: f64 = 1.5;
@@ -31,7 +31,7 @@ pub(super) struct Leeway<const D: usize> {
     points: Vec<Point<D>>,
     /// Twice the ways of everything so far, meters.
     odometer_m: f64,
-    /// The odometer's reading at which something could touch each rod.
+    /// The odometer's reading at which a part could touch each rod.
     until_m: Vec<f64>,
     /// Boxes of the rods without their thickness, and the odometer's reading when they were right.
     tree: OwnBody<D>,
@@ -44,7 +44,7 @@ impl<const D: usize> Leeway<D> {
         chain.rods().len() >= FEWEST_RODS
     }
 
-    /// Notes where a chain is, whichever it is and however it came there.
+    /// Notes the places of a chain, whichever it is and however it came there.
     pub(super) fn note(&mut self, chain: &Chain<D>) {
         if self.points.len() != chain.points().len() || self.odometer_m > MOST_M {
             self.begin(chain);
@@ -92,7 +92,7 @@ impl<const D: usize> Leeway<D> {
     pub(super) fn allows(&mut self, chain: &Chain<D>, way_m: f64) -> bool {
         self.travel(way_m);
         // On its way every part was at most so far from where it is, and rods keep a distance from
-        // what they pass that is at most what they need at rest.
+        // the parts they pass that is at most the one needed at rest.
         let needed_m = 2.0 * chain.thickest_m() + 3.0 * way_m + SPARE_M;
         for rod in 0..self.until_m.len() {
             if self.until_m[rod] - self.odometer_m >= needed_m {
@@ -107,7 +107,7 @@ impl<const D: usize> Leeway<D> {
         true
     }
 
-    /// Returns the distance of a rod from everything that can be in its way, up to the distance
+    /// Returns the distance of a rod from all parts that can be in its way, up to the distance
     /// searched, meters.
     fn measured_m(&mut self, chain: &Chain<D>, rod: usize, needed_m: f64) -> f64 {
         let look_m = needed_m + LOOK_LENGTHS * chain.longest_m();

@@ -116,7 +116,7 @@ impl<const D: usize> Obstacles<D> {
     }
 
     /// Returns obstacles for chains whose longest rod, with its ends, measures about `reach_m`;
-    /// that sets the cells of the grid, never the result.
+    /// that determines the cells of the grid, never the result.
     ///
     /// # Errors
     /// When a number is not finite, a radius is negative, or an obstacle is farther than 1e7 m
@@ -191,7 +191,7 @@ impl<const D: usize> Obstacles<D> {
         }
     }
 
-    /// Returns the obstacle with the lowest id of those that a capsule is in.
+    /// Returns the obstacle with the lowest id among those that a capsule overlaps.
     pub(crate) fn first_at(&self, [p, q]: [Point<D>; 2], radius_m: f64) -> Option<u32> {
         let mut first: Option<u32> = None;
         self.visit(&Bounds::of(&[p, q]).grown(radius_m.max(0.0)), |o| {
@@ -204,7 +204,7 @@ impl<const D: usize> Obstacles<D> {
     }
 
     /// Returns the least distance of a capsule's surface from the obstacles within `look_m`;
-    /// `look_m` if nothing is as near.
+    /// `look_m` if none is as near.
     pub fn clearance_m(&self, [p, q]: [Point<D>; 2], radius_m: f64, look_m: f64) -> f64 {
         let mut least_m = look_m;
         self.visit(&Bounds::of(&[p, q]).grown(radius_m + look_m), |o| {

@@ -12,7 +12,7 @@ use super::geometry::{Point, distance, dot, sub};
 use super::pass::{Direction, Tally};
 use super::scene::fits;
 
-/// The rule by which a slave counts as staying where it is.
+/// The rule by which a slave counts as staying in place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Stays {
     /// The new place is the old one, bit for bit.

@@ -2,7 +2,7 @@
 //!
 //! Neighbors along the chain are neighbors in space, so the tree over the index needs no sorting
 //! and never changes its shape. A rod that moves gets its new box at once; the boxes above it grow
-//! as far as they must, and shrink at the start of the next motion, which refits what has changed.
+//! as far as they must, and shrink at the start of the next motion, which refits the changed leaves.
 
 use super::geometry::Bounds;
 use std::ops::Range;
@@ -22,7 +22,7 @@ pub(crate) struct OwnBody<const D: usize> {
 }
 
 impl<const D: usize> OwnBody<D> {
-    /// Fits the tree to boxes: all of it if their number is new, otherwise around those that differ.
+    /// Fits the tree to boxes: all of it if their number is new, otherwise only around those that differ.
     pub(crate) fn refit(&mut self, boxes: impl ExactSizeIterator<Item = Bounds<D>>) {
         if boxes.len() != self.rods.len() {
             return self.rebuild(boxes);

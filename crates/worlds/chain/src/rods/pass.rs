@@ -25,7 +25,7 @@ impl Tally {
         (self.from, self.to) = (self.from.min(run.start), self.to.max(run.end));
     }
 
-    /// Adds the results of a motion of its own.
+    /// Adds the results of a separate motion.
     pub(super) fn add(&mut self, motion: &Self) {
         self.touch(motion.from..motion.to);
         self.changed += motion.changed;

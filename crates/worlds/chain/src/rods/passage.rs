@@ -7,7 +7,7 @@
 //!
 //! Moving obstacles move between requests, when a world advances them. One that is fast and thin
 //! may jump over a rod and touch it neither before nor after: a ball only if it moves at once by
-//! more than twice its radius and the rod's together. A caller that advances obstacles so fast asks
+//! more than twice its radius and the rod's together. A caller that advances obstacles that fast asks
 //! [`passed`], which looks at the motion relative to each of them.
 
 use super::chain::Chain;
@@ -134,7 +134,7 @@ mod tests {
             let mut obstacles = Obstacles::new(vec![ball], 1.0).unwrap();
             obstacles.advance(1.0);
             let told = passed(&rod_at(after), &before, &obstacles, 1.0).is_some();
-            // Test many times: a point that crosses comes nearer than any gap between them.
+            // Tests many times: a point that crosses comes nearer than any gap between them.
             let apart_m = |k: i32| {
                 let time = f64::from(k) / 2000.0;
                 let rod = [0, 1].map(|end| between(before[end], after[end], time));

@@ -19,7 +19,7 @@ use apart::Proofs;
 use sidestep_kernel::{InputError, interrupt};
 use std::ops::Range;
 
-/// Most sub-steps of a request; one that would take more is refused.
+/// Most sub-steps of a request; one that would need more is refused.
 const MAX_SUB_STEPS: f64 = 1e6;
 /// Number of sub-steps from one look at whether to go on to the next.
 const LOOKS_EVERY: usize = 16;
@@ -93,7 +93,7 @@ impl<const D: usize> Propagator<D> {
         Self { rules, ..Self::default() }
     }
 
-    /// Moves a chain as requested, in sub-steps if something may be in the way.
+    /// Moves a chain as requested, in sub-steps if anything may be in the way.
     ///
     /// # Errors
     /// When a target is not finite or more than 1e6 m from the origin, or the chain does not have
@@ -192,7 +192,7 @@ impl<const D: usize> Propagator<D> {
         followed
     }
 
-    /// Finds new places for the heads and everything that follows them.
+    /// Finds new places for the heads and all connectors that follow them.
     fn sweep_from(
         &mut self,
         chain: &Chain<D>,
@@ -431,7 +431,7 @@ impl<const D: usize> Propagator<D> {
     }
 }
 
-/// Returns whether nothing but the chain itself can be in the way of a motion.
+/// Returns whether only the chain itself can be in the way of a motion.
 fn is_open<const D: usize>(chain: &Chain<D>, obstacles: &Obstacles<D>, heads: &Heads<D>) -> bool {
     obstacles.is_empty() && chain.is_plain() && heads.n == 1
 }

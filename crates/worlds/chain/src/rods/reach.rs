@@ -1,10 +1,10 @@
-//! An arm's reach: moving one connector of a chain that others hold: a fixed base, a base on a line, on a
+//! An arm's reach: moving one connector of a chain held by others: a fixed base, a base on a line, on a
 //! plane or in a box, two ends, or any of them in between.
 //!
 //! A connector that is held vetoes a pull of rods of fixed length that would take it away, so its objection
-//! is answered by return passes: all that is held moves tentatively, and is then led back, to its place if it
-//! is fixed and to the nearest one that it may have if it is not. All passes and the check of the whole way
-//! are one transaction.
+//! is answered by return passes: all held connectors move tentatively, and are then led back, each to its
+//! place if it is fixed, and to the nearest one allowed if it is not. All passes and the check of the whole
+//! way are one transaction.
 
 use super::chain::{Chain, LENGTH_TOLERANCE_M, Mobility};
 use super::geometry::{Point, distance};
@@ -16,13 +16,13 @@ use sidestep_kernel::{InputError, interrupt};
 
 /// Most double passes before the search is given up.
 const MAX_DOUBLE_PASSES: usize = 40;
-/// Most double passes where several connectors are held, whose return passes disturb each other.
+/// Most double passes where several connectors are held, because their return passes disturb each other.
 const MAX_MUTUAL_PASSES: usize = 400;
 /// Least relative gain of a double pass; one that brings the connector nearer by less ends the
 /// search.
 const LEAST_GAIN: f64 = 1e-4;
 /// Distance from their places within which several held connectors count as being back; each is put
-/// there exactly then, which takes up a tenth of what rods may be out of their lengths.
+/// there exactly then, which takes up a tenth of the tolerance of the rods' lengths.
 const BACK_M: f64 = 0.1 * LENGTH_TOLERANCE_M;
 
 /// The target of a connector, and the base.
@@ -57,7 +57,7 @@ pub(crate) enum Reached<const D: usize> {
     },
 }
 
-/// A connector that is held, its place before, and what it was.
+/// A connector that is held, its place before, and its constraint.
 #[derive(Debug, Clone, Copy)]
 struct Held<const D: usize> {
     k: usize,
@@ -77,8 +77,8 @@ impl<const D: usize> Held<D> {
     }
 }
 
-/// Moves a connector to a target while the base keeps its place, bit for bit, and whoever else is held
-/// stays where it may be.
+/// Moves a connector to a target while the base keeps its place, bit for bit, and all other held
+/// connectors stay at allowed places.
 ///
 /// # Errors
 /// As [`Propagator::propagate`]; also when the chain does not have the base.
@@ -121,7 +121,7 @@ pub(crate) fn reach<const D: usize>(
     came
 }
 
-/// Returns the connectors that may not go anywhere, and the base.
+/// Returns the connectors that are not free to go anywhere, and the base.
 fn held<const D: usize>(chain: &Chain<D>, order: &Reach<D>) -> Vec<Held<D>> {
     let is_held = |k: usize| {
         let connector = &chain.connectors()[k];
@@ -163,8 +163,8 @@ fn passes<const D: usize>(
     Ok(Reached::Short { nearest, veto: None })
 }
 
-/// Leads the initiator to its target, and then all that is held back; returns the objection, if there is
-/// one.
+/// Leads the initiator to its target, and then all held connectors back; returns the objection, if there
+/// is one.
 fn double_pass<const D: usize>(
     propagator: &mut Propagator<D>,
     chain: &mut Chain<D>,
@@ -182,7 +182,7 @@ fn double_pass<const D: usize>(
         if let Outcome::Vetoed(veto) = propagator.propagate(chain, obstacles, &request)? {
             return Ok(Some(veto));
         }
-        // A last move shorter than the least counts as none, so who is held is put exactly home.
+        // A last move shorter than the least counts as none, so a held connector is put exactly home.
         if pass > 0 {
             chain.points_mut()[k] = to;
         }
@@ -190,13 +190,13 @@ fn double_pass<const D: usize>(
     Ok(None)
 }
 
-/// Returns how far the held connector that is farthest from its place is from it, meters.
+/// Returns the greatest distance of a held connector from its place, meters.
 fn astray_m<const D: usize>(chain: &Chain<D>, held: &[Held<D>]) -> f64 {
     let off_m = held.iter().map(|h| distance(chain.points()[h.k], h.place(chain)));
     off_m.fold(0.0, f64::max)
 }
 
-/// Puts all that is held exactly where it belongs, if it is as good as there; returns whether it is.
+/// Puts all held connectors exactly where they belong, if they are as good as there; returns whether they are.
 fn settle<const D: usize>(chain: &mut Chain<D>, held: &[Held<D>]) -> bool {
     let is_back = astray_m(chain, held) <= BACK_M;
     for h in held.iter().filter(|_| is_back) {
@@ -206,8 +206,8 @@ fn settle<const D: usize>(chain: &mut Chain<D>, held: &[Held<D>]) -> bool {
     is_back
 }
 
-/// Returns what is in the way from the old state to the new one, because no pass has checked that
-/// whole way.
+/// Returns the veto of an obstacle on the way from the old state to the new one, because no pass has
+/// checked that whole way.
 fn blocked_way<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,

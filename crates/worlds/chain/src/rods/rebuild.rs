@@ -131,7 +131,7 @@ fn is_whole<const D: usize>(chain: &Chain<D>, low: usize, high: usize) -> bool {
 /// Returns the least number of rods, each as long as the longest, that fill a gap.
 fn missing(rods: &[Rod], gap_m: f64) -> usize {
     let longest_m = rods.iter().map(|rod| rod.max_m).fold(0.0, f64::max);
-    // A gap of a whole number of rods is no part longer because of rounding.
+    // A gap of a whole number of rods needs no further part because of rounding.
     ((gap_m - LENGTH_TOLERANCE_M) / longest_m).ceil().max(1.0) as usize
 }
 
@@ -267,8 +267,7 @@ mod tests {
         assert!(reform(&mut chain, 0..=3, MayCome::Nobody).is_err());
     }
 
-    /// Chains of which parts are wanting, so that those left reach across the gap with `part` of
-    /// their length.
+    /// Chains with missing parts, so that those left reach across the gap with `part` of their length.
     fn wanting<const D: usize>(seed: u64, part: f64) -> Chain<D> {
         let mut numbers = Numbers::new(seed);
         let parts = 3 + seed as usize % 18;

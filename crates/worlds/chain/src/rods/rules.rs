@@ -3,7 +3,7 @@
 /// Reaction of a rod that hits an obstacle (slides A7, A8).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Rotation {
-    /// Turns to the nearest direction that is free of everything at once: the default.
+    /// Turns to the nearest direction free of all obstacles at once: the default.
     #[default]
     Union,
     /// Turns once, to the tangent of the obstacle that is hit nearest to the master, as the slides
@@ -25,7 +25,7 @@ pub struct Rules {
     /// Longest move of a slave in one sub-step, meters; infinite for no limit.
     pub slave_step_max_m: f64,
     /// Longest move of any connector in one request that a fixed base answers, meters; infinite for
-    /// no limit. Near singular postures the initiator goes as much less far as that takes.
+    /// no limit. Near singular postures the initiator goes only as far as that allows.
     pub joint_step_max_m: f64,
     /// Number of times that one sweep may try another direction for an earlier slave.
     pub backtracks: usize,

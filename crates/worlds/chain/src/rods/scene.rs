@@ -237,8 +237,8 @@ impl<'a, const D: usize> Scene<'a, D> {
     }
 }
 
-/// Returns how deep a rod or its end is in a block, and the reason; `None` if all is well. No point
-/// of the rod moves by more than `way_m`.
+/// Returns the depth of a rod or its end in a block, and the reason; `None` if all is well. No point of
+/// the rod moves by more than `way_m`.
 fn objection<const D: usize>(
     step: &Step<D>,
     s: Point<D>,
@@ -273,7 +273,7 @@ fn was_inside<const D: usize>(step: &Step<D>, block: &Block<D>) -> bool {
     depth_m(step.mo, step.so, step, block) > TOLERANCE_M
 }
 
-/// Returns how deep a rod, or the connector at its end, is in a block, meters; negative outside.
+/// Returns the depth of a rod, or of the connector at its end, in a block, meters; negative outside.
 fn depth_m<const D: usize>(m: Point<D>, s: Point<D>, step: &Step<D>, block: &Block<D>) -> f64 {
     let rod_m =
         block.radius_m + step.rod.radius_m - block.core.nearest_to_segment([m, s]).distance_m;

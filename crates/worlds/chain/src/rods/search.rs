@@ -1,5 +1,5 @@
-//! A search for a direction of a rod in space that is free of everything nearby, because the
-//! blocked directions on a sphere have no order.
+//! A search for a direction of a rod in space that is free of all obstacles nearby, because the blocked
+//! directions on a sphere have no order.
 //!
 //! First the rod turns away from the worst obstacle, again and again; that is nearly always enough.
 //! If it is not, rings of directions around the wanted one are tried from the narrowest on, and the

@@ -9,9 +9,8 @@ use super::geometry::{
     Point, add, along, between, distance, first_axis, perpendicular, scaled, sub, unit,
 };
 
-/// Returns places for the joints of rods from `a` to `b`; rods that span another distance are as
-/// near to it as they can be. They lie straight if they can be so short, and as a triangle
-/// otherwise.
+/// Returns places for the joints of rods from `a` to `b`; rods that cannot span this gap come as near
+/// to it as they can. They lie straight if they can be so short, and as a triangle otherwise.
 pub(super) fn joints<const D: usize>(a: Point<D>, b: Point<D>, rods: &[Rod]) -> Vec<Point<D>> {
     let gap_m = distance(a, b);
     let least_m: f64 = rods.iter().map(|rod| rod.min_m).sum();
@@ -96,7 +95,7 @@ mod tests {
         [rods.iter().map(folded_m).fold(0.0, f64::max), most_m]
     }
 
-    /// The same by another way: rod after rod, the nearest and farthest place of the last end.
+    /// The same in another way: rod after rod, the nearest and farthest place of the last end.
     fn rod_by_rod_m(rods: &[Rod]) -> [f64; 2] {
         rods.iter().fold([0.0, 0.0], |[near_m, far_m], rod| {
             let folded_m = (near_m - rod.max_m).max(rod.min_m - far_m).max(0.0);

@@ -1,10 +1,10 @@
-//! A test whether a rod passes through something between two good positions.
+//! A test whether a rod passes through a solid between two good positions.
 //!
 //! Both ends go straight from their old to their new place. In the plane the test is exact: the rod
 //! passes a core only where its moving end crosses it, or where an end of the core crosses the rod.
-//! In space a rod may go round anything, so only its distance counts: it is never nearer to the
-//! core than half of the distance that it must keep at rest. [`super::passage`] describes what that
-//! does and does not guarantee.
+//! In space a rod may go around anything, so only its distance counts: it is never nearer to the core
+//! than half of the distance that it must keep at rest. [`super::passage`] describes the guarantees of
+//! that and their limits.
 
 use super::geometry::{Core, Point, along, between, cross_2d, cross_each_other, dot, sub};
 

@@ -1,7 +1,7 @@
-//! Requests to move, and their outcomes: a move, or a veto that says which part objects and why.
+//! Requests to move, and their outcomes: a move, or a veto that names the objecting part and the reason.
 //!
-//! A veto is an outcome, not an error (slides R1, R6 to R9). The source of the request decides what
-//! follows: an autonomous mover plans again, a planner or an operator gets a report.
+//! A veto is an outcome, not an error (slides R1, R6 to R9). The source of the request decides the next
+//! step: an autonomous mover plans again, a planner or an operator gets a report.
 
 use super::geometry::Point;
 use serde::{Deserialize, Serialize};
@@ -74,7 +74,7 @@ pub enum Reason {
     Failed,
     /// A connector would leave the line, plane or box that it belongs on.
     Mobility,
-    /// Something blocks the place where the initiator wants to go.
+    /// An obstacle blocks the initiator's target.
     TargetBlocked,
     /// Every direction of a rod is blocked.
     BothSidesBlocked,

@@ -89,7 +89,7 @@ struct Front<const D: usize> {
 }
 
 impl<const D: usize> Front<D> {
-    /// Returns positions apart from each other, which nothing reads.
+    /// Returns positions apart from each other, which are never read.
     fn nobody() -> Self {
         Self { rows: [std::array::from_fn(|w| -4.0 * w as f64); D] }
     }
@@ -135,7 +135,7 @@ struct Motions<const D: usize, const MEASURES: bool> {
     connectors: usize,
     limits: Limits,
     least_move_m: f64,
-    /// Length of a move above which a slave surely moves; -1 in lanes without a motion, which nothing asks.
+    /// Length of a move above which a slave surely moves; -1 in lanes without a motion, where it is never read.
     surely_m: [f64; LANES],
     /// Whether a lane's last slave stayed, and whether its motion has ended.
     rests: [bool; LANES],
@@ -185,7 +185,8 @@ impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
             }
         }
         let d = square.map(f64::sqrt);
-        // Whether every lane is at a slave that moves. All lanes are looked at, for a search would branch at each.
+        // Whether every lane is at a slave that moves. All lanes are looked at, because a search would branch at
+        // each.
         let mut one_by_one = self.is_mixed || j < self.n || j >= self.connectors;
         let mut part = [0.0; LANES];
         for w in 0..LANES {
@@ -239,7 +240,7 @@ impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
             let [mo, mn, so] = [next.get(w), now.get(w + 1), now.get(w)];
             let rod =
                 Rod { min_m: self.limits.min_m[w], max_m: self.limits.max_m[w], radius_m: 0.0 };
-            // As a sweep ends: at a slave that stays, if the rod beyond is good as it is.
+            // The way a sweep ends: at a slave that stays, if the rod beyond is good as it is.
             self.ended[w] |= self.rests[w] && fits(rod, distance(mn, so));
             if self.ended[w] {
                 next.set(w + 1, so);
@@ -279,7 +280,7 @@ impl<const D: usize, const MEASURES: bool> Motions<D, MEASURES> {
 }
 
 /// Makes as many motions as there are heads, at most one per lane. Lanes without a head, not yet at
-/// a connector, or past the last one hold values that nothing reads.
+/// a connector, or past the last one hold values that are never read.
 fn pull_lanes<const D: usize, const MEASURES: bool>(
     chain: &mut Chain<D>,
     heads: &[Point<D>],
@@ -290,7 +291,7 @@ fn pull_lanes<const D: usize, const MEASURES: bool>(
     let nobody = Rod { min_m: 1.0, max_m: 1.0, radius_m: 0.0 };
     let (mut now, mut next) = (Front::nobody(), Front::nobody());
     for j in 0..points.len() + n - 1 {
-        // Past the last, never at the place before, so that no rod has length zero.
+        // Past the last connector, never at the place before, so that no rod has length zero.
         let beyond = || super::geometry::scaled(super::geometry::first_axis(), 4.0 * j as f64);
         now.set(0, points.get(j).copied().unwrap_or_else(beyond));
         motions.limits.shift(rods.get(j.wrapping_sub(1)).copied().unwrap_or(nobody));
@@ -302,7 +303,7 @@ fn pull_lanes<const D: usize, const MEASURES: bool>(
         if j + 1 >= n {
             points[j + 1 - n] = next.get(n);
             if motions.have_ended() {
-                // Nothing changes what earlier lanes have left behind.
+                // The places left behind by earlier lanes no longer change.
                 let count = points.len();
                 for w in (0..n - 1).filter(|&w| j - w < count) {
                     points[j - w] = next.get(w + 1);
@@ -365,7 +366,7 @@ mod tests {
             assert_eq!(at_once.points(), single.points());
             assert_eq!(measured.changed, expected.changed);
             assert_eq!(measured.longest_m.to_bits(), expected.longest_m.to_bits());
-            // Rods that nothing moved are measured once, before.
+            // Rods that did not move are measured once, before.
             let most_m = measured.max_rod_violation_m.max(start.max_rod_violation_m());
             let expected_m = expected.max_rod_violation_m.max(start.max_rod_violation_m());
             assert_eq!(most_m.to_bits(), expected_m.to_bits());

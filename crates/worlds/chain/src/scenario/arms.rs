@@ -31,7 +31,7 @@ pub(super) struct ArmSection {
 }
 
 impl<const D: usize> Compiler<'_, D> {
-    /// Returns an arm whose base is at `at_m`.
+    /// Returns an arm with its base at `at_m`.
     pub(super) fn arm(
         &self,
         section: &Spanned<ArmSection>,

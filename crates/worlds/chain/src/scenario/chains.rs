@@ -28,7 +28,7 @@ use std::sync::Arc;
 const ROOM: f64 = 1.2;
 /// Room for robots that follow their connectors on wheels, meters.
 const MARGIN_M: f64 = 0.08;
-/// Keys of a chain that an arm has none of, and the arm.
+/// Keys of a chain that an arm does not have, and the arm.
 const BESIDE_ARMS: [&str; 11] = [
     "connectors",
     "points_m",
@@ -47,7 +47,7 @@ const MAX_STEPS: f64 = 1e5;
 /// Most connectors of all chains together: some 3 GB.
 const MAX_CONNECTORS: usize = 10_000_000;
 
-/// Everything that is there when the chains of a section are placed.
+/// Everything already present when the chains of a section are placed.
 #[derive(Clone, Copy)]
 struct Around<'a, const D: usize> {
     site: Option<&'a Site>,
@@ -264,7 +264,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(changes)
     }
 
-    /// Refuses to join what has not been broken by then, by the cycles in which both take effect.
+    /// Refuses to join a chain that has not been broken by then, by the cycles in which both take effect.
     fn breaks_before_it_is_whole_again(
         &self,
         s: &ChainSection<D>,
@@ -283,7 +283,7 @@ impl<const D: usize> Compiler<'_, D> {
         }
     }
 
-    /// Refuses a speed that would take too many sub-steps per cycle to be practical.
+    /// Refuses a speed that would need too many sub-steps per cycle to be practical.
     fn check_steps(
         &self,
         chain: &Chain<D>,
@@ -300,7 +300,7 @@ impl<const D: usize> Compiler<'_, D> {
         Err(self.source.error(at, cause, remedy))
     }
 
-    /// Refuses a speed of escapes that would take too many sub-steps: the literal way out goes step by step.
+    /// Refuses a speed of escapes that would need too many sub-steps: the literal way out goes step by step.
     pub(super) fn check_escapes(
         &self,
         chains: &[ChainSpec<D>],
@@ -447,8 +447,8 @@ impl<const D: usize> Compiler<'_, D> {
         Ok((chain.map_err(|error| self.source.error_of(at, &error))?, Some(Arc::new(arm))))
     }
 
-    /// Refuses an arm whose base may move, and changes that take it apart: its connectors are where its joints put
-    /// them.
+    /// Refuses an arm with a base that may move, and changes that take it apart: its joints determine the places
+    /// of its connectors.
     fn stays_whole(
         &self,
         s: &ChainSection<D>,
@@ -614,7 +614,7 @@ impl<const D: usize> Compiler<'_, D> {
 }
 
 /// Returns the places of connectors in legs there and back, each beside the one before: to the left in the plane. The
-/// legs and what is between them are as many rods as come nearest to their lengths, one at least.
+/// legs and the spans between them have as many rods as come nearest to their lengths, one at least.
 fn folded<const D: usize>(
     n: usize,
     (start, u): (Point<D>, Point<D>),

@@ -44,7 +44,7 @@ pub(super) struct ChangeSection<const D: usize> {
 }
 
 impl<const D: usize> ChangeSection<D> {
-    /// Returns the cycle at whose start it takes effect.
+    /// Returns the cycle at the start of which it takes effect.
     fn cycle(&self, dt_s: f64) -> u64 {
         (self.at_s.get() / dt_s).round() as u64
     }
@@ -59,7 +59,7 @@ impl<const D: usize> ChangeSection<D> {
         self.connector == Some(connector) && (self.failed == Some(false) || self.mobility.is_some())
     }
 
-    /// Returns whether it would take an arm from where its joints can put it: apart, or off its base.
+    /// Returns whether it would take an arm away from any place that its joints allow: apart, or off its base.
     pub(super) fn takes_apart(&self) -> bool {
         self.scatter.is_some() || (self.connector == Some(0) && self.mobility.is_some())
     }

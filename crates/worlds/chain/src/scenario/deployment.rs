@@ -1,4 +1,4 @@
-//! Scenarios whose chains agents can move that know nothing but their neighbors and what they see.
+//! Scenarios in which agents that know only their neighbors and their own perception can move the chains.
 
 use super::{ChainSpec, Compiler};
 use crate::deploy::kind::Deployment;
@@ -8,7 +8,7 @@ use crate::rods::rules::Rules;
 use crate::world::What;
 use sidestep_kernel::InputError;
 
-/// A key, the reason why its value needs somebody who sees the whole chain, and the remedy.
+/// A key, the reason why its value needs a view of the whole chain, and the remedy.
 type NotLocal = (String, String, &'static str);
 
 impl<const D: usize> Compiler<'_, D> {

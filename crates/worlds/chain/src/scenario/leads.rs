@@ -1,4 +1,4 @@
-//! Refusals of tasks whose connector can never do them.
+//! Refusals of tasks that their connector can never do.
 
 use super::super::arms::arm::Arm;
 use super::super::driver::{Driver, Task};
@@ -11,8 +11,8 @@ use sidestep_kernel::InputError;
 use sidestep_scenario::Spanned;
 
 impl<const D: usize> Compiler<'_, D> {
-    /// Refuses a task that moves a connector which is fixed or has failed, and targets off the line, the
-    /// plane or the box on which it belongs, unless a change may let it go.
+    /// Refuses a task that moves a fixed or failed connector, and targets off the line, the plane or the
+    /// box on which it belongs, unless a change may let it go.
     pub(super) fn can_lead(
         &self,
         s: &ChainSection<D>,
@@ -88,7 +88,7 @@ mod tests {
     use crate::scenario::Compiled;
     use sidestep_scenario::Source;
 
-    /// Compiles a chain of four whose first connector is limited, with a task.
+    /// Compiles a chain of four with a limited first connector and a task.
     fn told(limit: &str, task: &str, change: &str) -> Option<String> {
         let text = format!(
             "format = 1\nworld = \"chain\"\n[[chains]]\nconnectors = 4\nrod_m = 0.5\n\
@@ -130,7 +130,7 @@ mod tests {
         assert!(cause.starts_with("target 1 is 0.3000 m off"), "{cause}");
     }
 
-    /// Compiles the shipped arm with a task, and what it is given beside that.
+    /// Compiles the shipped arm with a task and further keys.
     fn told_of_arm(beside: &str, task: &str) -> Option<String> {
         let text = format!(
             "format = 1\nworld = \"chain\"\n[chain]\ndimensions = 3\n[[chains]]\n\

@@ -103,7 +103,7 @@ pub(super) struct NavigatorSection {
     leave_rule: Option<bool>,
     /// Way to turn.
     turning: TurningWord,
-    /// The answer to something that moves ahead.
+    /// The answer to a body that moves ahead.
     movers: MoversWord,
     /// Number of beams of the laser.
     beams: Option<usize>,
@@ -141,7 +141,7 @@ pub(super) struct RobotsSection {
 }
 
 impl<const D: usize> Compiler<'_, D> {
-    /// Returns a navigator that drives with `speed_m_s`.
+    /// Returns a navigator that drives at `speed_m_s`.
     pub(super) fn navigator(
         &self,
         section: Option<&Spanned<NavigatorSection>>,
@@ -184,7 +184,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(middle.map(|(line, width_m)| Goal::EndOf { line, width_m }))
     }
 
-    /// Returns the robots of a swarm whose leader drives with `speed_m_s`.
+    /// Returns the robots of a swarm with a leader that drives at `speed_m_s`.
     pub(super) fn robots(
         &self,
         section: &Spanned<RobotsSection>,

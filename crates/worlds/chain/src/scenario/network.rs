@@ -12,7 +12,7 @@ use sidestep_scenario::network::{Names, Wrong, check_sides, during, for_ever};
 
 pub(super) type NetworkSection = sidestep_scenario::network::NetworkSection<Connectors>;
 
-/// A while in which a connector's radio is dead: it sends nothing, hears nothing, and knows it.
+/// A period in which a connector's radio is dead: it sends nothing, hears nothing, and knows it.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Silence {
@@ -29,7 +29,7 @@ pub(super) struct Silence {
     until_s: f64,
 }
 
-/// A while in which no message gets from one side to another. Connectors on no side hear all, and are
+/// A period in which no message gets from one side to another. Connectors on no side hear all, and are
 /// heard by all.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -47,21 +47,21 @@ pub(super) struct Partition {
     until_s: f64,
 }
 
-/// A while in which a link between two neighbors works one way only.
+/// A period in which a link between two neighbors works one way only.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct OneWay {
     /// Number of the connector that is heard by the other.
     sender: u32,
-    /// Number of its neighbor, whose messages do not reach it.
+    /// Number of its neighbor, which it does not hear.
     receiver: u32,
     /// Number of the chain.
     #[serde(default)]
     chain: EntityId,
-    /// Start of that while, in seconds after the start of the run.
+    /// Start of that period, in seconds after the start of the run.
     #[serde(default)]
     from_s: f64,
-    /// End of that while, in seconds after the start of the run; infinite unless given.
+    /// End of that period, in seconds after the start of the run; infinite unless given.
     #[serde(default = "for_ever")]
     until_s: f64,
 }

@@ -76,10 +76,10 @@ pub(super) struct ObstacleSection<const D: usize> {
     #[serde(default)]
     radius_m: f64,
     turn_deg: Option<f64>,
-    /// Velocity of one that moves straight on.
+    /// Velocity of an obstacle that moves straight on.
     velocity_m_s: Option<Place<D>>,
     bounces_m: Option<[Place<D>; 2]>,
-    /// Way-points of one that goes from one to the next.
+    /// Way points of an obstacle that goes from one to the next.
     patrol_m: Option<Vec<Place<D>>>,
     closed: Option<bool>,
     /// Speed along them.
@@ -156,7 +156,7 @@ impl<const D: usize> Compiler<'_, D> {
         })
     }
 
-    /// Returns all obstacles but those at random places, which keep away from chains.
+    /// Returns all obstacles except those at random places, which keep away from chains.
     fn given(&self, site: Option<&Site>) -> Result<Gathered<D>, InputError> {
         let mut all = Gathered { still: Vec::new(), movers: Vec::new(), next_id: 0 };
         self.add_corridor(&mut all)?;
@@ -169,7 +169,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(all)
     }
 
-    /// Returns what a chain has to be placed between: all obstacles but those at random places, where they are at the
+    /// Returns the obstacles among which a chain is placed: all except those at random places, as they are at the
     /// start, and the parts of the chains that are placed already.
     pub(super) fn in_the_way(
         &self,
@@ -385,7 +385,7 @@ impl<const D: usize> Compiler<'_, D> {
         let widest = chains.iter().flat_map(|spec| spec.start.connectors());
         let widest_m = widest.map(|c| c.radius_m).fold(0.0, f64::max);
         let keep_m = widest_m + s.keep_m.unwrap_or(KEEP_M);
-        // Every field has places of its own.
+        // Every field has its own places.
         let seed = Seed(self.head.seed.wrapping_add(number << 32));
         let Limits { least, greatest } = s.radius_m;
         match (s.part, s.n, s.speed_m_s) {

@@ -27,7 +27,7 @@ impl<const D: usize> Recipe<D> {
         Ok(Self { source: source.clone(), head, file, site })
     }
 
-    /// Returns whether the seed decides what is there at the start: obstacles, or where a chain begins.
+    /// Returns whether the seed decides anything at the start: obstacles, or the place of a chain.
     pub(crate) fn draws_start(&self) -> bool {
         !self.file.fields.0.is_empty() || self.file.is_anywhere()
     }
@@ -69,8 +69,8 @@ impl<const D: usize> ChainFile<D> {
 }
 
 impl<const D: usize> Compiled<D> {
-    /// Returns the same scenario with another seed: what compiling it with that seed would give. Only what the
-    /// seed draws is made anew, random obstacles and chains that start anywhere; all else is shared.
+    /// Returns the same scenario with another seed: the result of compiling it with that seed. Only the parts
+    /// that the seed draws are made anew, random obstacles and chains that start anywhere; all else is shared.
     /// `None` where no scenario was read.
     ///
     /// # Errors

@@ -10,7 +10,7 @@ use super::obstacles::Ground;
 use sidestep_kernel::{InputError, Slot};
 use std::ops::Range;
 
-/// A part of a chain that is inside something.
+/// A part of a chain that is inside a solid.
 #[derive(Debug, Clone, Copy)]
 struct Inside {
     /// The part's connector; for a rod the one before it.
@@ -20,8 +20,8 @@ struct Inside {
 }
 
 impl<const D: usize> Compiler<'_, D> {
-    /// Refuses chains that start in obstacles, or in each other, because no motion leads out of
-    /// there without passing through something.
+    /// Refuses chains that start in obstacles, or in each other, because every motion out of there
+    /// would pass through a solid.
     pub(super) fn starts(
         &self,
         chains: &[ChainSpec<D>],
@@ -73,7 +73,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 }
 
-/// Returns the deepest part of a chain in anything that is not called `own`.
+/// Returns the part of a chain that is deepest in anything not called `own`.
 fn deepest<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,

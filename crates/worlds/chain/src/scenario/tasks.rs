@@ -32,7 +32,7 @@ enum Kind {
     Targets,
     /// Drives on wheels, with a laser, along walls.
     Navigate,
-    /// Goes to where a caller orders, cycle by cycle.
+    /// Goes where a caller orders, cycle by cycle.
     External,
 }
 
@@ -80,7 +80,7 @@ impl<const D: usize> TaskSection<D> {
         self.speed_m_s.map_or(SPEED_M_S, f64::from)
     }
 
-    /// Returns whether it plans ways, on a chain that has a fixed base or has none.
+    /// Returns whether it plans ways, on a chain with or without a fixed base.
     fn plans(&self, has_base: bool) -> bool {
         match self.planner {
             Some(planner) => planner == PlannerWord::RrtConnect,
@@ -222,7 +222,7 @@ impl<const D: usize> Compiler<'_, D> {
         let keys = keys.map(|(key, is_given, kind)| (key, is_given, kind == s.kind));
         let of = format!("in a task of kind {:?}", s.kind).to_lowercase();
         self.has_no_idle_key(&keys, &of, at.clone())?;
-        // A caller sees each veto, and decides itself when to give up; who rests wants nothing.
+        // A caller sees each veto, and decides itself when to give up; a resting chain wants nothing.
         let is_patient = !matches!(s.kind, Kind::External | Kind::Rest);
         let keys = [("patience_s", s.patience_s.is_some(), is_patient)];
         self.has_no_idle_key(&keys, &of, at.clone())?;

@@ -60,13 +60,13 @@ impl Script {
     ///
     /// # Errors
     /// When the text is too long, is no script, or uses procedures or parameters that it does not
-    /// have; the error names line, column and what was expected there.
+    /// have; the error names the line, the column and the token expected there.
     pub fn parse(place: &str, text: &str) -> Result<Self, InputError> {
         parse::script(place, text)
     }
 
-    /// Returns the motions of an initiator that is at `start`, one after the other. After an error
-    /// there are no more.
+    /// Returns the motions of an initiator that is at `start`, one after the other. None follow after
+    /// an error.
     pub fn motions(&self, start: Turtle) -> Motions<'_> {
         Motions::new(self, start)
     }

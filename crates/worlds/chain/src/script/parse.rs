@@ -16,7 +16,7 @@ type Input<'a> = LocatingSlice<&'a str>;
 /// Words that cannot name a procedure.
 const RESERVED: [&str; 8] = ["forward", "turn", "pitch", "wait", "goto", "repeat", "to", "end"];
 
-/// Statements, listed in errors if something else is found.
+/// Statements, listed in errors if anything else is found.
 const STATEMENTS: &str = "a statement (forward, turn, pitch, wait, goto, repeat, a procedure)";
 
 pub(super) fn script(place: &str, text: &str) -> Result<Script, InputError> {
@@ -60,7 +60,7 @@ fn check_nesting(place: &str, text: &str) -> Result<(), InputError> {
     Ok(())
 }
 
-/// Returns what was expected, and what was found.
+/// Returns the expected and the found token, in words.
 fn words(error: &ContextError, rest: &str) -> (String, String) {
     let expected = error.context().find_map(|context| match context {
         StrContext::Expected(value) => Some(value.to_string()),

@@ -117,7 +117,7 @@ fn what_never_ends_is_stopped() {
     let nested = "repeat 1 [".repeat(100_000);
     assert!(error_of(&nested).cause().contains("64 brackets"));
     assert!(error_of(&" ".repeat(MAX_BYTES + 1)).cause().contains("bytes"));
-    // A long sum is no deep one.
+    // A long sum is not deep.
     assert_at(end_of(&format!("forward 0{}", " + 1".repeat(100_000))), [100_000.0, 0.0, 0.0]);
 }
 

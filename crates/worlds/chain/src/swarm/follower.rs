@@ -23,7 +23,7 @@ pub struct Follower {
     pub ring: Ring,
     /// Speed per distance from the connector, beyond the connector's own speed.
     pub gain_per_s: f64,
-    /// Turn rate per angle between its heading and where it wants to go.
+    /// Turn rate per angle between its heading and its wanted direction.
     pub turn_gain_per_s: f64,
     /// Time to collision that it keeps: it goes no faster than that allows.
     pub horizon_s: f64,
@@ -165,9 +165,9 @@ impl Follower {
 /// Returns the part of its speed at which a leader may go, given the largest lag of a follower: it
 /// slows down from half the limit on.
 ///
-/// A connector that is pulled round a sharp corner goes up to three times as fast as the leader,
-/// too fast for wheels. A late follower cuts the corner and gets stuck there. Therefore each robot
-/// reports its lag to the robot before it, as it would report a veto, and the leader slows down.
+/// A connector that is pulled around a sharp corner goes up to three times as fast as the leader, too
+/// fast for wheels. A late follower cuts the corner and gets stuck there. Therefore each robot reports
+/// its lag to the robot before it, as it would report a veto, and the leader slows down.
 pub(crate) fn pace(worst_lag_m: f64, limit_m: f64) -> f64 {
     (2.0 - 2.0 * worst_lag_m / limit_m).clamp(0.0, 1.0)
 }

@@ -52,11 +52,11 @@ pub struct Laser {
 pub struct Scan {
     /// Range of every beam of the full circle, as in [`Laser`]; beams that are not read hold 0.
     ranges_m: Vec<f64>,
-    /// The same without errors, where that is wanted.
+    /// The same without errors, where wanted.
     true_m: Vec<f64>,
-    /// The same without errors and without what moves; empty if nothing does.
+    /// The same without errors and without moving bodies; empty if nothing moves.
     still_m: Vec<f64>,
-    /// Whether what every beam meets moves; empty if nothing does.
+    /// Whether every beam meets a moving body; empty if nothing moves.
     meets_mover: Vec<bool>,
     /// Whether ranges without errors are kept.
     pub keeps_truth: bool,
@@ -146,7 +146,7 @@ impl Laser {
         }
     }
 
-    /// Shortens the beams that meet something that moves, if anything does, and notes which they are.
+    /// Shortens the beams that meet a moving obstacle, if there is any, and notes which they are.
     fn look_at_movers(
         &self,
         pose: &Pose,
@@ -253,7 +253,7 @@ impl Laser {
         Some(beams.map(range_m).fold(self.range_m, f64::min))
     }
 
-    /// Returns the least range of the beams of a sector that meet something that moves, or of the others, as
+    /// Returns the least range of the beams of a sector that meet a moving body, or of the others, as
     /// [`Self::least_m`].
     pub fn least_of_m(&self, scan: &Scan, sector_rad: [f64; 2], moves: bool) -> Option<f64> {
         let n = self.directions.len() as isize;

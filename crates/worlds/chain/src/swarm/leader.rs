@@ -10,7 +10,7 @@
 //! | 1 close left | wall close on the left, but not on the right | s, 0 |
 //!
 //! A lower number replaces a higher one. The exclusions let the right side win every tie, which
-//! is what turns a robot round in a dead end. Distances are from the robot's middle.
+//! turns a robot around in a dead end. Distances are from the robot's middle.
 
 use super::drive::{Pose, Wheels, steer};
 use super::laser::{Body, Laser, Scan};
@@ -71,7 +71,7 @@ pub enum Leaving {
     /// Its distance is between far and lost.
     Range,
     /// Its distance is above far: the slides' words taken literally. A leader in the open then
-    /// turns forever, because it leaves walls that are not there.
+    /// turns forever, because it leaves walls that do not exist.
     Level,
 }
 
@@ -112,7 +112,7 @@ pub enum Turning {
     #[default]
     AboutAWheel,
     /// About the resting wheel, and on the spot if that is blocked: for corridors too narrow to
-    /// swing round in.
+    /// swing around in.
     OnTheSpotWhereBlocked,
 }
 
@@ -139,12 +139,12 @@ pub struct Leader {
     pub target_sense: TargetSense,
     /// Way in which it turns.
     pub turning: Turning,
-    /// Whether it takes what moves for no wall, and stands while that is ahead and close. Otherwise a wall is
-    /// whatever its laser meets, as in the slides, and who crosses its way turns it round.
+    /// Whether it takes no moving body for a wall, and stands while one is ahead and close. Otherwise a wall
+    /// is anything that its laser meets, as in the slides, and a robot that crosses its way turns it around.
     pub gives_way: bool,
 }
 
-/// Angle to each side of straight ahead within which a leader stands for what moves, about 60 degrees.
+/// Angle to each side of straight ahead within which a leader stands for a moving body, about 60 degrees.
 const AHEAD_RAD: f64 = 1.05;
 
 impl Leader {
@@ -250,7 +250,7 @@ pub struct Percept {
     pub walls_m: Sides<f64>,
     /// The target, if it is detected.
     pub target: Option<Sighting>,
-    /// Whether something that moves is close ahead.
+    /// Whether a moving body is close ahead.
     pub is_mover_ahead: bool,
     /// Whether the leader still has the patience to stand for it.
     pub stands_for_it: bool,
@@ -274,13 +274,13 @@ pub struct Decision {
     pub layer: Layer,
     /// The walls that it follows from now on.
     pub followed: Sides<bool>,
-    /// Whether it stands or goes on while something that moves is close ahead.
+    /// Whether it stands or goes on while a moving body is close ahead.
     pub is_mover_ahead: bool,
 }
 
 impl Leader {
     /// Reads the laser and the target's detector. `scan` is a buffer; its old contents are
-    /// forgotten. A leader that `is_patient` takes what moves for no wall.
+    /// forgotten. A leader that `is_patient` takes no moving body for a wall.
     pub fn perceive(
         &self,
         pose: &Pose,

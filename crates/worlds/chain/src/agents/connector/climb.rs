@@ -3,7 +3,7 @@
 //!
 //! The ladder asks for the outcome of a motion and goes on at once; an agent has to wait for it. So
 //! the climb starts again with every answer, takes the answers that are there already, and stops
-//! where the next one is wanting. It is short, and the same code leads a chain that is moved at once.
+//! where the next one is missing. It is short, and the same code leads a chain that is moved at once.
 
 use super::ConnectorAgent;
 use crate::agents::control::Ended;
@@ -159,7 +159,7 @@ impl<const D: usize> ConnectorAgent<D> {
         }
     }
 
-    /// Returns the side on which the end is that leads where this connector is stuck.
+    /// Returns the side of the end that leads where this connector is stuck.
     fn far_side(&self) -> Side {
         match farther_end(self.me as usize, self.n as usize) {
             0 => Side::Below,

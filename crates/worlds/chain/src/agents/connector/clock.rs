@@ -8,7 +8,7 @@ use crate::agents::side::Side;
 use sidestep_kernel::network::{Seal, TalkId};
 
 impl<const D: usize> ConnectorAgent<D> {
-    /// Looks at the clock: sends again what was not confirmed, and gives up who never confirms.
+    /// Looks at the clock: sends unconfirmed messages again, and gives up a neighbor that never confirms.
     pub fn on_timer(&mut self, tick: u64) {
         self.now = self.now.max(tick);
         for side in Side::ALL {
@@ -23,7 +23,7 @@ impl<const D: usize> ConnectorAgent<D> {
         self.run();
     }
 
-    /// Ends the cycle because time is up. Who has not been heard at all is lost.
+    /// Ends the cycle because time is up. A neighbor that has not been heard at all is lost.
     fn close(&mut self) {
         for side in Side::ALL {
             if self.links[side].as_ref().is_some_and(|link| !link.is_heard()) {
@@ -81,7 +81,7 @@ impl<const D: usize> ConnectorAgent<D> {
         self.is_closed || self.is_over && links.all(Link::is_quiet)
     }
 
-    /// Returns what its connector does in this cycle; none before the cycle is over.
+    /// Returns its connector's motion in this cycle; none before the cycle is over.
     pub fn control(&self) -> Option<Control<D>> {
         let cycle = self.cycle.filter(|_| self.is_done())?;
         let doubt = self.following.as_ref().filter(|following| following.has_consented);

@@ -147,7 +147,7 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Passes an objection on to its master, or to the motion that it leads. Where this connector could have
-    /// gone elsewhere, the search for a way is what has ended.
+    /// gone elsewhere, it is the search for a way that has ended.
     pub(super) fn on_objection(&mut self, from: Side, objection: Objection) {
         let waiting = self.following.as_mut().filter(|f| f.waits && f.master == from.other());
         let Some(following) = waiting else { return self.is_led_against(from, &objection) };

@@ -202,7 +202,7 @@ impl<const D: usize> ConnectorAgent<D> {
         self.is_answered(leading.orderer, Some(Outcome::Moved(leading.moved)));
     }
 
-    /// Ends a motion to which somebody objects.
+    /// Ends a motion to which a connector objects.
     fn has_led_in_vain(&mut self, leading: Leading<D>, objection: &Objection) {
         let Objection { by, reason, obstacle, .. } = *objection;
         let (by, from, reached) = (by as usize, self.me as usize, self.place.base);
@@ -219,14 +219,14 @@ impl<const D: usize> ConnectorAgent<D> {
         }
     }
 
-    /// Breaks off the motion that it leads, if there is one: nobody moves.
+    /// Breaks off the motion that it leads, if there is one: no connector moves.
     pub(super) fn give_up_leading(&mut self) {
         if let Some(leading) = self.leading.take() {
             self.settle(&leading, false);
         }
     }
 
-    /// Hands the outcome of a motion to who wanted it.
+    /// Hands the outcome of a motion to its orderer.
     fn is_answered(&mut self, orderer: Option<Side>, outcome: Option<Outcome<D>>) {
         match orderer {
             Some(side) => self.say(side, Message::Done(outcome)),

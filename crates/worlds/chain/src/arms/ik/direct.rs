@@ -1,10 +1,10 @@
 //! A posture in closed form: straight except for at most two bends.
 //!
-//! Whatever a limb can reach, it reaches with its rods in three straight lines: those before the
+//! Any place that a limb can reach, it reaches with its rods in three straight lines: those before the
 //! rod that holds the middle of its length, that rod, and those behind it (Hopcroft, Joseph and
-//! Whitesides, "On the movement of robot arms in 2-dimensional bounded regions", 1985). Two
-//! triangles give the bends. The engines use it as a last resort, so that they always succeed; near
-//! the full reach every other posture looks like it.
+//! Whitesides, "On the movement of robot arms in 2-dimensional bounded regions", 1985). Two triangles
+//! give the bends. The engines use it as a last resort, so that they always succeed; near the full
+//! reach every other posture looks like it.
 
 use super::limb::{Shell, Span};
 use crate::rods::geometry::{

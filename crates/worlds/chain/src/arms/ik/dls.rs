@@ -1,14 +1,14 @@
 //! Damped least squares without a matrix: the nearest posture whose tip is at the target.
 //!
-//! Of all rod vectors `v'` within their lengths whose sum is the target `t`, wanted are those with
-//! the least sum of `|v' - v|^2`, where `v` are the present ones. With one multiplier `y` for the
-//! sum, every rod can be solved alone: `v'` is the vector within the rod's lengths that is nearest
-//! to `v + y`. It remains to find the `y` in 2 or 3 dimensions with `sum v'(y) = t`, and that is
-//! the gradient of a convex function: damped Newton steps get there from anywhere, each in O(n).
-//! Its matrix is the `J J^T` of damped least squares, and as there the damping falls by 0.3 after a
-//! step that helped and rises by 4 after one that did not. In contrast to damped least squares, the
-//! posture is not linearized anew at every step, so steps need no limit, and rods of variable
-//! length are no special case.
+//! Of all rod vectors `v'` within their lengths whose sum is the target `t`, the wanted ones have the
+//! least sum of `|v' - v|^2`, where `v` are the present ones. With one multiplier `y` for the sum,
+//! every rod can be solved alone: `v'` is the vector within the rod's lengths that is nearest to
+//! `v + y`. It remains to find the `y` in 2 or 3 dimensions with `sum v'(y) = t`, and that is the
+//! gradient of a convex function: damped Newton steps get there from anywhere, each in O(n). Its matrix
+//! is the `J J^T` of damped least squares, and, as in that method, the damping falls by 0.3 after a
+//! step that helped, and rises by 4 after one that did not. In contrast to damped least squares, the
+//! posture is not linearized anew at every step, so steps need no limit, and rods of variable length
+//! are no special case.
 //!
 //! If the convex function has its least value at a kink (`v + y = 0` for some rod: it might turn
 //! anywhere), steps stop helping; then the posture reached becomes the new `v`, and the answer is

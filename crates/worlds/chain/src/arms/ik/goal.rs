@@ -12,7 +12,7 @@ pub enum Engine {
     #[default]
     Auto,
     /// The chain's own rule, there and back. With rods of fixed length it is FABRIK. If anything
-    /// constrains the chain: a motion from the present posture, and nothing else.
+    /// constrains the chain: only a motion from the present posture.
     Chain,
     /// Damped least squares, which find the nearest of all postures. If anything constrains the
     /// chain: postures alone.
@@ -47,7 +47,7 @@ pub struct Goal<const D: usize> {
     pub tolerance_m: f64,
     /// The method that finds a posture.
     pub engine: Engine,
-    /// Postures to start from, beside the present one, if something is in the way.
+    /// Postures to start from, besides the present one, if an obstacle is in the way.
     pub restarts: usize,
     /// Random seed of these postures.
     pub seed: u64,
@@ -74,7 +74,7 @@ impl<const D: usize> Goal<D> {
 /// The kind of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// A motion: the chain can go there from where it is, and every state on the way has been
+    /// A motion: the chain can go there from its present posture, and every state on the way has been
     /// checked.
     Motion,
     /// A posture: good in itself; it has not been checked whether the chain can get there.

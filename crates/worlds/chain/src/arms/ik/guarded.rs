@@ -1,7 +1,7 @@
 //! Goals of constrained chains.
 //!
-//! First the chain is moved there from where it is. If that fails, postures are relaxed from the
-//! present one, its mirror image, and random ones, until one is good.
+//! First the chain is moved there from its present posture. If that fails, postures are relaxed from
+//! the present one, its mirror image, and random ones, until one is good.
 
 use super::goal::{Answer, Engine, Goal, Kind, Unreached};
 use super::legal::Judge;
@@ -14,7 +14,7 @@ use crate::rods::obstacle::Obstacles;
 use crate::rods::veto::Veto;
 use sidestep_kernel::InputError;
 
-/// Meets `goal`, whose target is within the shell of what the rods reach.
+/// Meets `goal`, with a target within the shell that the rods reach.
 pub(super) fn solve<const D: usize>(
     solver: &mut Solver<D>,
     chain: &Chain<D>,

@@ -17,8 +17,8 @@ pub(in crate::arms) struct Judge<'a, const D: usize> {
 }
 
 impl<const D: usize> Judge<'_, D> {
-    /// Returns the first objection to a posture, in the order of the connectors. Parts that are
-    /// where they were in the chain are not judged.
+    /// Returns the first objection to a posture, in the order of the connectors. Parts at their old
+    /// places in the chain are not judged.
     pub(in crate::arms) fn objection(&self, points: &[Point<D>], k: usize) -> Option<Veto<D>> {
         let veto =
             |(by, reason, obstacle)| Veto { by, from: k, reason, obstacle, reached: points[k] };

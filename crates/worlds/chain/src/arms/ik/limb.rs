@@ -71,7 +71,7 @@ pub(super) fn path(base: usize, k: usize) -> impl Iterator<Item = usize> + Clone
 }
 
 impl<const D: usize> Limb<D> {
-    /// Reads the rods from `base` to `k` of a chain whose connectors are at `points`.
+    /// Reads the rods from `base` to `k` of a chain with its connectors at `points`.
     pub(super) fn read(&mut self, chain: &Chain<D>, points: &[Point<D>], base: usize, k: usize) {
         self.spans.clear();
         self.vectors.clear();

@@ -1,12 +1,12 @@
-//! Inverse kinematics: a posture of a chain whose connector `k` is at a target while its base
-//! keeps its place.
+//! Inverse kinematics: a posture of a chain with connector `k` at a target while its base keeps its
+//! place.
 //!
 //! ```text
 //! goal       a goal, and its answer
-//! limb       the rods from base to tip; what they can reach
+//! limb       the rods from base to tip; their reach
 //! dls        the nearest posture, by damped least squares in O(n)
 //! alternate  the chain's own rule there and back (FABRIK)
-//! direct     closed form: straight but for two bends
+//! direct     closed form: straight except for two bends
 //! guarded    obstacles, bend limits, the chain's own body, connectors that are not free:
 //!            motion, then relax from several postures, judged by legal
 //! ```

@@ -1,7 +1,7 @@
 //! Relaxation to a posture that meets all constraints: every part that breaks one is pushed out of
 //! it, and then the nearest posture with whole rods and the tip at the target is taken ([`dls`]),
-//! which takes everything else along. Pushes go a little farther than they must, so that the step
-//! back to whole rods leaves them good; the result is judged without these margins.
+//! which takes all other parts along. Pushes go a little farther than they must, so that the step back
+//! to whole rods leaves them good; the result is judged without these margins.
 
 use super::legal::{Judge, OwnPair, bend_rad};
 use super::limb::{self, Limb};

@@ -29,9 +29,8 @@ pub struct BendLimit {
 }
 
 impl SerialChain {
-    /// Returns for each connector the limit of its bend; none if several joints bend it or nothing
-    /// does, and at the tip. The bend at the first connector is measured from
-    /// [`Skeleton::base_direction`].
+    /// Returns for each connector the limit of its bend; none if several joints bend it or none does,
+    /// and at the tip. The bend at the first connector is measured from [`Skeleton::base_direction`].
     pub fn bend_limits(&self, skeleton: &Skeleton) -> Vec<Option<BendLimit>> {
         (0..skeleton.connectors.len()).map(|at| self.bend_limit(skeleton, at)).collect()
     }

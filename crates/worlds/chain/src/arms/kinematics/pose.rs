@@ -60,7 +60,7 @@ impl Pose {
     /// `x, y, z, w`.
     pub fn quaternion(&self) -> [f64; 4] {
         let r = &self.rotation;
-        // Four times the squares of x, y, z, w; the largest is divided by, so that nothing is lost.
+        // Four times the squares of x, y, z, w; the largest is the divisor, so that no digits are lost.
         let squares = [
             1.0 + r[0][0] - r[1][1] - r[2][2],
             1.0 - r[0][0] + r[1][1] - r[2][2],

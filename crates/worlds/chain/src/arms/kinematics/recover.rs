@@ -1,11 +1,11 @@
 //! Joint values from the positions of connectors.
 //!
-//! From the base out, each connector determines the joints that move it and none before it: none,
-//! one (an angle about an axis, or a displacement along it), or two (the circles that two axes draw
-//! meet in at most two points; Paden and Kahan's second subproblem, here for axes that need not
-//! meet). If a step has two solutions, both are tried, the one nearer to the reference first. Iiwa
-//! arms and UR5 are solved this way, exactly; a Panda's elbow offsets couple three joints to one
-//! connector, which is refused with [`RecoverError::Coupled`].
+//! From the base out, each connector determines the joints that move it and no connector before it:
+//! none, one (an angle about an axis, or a displacement along it), or two (the circles that two axes
+//! draw meet in at most two points; Paden and Kahan's second subproblem, here for axes that need not
+//! meet). If a step has two solutions, both are tried, the one nearer to the reference first. Iiwa arms
+//! and UR5 are solved this way, exactly; a Panda's elbow offsets couple three joints to one connector,
+//! which is refused with [`RecoverError::Coupled`].
 
 use std::f64::consts::TAU;
 
@@ -377,7 +377,7 @@ fn nearest_turn(angle_rad: f64, reference_rad: f64, limits: Option<Limits>) -> f
 /// through `b`. Circles about parallel axes lie in one plane; then the line is that of the points
 /// with equal power. There is one point if circles just touch, or miss each other by rounding.
 fn meeting_points(first: &Line, a: Vector, second: &Line, b: Vector) -> Vec<Vector> {
-    // Everything relative to the second circle's center.
+    // All coordinates are relative to the second circle's center.
     let center = second.nearest(b);
     let radius = norm(sub(b, center));
     let n2 = second.along;

@@ -2,7 +2,7 @@
 //!
 //! Every connector is fixed in a range of links: a point on the axis of joint j is fixed in links j
 //! and j + 1, a point where three axes meet in four links. From the base on, the next connector is
-//! the one farthest out that shares a link with the last one, so that points between which nothing
+//! the one farthest out that shares a link with the last one, so that points between which no joint
 //! bends (such as the elbow offsets of a Panda) drop out.
 
 use super::pose::{Line, Pose, Vector};

@@ -349,7 +349,7 @@ proptest! {
     }
 }
 
-/// An arm whose second joint mimics the first, with an offset, and whose other joint has a limit and a velocity.
+/// An arm with a second joint that mimics the first, with an offset, and a third joint with a limit and a velocity.
 fn mimic(
     [offset, multiplier, upper, velocity]: [&str; 4],
 ) -> Result<Model, sidestep_kernel::InputError> {

@@ -79,7 +79,7 @@ impl<const D: usize> Postures for JointSpace<'_, D> {
     }
 
     /// A bound: the sum of the ways that each joint alone may move a connector. So a full turn, which brings each part
-    /// back to where it was, counts as the way that it is.
+    /// back to its place, counts with its whole way.
     fn apart_m(&self, a: &Vec<f64>, b: &Vec<f64>) -> f64 {
         let ways = a.iter().zip(b).zip(self.arm.follower.levers_m());
         ways.map(|((a, b), lever_m)| (b - a).abs() * lever_m).sum()
@@ -111,8 +111,8 @@ impl<const D: usize> Postures for JointSpace<'_, D> {
 
     fn any(&self, draws: &mut Draws) -> Vec<f64> {
         let any = |(variable, [lower, upper]): (&Variable, &[f64; 2])| {
-            // What turns without limits is everywhere after half a turn to either side; slides without limits go as
-            // far as the arm is long.
+            // A joint that turns without limits gets everywhere within half a turn to either side; slides without
+            // limits go as far as the arm is long.
             let far = match variable.motion {
                 Motion::Turn if lower.is_finite() => f64::INFINITY,
                 Motion::Turn => PI,

@@ -46,23 +46,23 @@ pub(crate) struct Errand<const D: usize> {
 /// A posture: the places of all connectors.
 pub(crate) type Posture<const D: usize> = Vec<Point<D>>;
 
-/// The postures of something that moves from one to another.
+/// The postures of a body that moves from one to another.
 pub(crate) trait Postures {
     type Posture: Clone;
 
     /// Returns the present posture.
     fn present(&self) -> Self::Posture;
 
-    /// Returns the length in which ways are measured, such as that of what moves when it is stretched out, meters.
+    /// Returns the length in which ways are measured, such as that of the stretched body, meters.
     fn length_m(&self) -> f64;
 
     /// Returns the longest way of a connector between two postures, or a bound on it, meters.
     fn apart_m(&self, a: &Self::Posture, b: &Self::Posture) -> f64;
 
-    /// Returns a measure of nearness: the sum of the squared ways of all that moves.
+    /// Returns a measure of nearness: the sum of the squared ways of all moving parts.
     fn spread2(&self, a: &Self::Posture, b: &Self::Posture) -> f64;
 
-    /// Returns the posture at a part of the straight way from one to another: everything turns and changes its length
+    /// Returns the posture at a part of the straight way from one to another: all parts turn and change their lengths
     /// evenly.
     fn at(&self, a: &Self::Posture, b: &Self::Posture, part: f64) -> Self::Posture;
 
@@ -140,7 +140,7 @@ fn goals<const D: usize>(
         if answer.reached && space.is_free(&answer.points) && !goals.contains(&answer.points) {
             goals.push(answer.points);
         }
-        // Where the first searches find nothing there is hardly anything to be found.
+        // Where the first searches find nothing, further ones hardly would.
         if goals.len() == GOALS || goals.is_empty() && search == GOALS {
             break;
         }

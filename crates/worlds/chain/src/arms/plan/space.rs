@@ -23,7 +23,7 @@ pub(crate) struct RodSpace<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> RodSpace<'a, D> {
-    /// Returns the postures that connector `k` can bring a chain to.
+    /// Returns the postures to which connector `k` can bring a chain.
     ///
     /// # Errors
     /// When no other connector keeps its place.
@@ -108,7 +108,7 @@ impl<const D: usize> Postures for RodSpace<'_, D> {
         (1..=n).all(|step| {
             interrupt::look();
             let next = self.at(a, b, step as f64 / n as f64);
-            // Rods that nearly turn round jump in between.
+            // Rods that nearly turn around jump in between.
             let is_near = self.apart_m(&before, &next) <= MOST_STEPS * self.step_m;
             before = next;
             is_near && self.is_free(&before)

@@ -32,7 +32,7 @@ impl<S: Postures> Tree<S> {
     }
 
     /// Grows toward a posture stride by stride, as far as the way is free; returns the last posture
-    /// and whether it is that one, or `None` if there was no stride at all.
+    /// and whether that is the target, or `None` if there was no stride at all.
     fn grow(
         &mut self,
         space: &S,

@@ -1,4 +1,4 @@
-//! Bytes that no agent sends: they are counted and dropped, whatever they are, and never a panic.
+//! Bytes that no agent sends: they are counted and dropped in any case, and never cause a panic.
 
 use super::{network, sights};
 use crate::agents::{ConnectorAgent, Motion, Outgoing, Sight, Wish};
@@ -131,8 +131,8 @@ proptest! {
         prop_assert_eq!(agent.control().is_some(), begins);
     }
 
-    /// Packets of a real talk, some of their bytes changed, in any order, to any neighbor: whoever lies or
-    /// repeats himself, agents come to a decision, and decide nothing but whether to go.
+    /// Packets of a real talk, some of their bytes changed, in any order, to any neighbor: whichever
+    /// neighbor lies or repeats itself, agents come to a decision, and decide only whether to go.
     #[test]
     fn packets_that_were_tampered_with_never_panic(
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<prop::sample::Index>(), any::<u8>(), 0usize..N), 1..60),

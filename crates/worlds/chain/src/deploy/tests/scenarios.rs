@@ -45,7 +45,7 @@ const SPACE: &str = "dimensions = 3\n[[fields]]\nlo_m = [-1, -2, -2]\nhi_m = [4,
     [[chains]]\nconnectors = 15\nat_m = [-1.5, 0, 0]\nalong = [-1, 0, 0]\nrod_m = [0.25, 0.3]\nradius_m = 0.05\n\
     [[chains.tasks]]\nkind = \"wander\"\nwithin_m = [[-2, -2, -2], [4, 2, 2]]\npatience_s = 100\n";
 
-/// Robots on wheels that follow a navigator round a corner.
+/// Robots on wheels that follow a navigator around a corner.
 const WHEELS: &str = "[ground]\ncorridor = { width_m = 2.0, legs = [{ straight_m = 5 }, { radius_m = 2, turn_deg = 90 }, { straight_m = 4 }] }\n\
     [[chains]]\nconnectors = 5\nat_m = [3.4, 0]\nrod_m = [0.6, 0.8]\nrod_radius_m = 0.05\nrobots = { radius_m = 0.25 }\n\
     [[chains.tasks]]\nkind = \"navigate\"\nnavigator = { noise_m = 0.01 }\n";
@@ -84,7 +84,7 @@ fn a_team_ends_with_the_digest_and_the_metrics_of_one_process() {
     }
 }
 
-/// Vetoes, ways to the side, and the other end in the lead are all in what is compared above.
+/// The comparison above includes vetoes, ways to the side, and the other end in the lead.
 #[test]
 fn what_is_compared_has_vetoes_and_all_that_comes_of_them() {
     let (_, field, _) = end(&text("team", FIELD), 400);
@@ -124,7 +124,7 @@ fn talk_elsewhere(run: &ChainRun<2>, cycle: u64) {
             let mut agents: Vec<_> = (0..sights.len() as u32).map(agent).collect();
             let mut waiting = Vec::new();
             let first = agents[0].id();
-            // The last begins first: who has not begun yet keeps what it is sent.
+            // The last begins first: one that has not begun yet keeps the packets sent to it.
             for (k, sight) in sights.into_iter().enumerate().rev() {
                 agents[k].begin(sight, 0).expect("a sight");
                 let sent = agents[k].take_packets();
@@ -160,7 +160,7 @@ fn agents_that_run_elsewhere_have_the_same_digest_and_as_many_packets() {
     }
 }
 
-/// Hands over what was decided elsewhere, but of some connectors in some cycles, as a process would.
+/// Hands over the decisions made elsewhere, except those of some connectors in some cycles, as a process would.
 fn hand_over(run: &mut ChainRun<2>) {
     let cycle = run.cycle();
     talk_elsewhere(run, cycle);
@@ -249,7 +249,7 @@ fn a_chain_stands_in_a_cycle_in_which_a_decision_does_not_come() {
     assert!(few.to_string().contains("0 decisions for 12"), "{few}");
 }
 
-/// Hands over what connectors of the first chain do, of whom some are gone.
+/// Hands over the decisions of the first chain's connectors, some of which are gone.
 fn hand_over_without(run: &mut ChainRun<2>, gone: &[u32]) {
     let cycle = run.cycle();
     talk_elsewhere(run, cycle);

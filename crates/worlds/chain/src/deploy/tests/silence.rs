@@ -1,5 +1,5 @@
-//! Connectors that are not heard, wherever and whenever: the chain stands and says who, no rod is torn,
-//! nobody moves on a veto, and all go on when everybody is back.
+//! Connectors that are not heard, wherever and whenever: the chain stands and names them, no rod is
+//! torn, no connector moves on a veto, and all go on when those are back.
 
 use super::{compared_on, network, talked};
 use crate::agents::{Ended, Goes};
@@ -45,7 +45,7 @@ fn a_chain_stands_within_a_cycle_says_who_is_lost_and_goes_on() {
         assert!(!moving.iter().any(|(kind, _)| *kind == Happening::Unheard), "{moving:?}");
         run.advance(1);
         assert_eq!(told(&mut *run), [(Happening::Unheard, Some(6))], "loss {loss}, rods {rod}");
-        // What had reached the leader by then may have been carried out; from now on nothing is.
+        // A motion agreed with the leader by then may have been carried out; from now on none is.
         let stands = run.poses().text;
         run.advance(39);
         assert_eq!(run.poses().text, stands, "loss {loss}, rods {rod}");
@@ -165,7 +165,8 @@ fn faulty(
 }
 
 /// One motion of a random chain over a faulty network: all of it is carried out, as one process does it, or
-/// nobody moves; a motion that somebody has vetoed is not; who does not know goes with its master or not at all.
+/// no connector moves; a vetoed motion is not; a connector that does not know goes with its master or not at
+/// all.
 fn all_or_nothing<const D: usize>(seed: u64, network: &Network) -> Result<bool, TestCaseError> {
     let mut world = AnyWorld::<D>::new(seed);
     let rules = Rules { self_collision: false, backtracks: 0, ..world.rules };

@@ -1,6 +1,6 @@
-//! Escape as the slides have it: one part after the other becomes the initiator of a motion.
+//! Escape by the slides' own method: one part after the other becomes the initiator of a motion.
 //!
-//! Parts of the chain that are too near to an obstacle, the deepest first, go where nothing gets
+//! Parts of the chain that are too near to an obstacle, the deepest first, go where no part gets
 //! deeper, and the chain follows by its rules. The slides set no limit to that. Here no connector,
 //! slaves included, is farther from its place at the start of the tick than its speed allows, and a
 //! part that only this limit keeps from escaping is reported.
@@ -29,7 +29,7 @@ pub(super) struct Literal<const D: usize> {
     before: Vec<Point<D>>,
 }
 
-/// Distance by which a push goes beyond what is needed, meters.
+/// Distance by which a push goes beyond the depth, meters.
 const BEYOND_M: f64 = 1e-6;
 /// Least gain of a helpful motion, as a part of its length.
 const LEAST_GAIN: f64 = 0.05;
@@ -70,7 +70,7 @@ impl<const D: usize> Literal<D> {
         Ok(told)
     }
 
-    /// Returns how far from its start a connector may be, or already is, meters.
+    /// Returns the greatest distance from its start that a connector may have, or already has, meters.
     fn longest_way_m(&self, tick: &Tick<'_, D>) -> f64 {
         let ways_m = tick.start.iter().zip(tick.chain.points()).map(|(s, p)| distance(*s, *p));
         ways_m.fold(self.rules.most_m(), f64::max)
@@ -109,7 +109,7 @@ impl<const D: usize> Literal<D> {
         Ok(())
     }
 
-    /// Measures all threats in a margin; none is given up any more.
+    /// Measures all threats in a margin; none counts as given up after that.
     fn measure_all(&mut self, tick: &Tick<'_, D>, margin: Margin) {
         for threat in &mut self.threats {
             threat.given_up = false;
@@ -136,8 +136,9 @@ impl<const D: usize> Literal<D> {
             .max_by(order)
     }
 
-    /// Tries to reduce one violation; returns the connectors that may have moved, or the objection if nothing works: then
-    /// every bit is as before. A base that objects is led back to its place by a return pass, so the elbows of an arm get out of the way too.
+    /// Tries to reduce one violation; returns the connectors that may have moved, or the objection if no motion
+    /// works: then every bit is as before. A base that objects is led back to its place by a return pass, so the
+    /// elbows of an arm get out of the way too.
     fn relieve(
         &mut self,
         tick: &mut Tick<'_, D>,
@@ -153,7 +154,7 @@ impl<const D: usize> Literal<D> {
                 let to = along(tick.chain.points()[k], way, push_m);
                 match self.attempt(tick, which, k, to)? {
                     Ok(touched) => return Ok(Ok(touched)),
-                    // If the speed limit was the only obstacle, that says more than any other
+                    // If the speed limit was the only obstacle, that is more informative than any other
                     // reason.
                     Err(veto) if why.reason != Reason::StepLimit => why = veto,
                     Err(_) => (),
@@ -232,7 +233,7 @@ impl<const D: usize> Literal<D> {
     ) -> Option<Veto<D>> {
         let depth_m = self.threats[which].depth_m;
         let bound_m = depth_m - LEAST_GAIN * way_m.min(depth_m);
-        // What nobody touched is as deep as before.
+        // Untouched parts are as deep as before.
         let all = self.threats.iter().enumerate();
         let mut changed = all.filter(|(i, threat)| *i == which || threat.part.is_among(touched));
         let worse = changed.find(|(i, threat)| {
@@ -264,8 +265,8 @@ fn depth_of<const D: usize>(tick: &Tick<'_, D>, threat: &Threat) -> f64 {
     threat.margin_m - gap_m(tick.chain, threat.part, &tick.obstacles.moving()[threat.mover])
 }
 
-/// Returns the connectors that may move for a part, and how much of their way the point of contact
-/// moves: for a rod the end nearer to the contact, then the other.
+/// Returns the connectors that may move for a part, and the share of their way that the point of
+/// contact moves: for a rod the end nearer to the contact, then the other.
 fn agents<const D: usize>(
     chain: &Chain<D>,
     part: Part,
@@ -282,7 +283,7 @@ fn agents<const D: usize>(
     ends.map(|end| end.filter(may_move))
 }
 
-/// Returns the objection of a part that nothing may move.
+/// Returns the objection of a part without a connector that may move.
 fn nobody<const D: usize>(chain: &Chain<D>, part: Part, obstacle: u32) -> Veto<D> {
     let (Part::Connector(k) | Part::Rod(k)) = part;
     let reason = if chain.connectors()[k].failed { Reason::Failed } else { Reason::Fixed };

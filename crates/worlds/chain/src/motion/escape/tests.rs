@@ -39,7 +39,7 @@ fn movers<const D: usize>(seed: u64, n: u32, speed_m_s: f64) -> Obstacles<D> {
     Obstacles::new((0..n).map(&mut ball).collect(), 1.0).unwrap()
 }
 
-/// One tick of obstacles and escape; checks what holds whatever comes.
+/// One tick of obstacles and escape; checks the laws that hold in any case.
 fn tick<const D: usize>(
     chain: &mut Chain<D>,
     obstacles: &mut Obstacles<D>,

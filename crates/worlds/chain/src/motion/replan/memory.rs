@@ -63,7 +63,7 @@ impl Memory {
     }
 
     /// Notes the distance of the goal. Coming a cell nearer than ever before is progress, after
-    /// which what failed may be tried again.
+    /// which failed rungs may be tried again.
     pub(super) fn note_goal(&mut self, goal_m: Option<f64>) {
         let Some(goal_m) = goal_m else { return };
         if self.best_m.is_none_or(|best_m| goal_m < best_m - CELL_M) {
@@ -138,7 +138,7 @@ impl Memory {
         }
     }
 
-    /// Forgets failures after the report that nothing works, so that everything may be tried again.
+    /// Forgets failures after the report that nothing works, so that every rung may be tried again.
     pub(super) fn starts_afresh(&mut self) {
         self.pulling_back = 0;
         self.hand_overs = 0;

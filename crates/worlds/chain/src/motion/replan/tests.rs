@@ -16,7 +16,7 @@ fn wall(id: u32, ends: [[f64; 2]; 2]) -> Obstacle<2> {
     Obstacle::capsule(id, ends, 0.0)
 }
 
-/// The walls of a dead end round the leader, so near that it cannot move except back.
+/// The walls of a dead end around the leader, so near that it cannot move except back.
 fn dead_end() -> Obstacles<2> {
     let walls = vec![
         wall(1, [[0.251, -2.0], [0.251, 2.0]]),
@@ -144,7 +144,7 @@ fn a_chain_that_cannot_move_says_who_objects_to_what() {
 
 #[test]
 fn going_to_and_fro_without_progress_hands_over_and_is_told_in_the_end() {
-    // The goal is behind a wide wall with ends: the ladder alone does not find round it.
+    // The goal is behind a wide wall with ends: the ladder alone finds no way around it.
     let walls = vec![
         wall(1, [[0.4, -1.0], [0.4, 1.0]]),
         wall(2, [[-4.0, 1.0], [0.4, 1.0]]),

@@ -1,4 +1,4 @@
-//! Outcomes of orders, as they are told.
+//! Outcomes of orders, as the caller observes them.
 
 use super::{name, observed, order, plane, source};
 use crate::chain_run;
@@ -14,7 +14,7 @@ fn facing_a_disc(more: &str) -> crate::ChainRun<2> {
     plane(&text, 1)
 }
 
-/// Returns whether values are the same but for rounding.
+/// Returns whether values are the same apart from rounding.
 fn is_near(values: &[f64], expected: &[f64]) -> bool {
     values.len() == expected.len()
         && values.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12)
@@ -67,7 +67,7 @@ fn as_far_as_it_goes_it_goes_to_the_obstacle() {
         (name(&run, 0, "answer"), name(&run, 0, "veto")),
         ("cut-short".into(), "target-blocked".into())
     );
-    // Half of the way of 0.05 m is free, and it is found to 1/256.
+    // Half of the way of 0.05 m is free, and it is found to within 1/256.
     assert!((0.599..0.6001).contains(&seen["joints_m"][0]), "{:?}", seen["joints_m"]);
     assert!((seen["done_share"][0] - 0.5).abs() < 0.02, "{:?}", seen["done_share"]);
     assert_eq!(seen["reached_m"][..], seen["joints_m"][..2]);

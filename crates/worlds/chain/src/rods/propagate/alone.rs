@@ -1,5 +1,5 @@
 //! One connector by itself: its reaction to its master, and its part as an initiator, by the code that
-//! judges whole chains. It knows what its neighbors tell it and what is near it, and nothing else.
+//! judges whole chains. It knows its neighbors' messages and its own surroundings, and nothing else.
 
 use super::{Heads, check, n_sub_steps, project};
 use crate::rods::candidates::{Work, guided};
@@ -27,7 +27,7 @@ pub(crate) struct Alone<const D: usize> {
     own: OwnBody<D>,
 }
 
-/// A master's motion, as its slave is told of it.
+/// A master's motion, as its slave hears of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pull<const D: usize> {
     /// The master before,
@@ -49,7 +49,7 @@ pub(crate) struct Pull<const D: usize> {
 pub(crate) struct Reaction<const D: usize> {
     /// Its new place; the old one, bit for bit, if it stays.
     pub(crate) at: Point<D>,
-    /// Whether the motion ends here, because the slave stays and all beyond it is good as it is.
+    /// Whether the motion ends here, because the slave stays and everything beyond it is good as it is.
     pub(crate) ends: bool,
     /// Whether its rod turned from the guide line.
     pub(crate) rotated: bool,

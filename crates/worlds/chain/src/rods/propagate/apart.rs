@@ -8,7 +8,7 @@ use crate::rods::obstacle::Obstacles;
 use crate::rods::open::{self, Stays};
 use std::ops::Range;
 
-/// Motions among obstacles until a proof is tried again. Where one fails, all that it took is lost, so every
+/// Motions among obstacles until a proof is tried again. Where one fails, its effort is lost, so every
 /// failure doubles the time to the next. No result depends on it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Proofs {
@@ -32,7 +32,7 @@ impl Proofs {
         self.until_next = self.pause;
     }
 
-    /// Returns those of a propagator that never tries one.
+    /// Returns the proofs of a propagator that never tries one.
     #[cfg(test)]
     pub(super) fn never() -> Self {
         Self { until_next: u32::MAX, pause: 0 }
@@ -40,8 +40,8 @@ impl Proofs {
 }
 
 impl<const D: usize> Propagator<D> {
-    /// Makes a motion in which no part comes near another, if it is one; then nothing can object,
-    /// and the chain moves as if it were not in its own way.
+    /// Makes a motion if no part comes near another in it; then nothing can object, and the chain moves
+    /// as if it were not in its own way.
     pub(super) fn pull_apart(
         &mut self,
         chain: &mut Chain<D>,
@@ -82,7 +82,7 @@ impl<const D: usize> Propagator<D> {
             && Leeway::is_for(chain);
         let k = heads.first;
         let from = heads.places(chain);
-        // A sub-step that is too short to count is none.
+        // A sub-step too short to count is none.
         let is_long = distance(from[0], heads.to[0]) > 2.0 * n as f64 * chain.least_move_m();
         if !may || !is_long || !self.whole_proofs.is_due() {
             return false;
@@ -116,8 +116,8 @@ impl<const D: usize> Propagator<D> {
         may
     }
 
-    /// Makes a motion among obstacles in which no rod turns and no part comes near another, if it is one: every part is
-    /// then where it would be if each had been looked at.
+    /// Makes a motion among obstacles if no rod turns and no part comes near another in it: every part is then where
+    /// it would be if each had been looked at.
     pub(super) fn sweep_apart(
         &mut self,
         chain: &mut Chain<D>,

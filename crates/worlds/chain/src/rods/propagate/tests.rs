@@ -1,25 +1,25 @@
 //! Tests of motions of whole chains. The invariants, and the tests that hold them:
 //!
 //! 1. rods keep their limits: [`laws`] `rods_bends_clearances_and_bases_keep_the_laws_in_any_world`
-//! 2. nobody comes nearer than 1e-9 m, or goes deeper: the same;
+//! 2. no part comes nearer than 1e-9 m, or goes deeper: the same;
 //!    `who_starts_inside_goes_no_deeper_in_any_world`
-//! 3. who is fixed or failed keeps every bit: the same; `fixed_and_failed_connectors_object_and_stay`
+//! 3. fixed and failed connectors keep every bit: the same; `fixed_and_failed_connectors_object_and_stay`
 //! 4. a veto leaves every bit: the same
-//! 5. a rod that only changes its length leaves every bit beyond, and `touched` is what changed:
+//! 5. a rod that only changes its length leaves every bit beyond, and `touched` is the set of changes:
 //!    `a_rod_that_only_changes_its_length_leaves_every_bit_beyond`
 //! 6. bends keep their limits: as 1; `a_bend_limit_stops_what_would_fold`
-//! 7. what is far does not matter: [`symmetry`] `far_obstacles_change_no_bit`
+//! 7. distant obstacles do not matter: [`symmetry`] `far_obstacles_change_no_bit`
 //! 8. mirrored, turned, scaled: [`symmetry`] `a_chain_turned_round_moves_as_its_mirror`,
 //!    `a_world_moved_rigidly_gives_the_same_motion`, `a_chain_twice_as_large_moves_twice_as_far`
 //! 9. halves are independent: [`symmetry`] `the_two_halves_move_on_their_own`
 //! 10. lanes are motions one by one: `wavefront.rs`, `lanes_are_motions_one_after_the_other`
 //! 11. the same seed gives the same bytes on any number of threads: [`laws`]
 //!     `the_same_seed_gives_the_same_bytes_on_any_number_of_threads`
-//! 12. nobody passes a wall of a millimeter: [`tunnel`]
+//! 12. no part passes a wall of a millimeter: [`tunnel`]
 //! 13. a pull and a base pass are a FABRIK iteration to 1e-15: [`symmetry`]
 //!     `a_pull_and_a_base_pass_are_one_fabrik_iteration`
-//! 14. blocked intervals are what distances say: `interval.rs`, a million cases on request
-//! 15. a veto names what matters: [`laws`]
+//! 14. blocked intervals agree with distances: `interval.rs`, a million cases on request
+//! 15. a veto names the decisive constraint: [`laws`]
 //!     `a_veto_names_a_constraint_without_which_it_is_gone_or_elsewhere`
 //! 16. pushed, no chain runs into itself; pulled through a corridor, none objects: [`laws`]
 //!     `a_chain_that_is_pushed_never_runs_into_itself`, [`corridor`]

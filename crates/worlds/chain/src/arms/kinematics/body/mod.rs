@@ -23,7 +23,7 @@ use parry3d_f64::shape::{Ball, Cuboid, Cylinder, Shape as ParryShape};
 use sidestep_import::urdf::{Model, Shape, Solid};
 use sidestep_kernel::geometry::norm;
 
-/// The shapes of an arm's links, and of all that hangs on them or that it hangs on.
+/// The shapes of an arm's links, and of all links that hang on them or carry the arm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmBody {
     parts: Vec<Part>,
@@ -57,7 +57,7 @@ pub(super) struct Placed {
     center_m: Vector,
 }
 
-/// Two things that are nearer to each other than a distance.
+/// Two bodies that are nearer to each other than a distance.
 pub(super) struct Near {
     /// The point of the first that is nearest to the second, or deepest in it.
     pub(super) first_m: Vector,
@@ -146,12 +146,12 @@ impl ArmBody {
         &self.pairs
     }
 
-    /// Computes where all parts are.
+    /// Computes the places of all parts.
     pub(super) fn place(&self, frames: &Frames, values: &[f64], placed: &mut Vec<Placed>) {
         self.place_on(&frames.links, values, placed);
     }
 
-    /// Computes where all parts are if the arm's links are at `links`.
+    /// Computes the places of all parts if the arm's links are at `links`.
     pub(super) fn place_on(&self, links: &[Pose], values: &[f64], placed: &mut Vec<Placed>) {
         placed.clear();
         placed.extend(self.parts.iter().map(|part| {
@@ -161,7 +161,7 @@ impl ArmBody {
         }));
     }
 
-    /// Returns how two parts are to each other, if they are nearer than `within_m`.
+    /// Returns the relation of two parts, if they are nearer than `within_m`.
     pub(super) fn near(
         &self,
         placed: &[Placed],
@@ -177,7 +177,7 @@ impl ArmBody {
         near(&placed[a].pose, shapes[0], &placed[b].pose, shapes[1], within_m)
     }
 
-    /// Returns how a part is to a ball, if they are nearer than `within_m`.
+    /// Returns the relation of a part to a ball, if they are nearer than `within_m`.
     pub(super) fn near_ball(
         &self,
         placed: &[Placed],

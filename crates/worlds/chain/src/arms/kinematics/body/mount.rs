@@ -128,7 +128,7 @@ fn still(model: &Model, chain: &SerialChain, joint: usize) -> Pose {
     let origin = Pose::from_origin(&moving.origin);
     let rest = moving.limits.map_or(0.0, |l| 0f64.clamp(l.lower, l.upper));
     match Motion::of(moving.kind) {
-        // What floats or slides in a plane is taken as it is drawn.
+        // A link that floats or slides in a plane is taken as drawn.
         None => origin,
         Some(motion) => {
             let drive = chain.drive(model, joint);

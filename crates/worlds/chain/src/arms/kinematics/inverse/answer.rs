@@ -47,7 +47,7 @@ pub struct Posture {
 pub struct Hit {
     /// The part.
     pub part: Part,
-    /// The thing that it is in.
+    /// The body that it is in.
     pub against: Against,
     /// Depth in m.
     pub depth_m: f64,
@@ -64,7 +64,7 @@ pub enum Part {
     Link(String),
 }
 
-/// A thing that an arm must not touch.
+/// A body that an arm must not touch.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Against {
     /// The sphere of this index (from 0).

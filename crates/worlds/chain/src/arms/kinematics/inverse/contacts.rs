@@ -1,4 +1,4 @@
-//! Parts of an arm that are in something, or nearly so.
+//! Parts of an arm that are in another body, or nearly so.
 
 use super::super::body::{self, ArmBody, Near};
 use super::super::pose::Vector;
@@ -9,10 +9,10 @@ use super::quick::Placed;
 use crate::rods::geometry::nearest_on_segment;
 use sidestep_kernel::geometry::{dot, norm, scaled, sub};
 
-/// Distance from everything that steps aim at, in parts of the reach.
+/// Distance from all bodies that steps aim at, in parts of the reach.
 const MARGIN: f64 = 1e-4;
 
-/// The parts of an arm, and what they must not enter.
+/// The parts of an arm, and the bodies that they must not enter.
 pub(super) struct Contacts<'a> {
     anchors: &'a [Anchor],
     /// Indices of the rods that stand for links without shapes.
@@ -27,12 +27,12 @@ pub(super) struct Contacts<'a> {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Touched {
     pub(super) contacts: Vec<Contact>,
-    /// The deepest of those that are no mere margin.
+    /// The deepest of those that are more than a mere margin.
     pub(super) hit: Option<Hit>,
     parts: Vec<body::Placed>,
 }
 
-/// A place where a part is too near to something.
+/// A place where a part is too near to a body.
 #[derive(Debug, Clone)]
 pub(super) struct Contact {
     /// The unit vector in which the part gets away.
@@ -145,7 +145,7 @@ impl<'a> Contacts<'a> {
         }
     }
 
-    /// Returns the contact of two things that are fixed in two links; the base stands still.
+    /// Returns the contact of two bodies that are fixed in two links; the base stands still.
     fn contact(&self, near: &Near, link: usize, other: usize) -> Contact {
         Contact {
             away: near.away,

@@ -28,7 +28,7 @@ impl Effort {
     /// One start of many: where it goes slowly, another start is quicker (half of the time for all
     /// starts, measured).
     pub(super) const BRIEF: Self = Self { steps: 200, patience: 6, least_gain: 0.3 };
-    /// Effort that comes as near as it goes.
+    /// Effort that comes as near as possible.
     pub(super) const PATIENT: Self = Self { steps: 400, patience: 24, least_gain: 1e-3 };
 }
 

@@ -1,8 +1,8 @@
-//! Joint values for the places of connectors: what a chain's motion asks of an arm's joints within one cycle.
+//! Joint values for the places of connectors: the demands of a chain's motion on an arm's joints within one cycle.
 //!
 //! A chain of rods moves in more ways than most arms: its motion is a guide. First all connectors are brought as near
 //! to their places in it as the joints can, then the connectors that lead are brought to theirs exactly. Both stay in
-//! a *room* of each variable: its limits, and what its speed allows in a cycle.
+//! a *room* of each variable: its limits, and the range that its speed allows in a cycle.
 
 use super::super::pose::Vector;
 use super::super::serial::{Motion, MovingJoint, SerialChain};
@@ -12,7 +12,7 @@ use super::step::{Bounds, Stepper};
 use sidestep_kernel::geometry::{norm, sub};
 use std::f64::consts::PI;
 
-/// Speed of joints whose model gives none.
+/// Speed of joints without one in the model.
 const TURNS_RAD_S: f64 = PI;
 const SLIDES_M_S: f64 = 1.0;
 /// Weight of a connector's place in the guide.
@@ -26,7 +26,7 @@ const LED_DAMPING: f64 = 1e-4;
 /// Factors of the damping after a step that helped, and after one that did not.
 const RELAX: f64 = 0.1;
 const STIFFEN: f64 = 10.0;
-/// Steps that do not help, one after the other, before no more are made.
+/// Steps in a row that do not help, after which the descent ends.
 const PATIENCE: usize = 4;
 /// Distance from its place, in parts of the reach, at which a connector counts as being there.
 const THERE: f64 = 1e-13;
@@ -195,7 +195,7 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// Returns the weighted ways that connectors are off their places at these values.
+    /// Returns the weighted ways from the connectors to their places at these values.
     fn look(
         &mut self,
         values: &[f64],
@@ -250,7 +250,7 @@ fn speeds(chain: &SerialChain) -> Vec<f64> {
     speeds
 }
 
-/// Returns bounds on the way of any connector per unit of each variable: the lengths of all that is between its joints
+/// Returns bounds on the way of any connector per unit of each variable: the lengths of all links between its joints
 /// and the connector.
 fn levers_m(chain: &SerialChain, anchors: &[Anchor]) -> Vec<f64> {
     let mut levers_m = vec![0.0; chain.variables.len()];

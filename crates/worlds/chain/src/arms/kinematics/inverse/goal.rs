@@ -60,8 +60,8 @@ impl Asked {
     /// Position and orientation.
     pub const POSE: Self = Self { along: [true; 3], turn: Turn::Whole };
 
-    /// Returns the part of a target that counts, whose orientation is asked for or not, where some axes of its frame
-    /// are free: `along` them, and the turn `about` them. Errors name the option `--free` of the command.
+    /// Returns the part of a target that counts, with or without its orientation, where some axes of its frame are
+    /// free: `along` them, and the turn `about` them. Errors name the option `--free` of the command.
     ///
     /// # Errors
     /// When a turn is free and none is asked for, two turns are free, or everything is.
@@ -133,7 +133,7 @@ pub struct ArmGoal {
     pub spheres: Vec<Sphere>,
     /// The shapes of the arm's links; without them, and where links have none, the arm is its rods.
     pub body: Option<ArmBody>,
-    /// Whether links of the body must not touch each other, but for those that may.
+    /// Whether links of the body must not touch each other, except for those that may.
     pub own_body: bool,
 }
 
@@ -191,7 +191,8 @@ impl ArmGoal {
         self.check_spheres()
     }
 
-    /// Returns whether one posture after the other is looked for, instead of the first that does.
+    /// Returns whether the search goes on from posture to posture, instead of ending at the first that
+    /// meets the goal.
     pub(super) fn wants_many(&self) -> bool {
         self.solutions > 1 || self.nearest
     }

@@ -16,8 +16,8 @@ const LONGEST: f64 = 4.0;
 /// Postures of the connectors that are tried.
 const RESTARTS: usize = 20;
 
-/// Returns joint values inside the limits at which the connectors are where the chain engine puts
-/// them; none if it does not reach the target, or points do not determine the joints. Also returns
+/// Returns joint values inside the limits at which the connectors are at the places found by the chain
+/// engine; none if it does not reach the target, or points do not determine the joints. Also returns
 /// the number of iterations.
 pub(super) fn posture(
     arm: &SerialChain,

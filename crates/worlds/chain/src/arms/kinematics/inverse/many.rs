@@ -10,14 +10,14 @@ use std::f64::consts::TAU;
 /// Most steps toward the start, and the first as a part of the way.
 const STEPS: usize = 30;
 const FIRST_PART: f64 = 0.5;
-/// Parts of the way below which no step is tried any more.
+/// Parts of the way below which no further step is tried.
 const LEAST_PART: f64 = 0.02;
 /// Least part of the distance that a step must save.
 const LEAST_GAIN: f64 = 1e-4;
 
 impl Search<'_> {
-    /// Descends from `first` and from random postures, and keeps what meets the goal and is
-    /// distinct from all before.
+    /// Descends from `first` and from random postures, and keeps the postures that meet the goal and
+    /// are distinct from all before.
     pub(super) fn many(&mut self, first: &[f64], start: &[f64]) -> Found {
         let (wanted, nearest) = (self.by.goal.solutions, self.by.goal.nearest);
         let mut found: Vec<Vec<f64>> = Vec::new();
@@ -79,7 +79,7 @@ impl Search<'_> {
         at
     }
 
-    /// Turns joints by full turns to where they are nearest to the start, inside their limits.
+    /// Turns joints by full turns to be nearest to the start, inside their limits.
     fn turn_back(&self, values: &mut [f64], start: &[f64]) {
         for (i, value) in values.iter_mut().enumerate() {
             let [lower, upper] = self.by.bounds.ranges[i];

@@ -2,14 +2,14 @@
 //!
 //! Damped least squares on the joints themselves, inside their limits: points leave twist open and
 //! couple the joints of some arms, joints do not. The engine [`Engine::Chain`] solves for the
-//! connectors first, with joint limits as bend limits, reads the joints off them, and leaves to the
-//! joints only what that does not decide.
+//! connectors first, with joint limits as bend limits, reads the joints off them, and leaves only the
+//! undecided rest to the joints.
 //!
 //! ```text
 //! goal       a goal: a pose, the part of it that counts, tolerances
 //! answer     its answer, and the reason for a failure
-//! quick      forward kinematics without allocation, and what each joint moves
-//! contacts   parts that are in something
+//! quick      forward kinematics without allocation, and the effect of each joint
+//! contacts   parts that are in another body
 //! rows       errors of a posture and their Jacobian: the tip, its orientation, contacts
 //! step       a damped step inside limits
 //! descent    steps from one posture, until the goal is met or nothing is gained

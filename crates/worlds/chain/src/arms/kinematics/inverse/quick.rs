@@ -1,5 +1,5 @@
-//! Forward kinematics of many postures of one arm: what does not depend on the posture is computed
-//! once, and nothing is allocated per posture.
+//! Forward kinematics of many postures of one arm: values independent of the posture are computed once,
+//! and nothing is allocated per posture.
 
 use super::super::pose::{Line, Pose, Vector, multiply};
 use super::super::serial::{Drive, Motion, SerialChain};

@@ -1,8 +1,8 @@
 //! Errors of a posture, and how the joints change them.
 //!
 //! Every row of the Jacobian is an error in m: of the tip along an axis that counts, of its
-//! orientation about an axis that counts (an angle times [`RADIAN`] of the arm's reach), or a part
-//! of the arm that is in something.
+//! orientation about an axis that counts (an angle times [`RADIAN`] of the arm's reach), or of a part
+//! of the arm that is in another body.
 
 use super::super::pose::{Pose, Vector};
 use super::super::serial::SerialChain;

@@ -189,7 +189,7 @@ impl<'a> Search<'a> {
         Some(ArmReason::OutsideLimits { joint, value, lower, upper })
     }
 
-    /// Returns the hit in a posture that would do if nothing could be hit.
+    /// Returns the hit in a posture that would meet the goal if there were no contacts.
     fn without_contacts(&self, few: &ArmGoal, best: &Best) -> Option<Hit> {
         if few.spheres.is_empty() && !few.own_body {
             return None;

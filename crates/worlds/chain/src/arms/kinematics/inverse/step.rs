@@ -94,8 +94,8 @@ impl Stepper {
         }
     }
 
-    /// Puts the variables that would leave their ranges at their ends, takes what that changes off
-    /// what is wanted, and returns whether there were any.
+    /// Puts the variables that would leave their ranges at their ends, subtracts the resulting changes
+    /// from the wanted ones, and returns whether there were any.
     fn stop_at_ends(&mut self, values: &[f64], bounds: &Bounds, next: &mut [f64]) -> bool {
         let n = values.len();
         let mut any = false;

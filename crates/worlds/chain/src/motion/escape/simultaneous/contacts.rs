@@ -1,4 +1,4 @@
-//! Everything that the parts of a chain may touch in a tick.
+//! All bodies that the parts of a chain may touch in a tick.
 
 use super::super::threat::{Threat, collect};
 use super::super::{Margin, Part};
@@ -8,7 +8,7 @@ use crate::rods::geometry::{Bounds, Core, Nearest, Point, between_segments, dist
 use crate::rods::obstacle::{Obstacle, Obstacles};
 use crate::rods::own_body::OwnBody;
 
-/// A part near something that stands still.
+/// A part near an obstacle that stands still.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wall<const D: usize> {
     pub(super) part: Part,
@@ -93,7 +93,7 @@ impl<const D: usize> Contacts<D> {
     }
 }
 
-/// Distance within which something is a contact, as a multiple of the way of a connector.
+/// Distance within which a body is a contact, as a multiple of the way of a connector.
 const REACH: f64 = 4.0;
 
 fn parts<const D: usize>(chain: &Chain<D>) -> impl Iterator<Item = Part> + use<D> {
@@ -138,7 +138,7 @@ pub(super) fn nearest<const D: usize>(points: &[Point<D>], parts: [Part; 2]) -> 
     }
 }
 
-/// Returns where on a part a point lies: 0 at its first end, 1 at its second.
+/// Returns the position of a point on a part: 0 at its first end, 1 at its second.
 pub(super) fn along_rod<const D: usize>(ends: [Point<D>; 2], at: Point<D>) -> f64 {
     let length_m = distance(ends[0], ends[1]);
     if length_m > 0.0 { (distance(ends[0], at) / length_m).min(1.0) } else { 0.0 }

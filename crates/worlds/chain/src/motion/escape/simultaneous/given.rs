@@ -19,14 +19,14 @@ pub(super) struct Given<'a, const D: usize> {
 }
 
 impl<const D: usize> Given<'_, D> {
-    /// Returns how far from its start a connector may be, meters: as far as its speed allows, or
-    /// as far as it already is.
+    /// Returns the distance from its start that a connector may have, meters: as far as its speed
+    /// allows, or as far as it already is.
     pub(super) fn room_m(&self, k: usize) -> f64 {
         self.most_m.max(distance(self.start[k], self.chain.points()[k]))
     }
 }
 
-/// A way through an obstacle: parts in it leave in one direction, whatever is nearer.
+/// A way through an obstacle: parts in it leave in one direction, even if another is shorter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Through<const D: usize> {
     pub(super) obstacle: u32,

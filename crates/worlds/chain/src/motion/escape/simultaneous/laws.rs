@@ -1,4 +1,4 @@
-//! The laws that every motion keeps, whatever comes.
+//! The laws that every motion keeps, in any case.
 
 use super::super::threat::Part;
 use super::contacts::{Contacts, nearest};
@@ -25,8 +25,7 @@ impl Bend {
         Some(Self { connector, most_rad })
     }
 
-    /// Moves the neighbors of a connector apart that bends too far; returns the correction,
-    /// meters.
+    /// Moves the neighbors of a connector that bends too far apart; returns the correction, meters.
     pub(super) fn correct<const D: usize>(&self, posture: &mut Posture<'_, D>) -> f64 {
         let [a, b, c] = [0, 1, 2].map(|k| posture.points[self.connector - 1 + k]);
         let (into_m, out_m) = (distance(a, b), distance(b, c));

@@ -1,10 +1,10 @@
-//! The leader's choice before anybody is caught: to go as it wants, or to rest.
+//! The leader's choice before any part is caught: to go as it wants, or to rest.
 //!
-//! Whoever leads a chain into the way of obstacles that close on it cannot pull it out again in time, though
-//! resting some seconds earlier would often have been enough. So what the leader wants is rolled out now and then,
-//! and where that brings parts inside, resting is too: it rests if the chain is then inside for less time. Other
+//! A leader that takes its chain into the way of obstacles that close on it cannot pull it out again in time, though
+//! resting some seconds earlier would often have been enough. So the leader's wish is rolled out now and then, and
+//! where that brings parts inside, resting is too: it rests if the chain is then inside for less time. Other
 //! headings in its place gain nothing: with seven of them chains are inside for longer (1.1 in place of 0.9 % of the
-//! steps among 8 discs), since leaders that turn to and fro get nowhere.
+//! steps among 8 discs), because leaders that turn to and fro get nowhere.
 
 use super::super::Escape;
 use super::given::Given;

@@ -1,16 +1,16 @@
 //! Escape by a simultaneous solve of all constraints of a tick.
 //!
 //! ```text
-//! solve.rs       where all parts go: contacts.rs, lengths.rs, and the laws.rs that hold whatever comes
-//! way_out.rs     what is done for parts that are caught: roll-outs of ways through an obstacle
-//! leading.rs     the leader's choice before anybody is caught: roll-outs of going on and of resting
+//! solve.rs       where all parts go: contacts.rs, lengths.rs, and the laws.rs that hold in any case
+//! way_out.rs     help for parts that are caught: roll-outs of ways through an obstacle
+//! leading.rs     the leader's choice before any part is caught: roll-outs of going on and of resting
 //! stage.rs       where roll-outs are made
 //! posture.rs     positions under trial
 //! ```
 //!
-//! One part that flees alone is held by its neighbors, which nobody asks to move. Here all of them
-//! move, own parts push each other, and what approaches is avoided by a margin as wide as its way
-//! in the look-ahead. If a part is caught all the same, because obstacles close like tongs or the
+//! One part that flees alone is held by its neighbors, which are not asked to move. Here all of them
+//! move, own parts push each other, and approaching obstacles are avoided by a margin as wide as their
+//! way in the look-ahead. If a part is caught all the same, because obstacles close like tongs or the
 //! chain is taut, it leaves through one of them, by the way that roll-outs find shortest.
 
 mod contacts;
@@ -49,7 +49,7 @@ pub(super) struct Simultaneous<const D: usize> {
     start: Vec<Point<D>>,
 }
 
-/// Most steps of a tick, each at most as long as the thinnest part, so that nothing is jumped over.
+/// Most steps of a tick, each at most as long as the thinnest part, so that no body is jumped over.
 const MOST_STEPS: f64 = 8.0;
 /// Rounds of a solve with margins, and rounds without.
 const ROUNDS: [usize; 2] = [24, 40];
@@ -132,7 +132,7 @@ impl<const D: usize> Simultaneous<D> {
     }
 
     /// Solves with the margins of the look-ahead and, if that leaves a part inside, without; the
-    /// better one is in `best`. Returns its least gap, meters; that of now if nothing is better.
+    /// better one is in `best`. Returns its least gap, meters; the present one if nothing is better.
     fn attempt(&mut self, given: &Given<'_, D>, through: Option<Through<D>>, before_m: f64) -> f64 {
         self.best.clear();
         self.best.extend_from_slice(given.chain.points());

@@ -33,7 +33,7 @@ struct Leg {
     to: usize,
 }
 
-/// The chain some time before it was inside for long, and for how long it was.
+/// The chain some time before a long time inside, and the length of that.
 struct Episode {
     cycle: u64,
     ticks: usize,
@@ -67,7 +67,7 @@ fn episodes(discs: usize, seed: u64) -> (World, Vec<Episode>) {
     (World::clone(run.world()), found)
 }
 
-/// Returns the longest time in a row that a chain is inside, in ticks, if it goes some ways; at most `enough`.
+/// Returns the longest time in a row that a chain is inside, in ticks, if it goes along some ways; at most `enough`.
 fn inside(world: &World, episode: &Episode, legs: &[Leg], enough: usize) -> usize {
     let (mut chain, mut obstacles) = (episode.chain.clone(), (*world.obstacles).clone());
     let rules = world.escape.expect("something moves");
@@ -145,9 +145,9 @@ fn motions(obstacles: &[u32], seed: u64) -> Vec<Vec<Leg>> {
 }
 
 /// One episode of 24 runs, seeds 1 to 12 with 8 discs and with 16, is longer than 50 ticks. The search tries 1,481 motions
-/// by the same solver at the same speed limit, from 2 s before on, in which nobody leads, with discs where they will be.
-/// So this is no pinch that no motion can leave; but in the roll-outs, in which discs go straight on, the chain is inside
-/// for as long if its leader rests.
+/// by the same solver at the same speed limit, from 2 s before on, in which no connector leads, with discs where they
+/// will be. So some motion can leave this pinch; but in the roll-outs, in which discs go straight on, the chain is
+/// inside for as long if its leader rests.
 #[test]
 #[ignore = "a search of a minute"]
 fn the_only_long_pinch_that_is_left_can_be_left_by_resting_in_time() {

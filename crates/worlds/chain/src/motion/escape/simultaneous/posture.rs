@@ -1,4 +1,4 @@
-//! Positions under trial, and how easily each gives way.
+//! Positions under trial, and the ease with which each gives way.
 
 use super::super::threat::Part;
 use crate::rods::geometry::{Point, along};
@@ -19,7 +19,7 @@ impl<const D: usize> Posture<'_, D> {
         ends(self.points, part)
     }
 
-    /// Returns how easily a point of a part gives way; `along_rod` goes from 0 to 1.
+    /// Returns the ease with which a point of a part gives way; `along_rod` goes from 0 to 1.
     pub(super) fn ease(&self, part: Part, along_rod: f64) -> f64 {
         match part {
             Part::Connector(k) => self.ease[k],

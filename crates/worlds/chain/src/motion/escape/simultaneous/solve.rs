@@ -1,6 +1,6 @@
-//! One simultaneous solve: where all parts go in a tick.
+//! One simultaneous solve: the new places of all parts in a tick.
 //!
-//! First rounds of corrections with margins around what moves, then rounds without, then only the
+//! First rounds of corrections with margins around moving obstacles, then rounds without, then only the
 //! laws: rods, speed, walls, own parts. A solve whose result breaks a law is given up, so that
 //! obstacles may be in conflict with laws, and never the other way round.
 
@@ -49,7 +49,7 @@ const SETTLED_M: f64 = 1e-6;
 const RESERVE: f64 = 1e-4;
 
 impl<const D: usize> Solver<D> {
-    /// Collects the contacts of a tick; returns whether anything that moves is near.
+    /// Collects the contacts of a tick; returns whether any moving obstacle is near.
     pub(super) fn look(&mut self, given: &Given<'_, D>, margin: Margin) -> bool {
         let Given { chain, obstacles, rules, most_m, .. } = *given;
         self.contacts.look_for_movers(chain, obstacles, (margin, most_m));
@@ -84,7 +84,7 @@ impl<const D: usize> Solver<D> {
         self.settle(given)
     }
 
-    /// Lets the chain around an obstacle that it goes through set out together, for parts that are
+    /// Lets the chain around an obstacle that it goes through set out together, because parts that are
     /// only dragged along come late.
     fn set_out(&mut self, given: &Given<'_, D>, through: Option<Through<D>>) {
         let Some(through) = through else { return };
@@ -99,7 +99,7 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// Leads parts away from what moves; returns the greatest correction, meters.
+    /// Leads parts away from moving obstacles; returns the greatest correction, meters.
     fn flee(
         &mut self,
         given: &Given<'_, D>,
@@ -168,7 +168,7 @@ impl<const D: usize> Solver<D> {
         bends.iter().fold(most_m, |most_m, bend| most_m.max(bend.correct(&mut posture)))
     }
 
-    /// Keeps every connector within its speed, and where it may be.
+    /// Keeps every connector within its speed, and at an allowed place.
     fn bound(&mut self, given: &Given<'_, D>) {
         for (k, point) in self.points.iter_mut().enumerate() {
             if self.ease[k] > 0.0 {
@@ -213,7 +213,7 @@ impl<const D: usize> Solver<D> {
             .all(|threat| gap_m(given.chain, threat.part, &moving[threat.mover]) > PASSED_M)
     }
 
-    /// Returns the least gap between the chain at some places and what moves, meters, and the
+    /// Returns the least gap between the chain at some places and moving obstacles, meters, and the
     /// threat that has it.
     pub(super) fn least_gap(
         &self,

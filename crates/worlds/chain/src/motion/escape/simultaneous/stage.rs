@@ -1,4 +1,4 @@
-//! The chain around a place, and what moves near it: where motions are rolled out.
+//! The chain around a place, and the moving obstacles near it: where motions are rolled out.
 
 use super::super::{Escape, Margin};
 use super::given::{Given, Through, Wishes};
@@ -45,7 +45,7 @@ const DEPTH_COST: f64 = 0.2;
 const ROUNDS: [usize; 2] = [12, 20];
 
 impl<const D: usize> Tried<D> {
-    /// Returns a way through an obstacle, or none, while nobody leads.
+    /// Returns a way through an obstacle, or none, while no connector leads.
     pub(super) fn way(through: Option<Through<D>>) -> Self {
         Self { through, lead: None, clear: CLEAR_TICKS }
     }
@@ -90,17 +90,17 @@ impl<'a, const D: usize> Stage<'a, D> {
         })
     }
 
-    /// Returns whether something that moves may come near it.
+    /// Returns whether a moving obstacle may come near it.
     pub(super) fn is_approached(&self) -> bool {
         self.obstacles.moving().iter().any(Obstacle::is_moving)
     }
 
-    /// Returns the ticks of roll-outs that some work allows, in ticks times connectors.
+    /// Returns the ticks of roll-outs that an amount of work allows, in ticks times connectors.
     pub(super) fn ticks_for(&self, work: usize) -> usize {
         work / self.chain.points().len()
     }
 
-    /// Returns the time inside by some motions, ticks, with something for depth; it may end early at
+    /// Returns the time inside by some motions, ticks, with a surcharge for depth; it may end early at
     /// `enough`, or when no tick is `left`.
     pub(super) fn cost(&self, tried: &Tried<D>, enough: f64, left: &mut usize) -> f64 {
         let (mut chain, mut obstacles) = (self.chain.clone(), self.obstacles.clone());
@@ -166,7 +166,7 @@ impl<'a, const D: usize> Stage<'a, D> {
         }
         let escaped = chain.points().to_vec();
         let to = add(chain.points()[k], way_m);
-        // Out of the range of coordinates nobody leads.
+        // Out of the range of coordinates there is no leading.
         let went = propagator.propagate(chain, obstacles, &Request::exact(k, to));
         if went.is_err() || longest_m(chain) > self.most_m {
             chain.points_mut().copy_from_slice(&escaped);

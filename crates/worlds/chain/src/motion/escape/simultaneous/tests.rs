@@ -76,7 +76,7 @@ impl<const D: usize> Case<D> {
     }
 }
 
-/// Asserts by distances of its own: connectors two apart, rods and connectors three apart, no crossing.
+/// Asserts by separately computed distances: connectors two apart, rods and connectors three apart, no crossing.
 fn assert_own_parts_are_apart<const D: usize>(chain: &Chain<D>) {
     let points = chain.points();
     let radius_m = |k: usize| chain.connectors()[k].radius_m;

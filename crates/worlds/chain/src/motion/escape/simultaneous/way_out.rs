@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::math::{cos, sin};
 use std::f64::consts::FRAC_PI_6;
 
-/// A chain's memory of how it gets out of where it was caught, and of how its leader keeps it out.
+/// A chain's memory of its way out of where it was caught, and of how its leader keeps it out.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct WayOut {
     passing: Option<Passing>,
@@ -62,7 +62,7 @@ impl WayOut {
         self.rests = rests;
     }
 
-    /// Forgets the way out, of a chain that nothing is near.
+    /// Forgets the way out of a chain with no obstacle near.
     pub(super) fn forget(&mut self) {
         *self = Self { rests: self.rests, ..Self::default() };
     }
@@ -75,7 +75,7 @@ impl WayOut {
         self.passing.map(|p| Through { obstacle: p.obstacle, toward: in_dimensions(p.toward) })
     }
 
-    /// Ends a way once no part is near the obstacle any more.
+    /// Ends a way once no part is near the obstacle.
     pub(super) fn forget_what_is_passed<const D: usize>(
         &mut self,
         given: &Given<'_, D>,
@@ -134,7 +134,7 @@ fn ways<const D: usize>(given: &Given<'_, D>, solver: &Solver<D>) -> Vec<Through
             ways.push(directions(through, mover.velocity_m_s).into_iter().map(way));
         }
     }
-    // Of each obstacle in turn, for there may be more than there is time for.
+    // Of each obstacle in turn, because there may be more than time allows.
     let mut all = Vec::new();
     while ways.iter().any(|ways| ways.len() > 0) {
         all.extend(ways.iter_mut().filter_map(Iterator::next));
@@ -166,7 +166,7 @@ fn directions<const D: usize>(through: Point<D>, velocity_m_s: Point<D>) -> Vec<
     all
 }
 
-/// Returns the first and the last connector of the chain around what is in danger.
+/// Returns the first and the last connector of the chain around the parts in danger.
 fn in_danger<const D: usize>(given: &Given<'_, D>, solver: &Solver<D>) -> (usize, usize) {
     let Given { chain, obstacles, .. } = *given;
     let near =

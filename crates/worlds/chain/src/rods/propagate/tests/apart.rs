@@ -1,8 +1,8 @@
-//! Motions that are proven to bring no parts near each other move as those whose parts were looked at.
+//! Motions proven to bring no parts near each other move as those whose parts were looked at.
 
 use super::*;
 
-/// Something so far away that it only makes every motion look at each part.
+/// An obstacle so far away that it only makes every motion look at each part.
 fn far<const D: usize>() -> Obstacles<D> {
     Obstacles::new(vec![Obstacle::ball(0, [1e4; D], 1.0)], 1.0).unwrap()
 }
@@ -49,7 +49,7 @@ fn led_both_ways<const D: usize>(
 
 /// Leads chains of many shapes about, alone and among balls.
 fn lead_many(seeds: std::ops::Range<u64>) {
-    // One propagator for all, because what it remembers of other chains must not matter.
+    // One propagator for all, because its memory of other chains must not matter.
     let (mut plane, mut space) = (Propagator::default(), Propagator::default());
     let mut sum = [0, 0];
     let nowhere = (Obstacles::default(), Obstacles::default());

@@ -57,8 +57,7 @@ fn assert_clean(width_m: f64, followers: usize, rod: Rod, step_m: f64) -> Run {
 const WIDTHS_M: [f64; 5] = [1.2, 1.6, 2.0, 2.5, 3.0];
 const LENGTHS_M: [(f64, f64); 3] = [(0.6, 0.8), (1.0, 1.0), (1.5, 1.5)];
 
-/// Rods of 1.5 m as thick as the robots cannot go round the narrowest bend of the narrowest
-/// corridor.
+/// Rods of 1.5 m as thick as the robots cannot go around the narrowest bend of the narrowest corridor.
 fn fits_round(width_m: f64, rod: Rod) -> bool {
     !(width_m == 1.2 && rod.max_m == 1.5 && rod.radius_m == 0.25)
 }

@@ -1,4 +1,4 @@
-//! Chains and requests at the edge of what there can be.
+//! Chains and requests at the edge of the possible.
 
 use super::*;
 
@@ -13,7 +13,7 @@ fn wrong_requests_are_errors_and_a_target_reached_is_no_motion() {
     assert!(ask(2, [0.0, 0.0]).is_err());
     let still = ask(0, [0.0, 0.0]).unwrap();
     assert_eq!(still.moved().unwrap().touched, 0..0);
-    // Onto the slave: the rod goes where it was.
+    // Onto the slave: the rod goes on along its old direction.
     assert!(ask(0, [1.0, 0.0]).unwrap().moved().is_some());
     assert_eq!(chain.points()[1], [2.0, 0.0]);
 }

@@ -74,7 +74,7 @@ fn many_worlds_keep_the_laws() {
     }
 }
 
-/// Takes away what a veto names; the same request must succeed, or fail elsewhere.
+/// Takes away the constraint that a veto names; the same request must succeed, or fail elsewhere.
 fn without<const D: usize>(world: &AnyWorld<D>, veto: &Veto<D>) -> AnyWorld<D> {
     let mut rules = world.rules;
     let mut chain = world.chain.clone();
@@ -142,7 +142,7 @@ fn a_veto_names_a_constraint_without_which_it_is_gone_or_elsewhere() {
     }
 }
 
-/// Obstacles that were put over a part of the chain: the chain may leave, but not go deeper.
+/// Obstacles placed over a part of the chain: the chain may leave, but not go deeper.
 fn goes_no_deeper<const D: usize>(seed: u64) -> usize {
     let mut world = AnyWorld::<D>::new(seed);
     let n = world.chain.points().len();

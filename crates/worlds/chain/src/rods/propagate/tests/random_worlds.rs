@@ -1,11 +1,11 @@
-//! Chains with everything that a chain may have, among obstacles of every kind.
+//! Chains with every property that a chain may have, among obstacles of every kind.
 
 use super::*;
 use crate::rods::geometry::{Core, Cuboid, Nearest, dot, perpendicular, unit};
 use crate::scenes::own_clearance_m;
 use std::f64::consts::PI;
 
-/// A chain, what is around it, and how it reacts. Nothing is wrong in it at the start.
+/// A chain, its surroundings, and the rules of its reactions. All is well at the start.
 pub(crate) struct AnyWorld<const D: usize> {
     pub(crate) chain: Chain<D>,
     pub(super) all: Vec<Obstacle<D>>,
@@ -29,7 +29,7 @@ impl<const D: usize> AnyWorld<D> {
         Self { chain, all, obstacles, rules, numbers }
     }
 
-    /// Somewhere within `half_m` of where a connector is, or a rod moved rigidly.
+    /// A request that moves a connector to within `half_m` of its place, or a rod rigidly.
     pub(crate) fn any_request(&mut self, half_m: f64) -> Request<D> {
         let numbers = &mut self.numbers;
         let n = self.chain.points().len();
@@ -61,7 +61,7 @@ fn any_chain<const D: usize>(seed: u64, numbers: &mut Numbers) -> Chain<D> {
     Chain::new(points, radii_m.into_iter().map(Connector::free).collect(), rods).unwrap()
 }
 
-/// Bend limits for some chains, and for some one connector that is not free.
+/// Bend limits for some chains, and one connector that is not free for some.
 fn constrain<const D: usize>(chain: &mut Chain<D>, numbers: &mut Numbers) {
     let n = chain.points().len();
     if numbers.unit() < 0.5 {
@@ -114,7 +114,7 @@ pub(super) fn apart_m<const D: usize>(chain: &Chain<D>, o: &Obstacle<D>) -> f64 
     (0..chain.points().len()).map(|i| -depth_of_part_m(chain, i, o)).fold(f64::INFINITY, f64::min)
 }
 
-/// Returns how deep connector `i` and the rod before it are in an obstacle.
+/// Returns the depth of connector `i` and the rod before it in an obstacle.
 pub(super) fn depth_of_part_m<const D: usize>(chain: &Chain<D>, i: usize, o: &Obstacle<D>) -> f64 {
     let p = chain.points();
     let depth_m = |nearest: Nearest<D>, radius_m: f64| radius_m + o.radius_m - nearest.distance_m;

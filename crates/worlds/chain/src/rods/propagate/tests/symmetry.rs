@@ -4,7 +4,7 @@ use super::random_worlds::apart_m;
 use super::*;
 use crate::rods::geometry::first_axis;
 
-/// Returns where a chain gets to among balls, with other balls far away and cells of any size.
+/// Returns the places that a chain reaches among balls, with other balls far away and cells of any size.
 fn wandered<const D: usize>(far: &[Obstacle<D>], reach_m: f64) -> Vec<[u64; D]> {
     let field = ball_field::<D>(5, 2.5, 0.15, 0.2, 0.06);
     let obstacles = Obstacles::new(field.iter().chain(far).copied().collect(), reach_m).unwrap();
@@ -54,7 +54,7 @@ fn moves_as_its_mirror<const D: usize>(seed: u64, k: usize) -> Result<(), TestCa
     Ok(())
 }
 
-/// A motion from the middle is what the two halves do with the same head, if neither objects.
+/// A motion from the middle equals those of the two halves with the same head, if neither objects.
 fn halves_move_on_their_own<const D: usize>(seed: u64, open: bool) -> Result<(), TestCaseError> {
     let (mut whole, balls) = among_balls::<D>(seed, 10);
     let balls = if open { Obstacles::default() } else { balls };

@@ -1,4 +1,4 @@
-//! Nobody passes through anything, however thin.
+//! No part passes through anything, however thin.
 
 use super::*;
 use crate::rods::geometry::{Core, Cuboid, cross_each_other};

@@ -97,7 +97,7 @@ proptest! {
         // At half a turn the errors have a kink.
         prop_assume!(here.turn_rad < 3.1);
         scene.slopes(&here, 4, &mut rows);
-        // Rows say how what is wanted gets less.
+        // Rows give the rates at which the wanted changes shrink.
         let products = rows.chunks_exact(4).zip(&here.wanted).map(|(row, w)| row[variable] * w);
         let by_rows = -2.0 * products.sum::<f64>();
         let by_differences = (look_at(1e-6).merit() - look_at(-1e-6).merit()) / 2e-6;
