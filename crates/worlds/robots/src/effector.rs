@@ -123,7 +123,7 @@ impl EffectorModel {
     }
 }
 
-/// The rule for a transition whose path meets an obstacle.
+/// The rule for a transition with a path that meets an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum ObstacleRule {

@@ -218,7 +218,7 @@ fn sensors(world: &RobotsWorld) -> Vec<Value> {
     by_name.into_values().map(one).collect()
 }
 
-/// Returns the effectors in use, each once, with the chance that an action comes to what it means.
+/// Returns the effectors in use, each once, with the chance that an action ends as intended.
 fn effectors(world: &RobotsWorld) -> Vec<Value> {
     let robots = world.types.iter().filter_map(|ty| match &ty.role {
         Role::Robot(model) => Some(&model.body.effector),

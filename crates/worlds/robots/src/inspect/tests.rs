@@ -98,7 +98,7 @@ fn what_is_told_of_an_action_is_what_comes_of_it() {
                     let then = run.inspect(run.world().who(id)).expect("it is there");
                     for (now, next) in [("place", "next place"), ("heading", "next heading")] {
                         let (now, next) = (then.value("Now", now), told.value("Outcome", next));
-                        // Who goes straight is told so before it turns at its next decision.
+                        // A body that goes straight is told so before it turns at its next decision.
                         assert_eq!(now, next, "{rule}, {policy}: {:?}", told.who);
                     }
                     moved += usize::from(told.value("Now", "place") != then.value("Now", "place"));

@@ -22,7 +22,7 @@ pub(super) fn on_effectors(
 /// Behaviors that never say anything.
 const SILENT: [&str; 5] = ["wander", "shuttle", "goto", "replay", "random"];
 
-/// Returns a note on a radio over which nobody speaks.
+/// Returns a note on a radio over which no robot speaks.
 pub(super) fn on_radio(file: &RobotsFile) -> Option<Remark> {
     let speaks = |section: &Spanned<RobotSection>| {
         let behaviour = section.get_ref().behaviour.as_ref();
@@ -123,7 +123,7 @@ impl Compiler<'_> {
         else {
             return 0;
         };
-        // Ways lead back as well, so whoever reaches a goal from its start reaches it from others.
+        // Ways lead back as well, so a robot that reaches a goal from its start reaches it from other goals.
         let (col, row) = placed.start[id as usize].0;
         model.behaviour.ways().iter().filter(|way| !way.reaches_goal(col, row)).count()
     }
