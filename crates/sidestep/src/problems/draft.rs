@@ -14,8 +14,8 @@ struct Change {
 }
 
 impl Change {
-    /// Returns the place before the change of a place after it; within what was inserted, the start of
-    /// what was removed, or its end.
+    /// Returns the place before the change of a place after it; within an insertion, the start of the
+    /// removed bytes, or their end.
     fn back(&self, offset: usize, is_end: bool) -> usize {
         match offset {
             _ if offset < self.at || (is_end && offset == self.at) => offset,

@@ -214,7 +214,7 @@ fn lost_and_told(run: &AirspaceRun) -> (Pairs, Pairs) {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// L1 for traffic that comes and goes and is told what to do: only pairs that were told to
+    /// L1 for traffic that comes and goes and follows orders: only pairs that were reported to
     /// be too close when they came in ever lose separation.
     #[test]
     fn the_shield_keeps_all_pairs_apart_that_did_not_come_in_too_close(
@@ -245,7 +245,7 @@ fn everything() -> Source {
         );
         airplanes.push_str(&plane([x, sign * 4000.0], -90.0 * sign, [x, -sign * 4000.0], &more));
     }
-    // Right behind the first one: whoever comes in there is too close.
+    // Right behind the first one: an airplane that comes in there is too close.
     airplanes.push_str(&plane([-5000.0, 4000.0], -90.0, [-5000.0, -4000.0], "appears_s = 5.0"));
     let more = "replay_until_s = 62.0\n[airspace.generator]\nkind = \"random\"\nn = 8\nradius_m = 9000.0\n";
     scenario(more, &airplanes)

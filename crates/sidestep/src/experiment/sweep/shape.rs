@@ -23,8 +23,8 @@ pub struct Shape(BTreeMap<(Role, String), Seen>);
 struct Seen {
     /// Its type, once it has a value.
     ty: Option<ColumnType>,
-    /// The first cell in which it has a value, and its place there: the order of columns, whoever ran what. Columns
-    /// without any value come last.
+    /// The first cell in which it has a value, and its place there: the order of columns, whichever process ran
+    /// which cell. Columns without any value come last.
     first: (u64, usize),
 }
 

@@ -114,7 +114,7 @@ fn the_golden_digests_of_chains_are_what_every_machine_gets() {
     assert_eq!(found, include_str!("../golden/serpentine.txt"), "found:\n{found}");
 }
 
-/// Two arms of one model whose tools pass each other; a plan is followed when the run is resumed.
+/// Two arms of one model with tools that pass each other; a plan is followed when the run is resumed.
 #[test]
 fn arms_of_joints_have_the_same_bits_however_they_are_run() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/chain/arm.urdf");

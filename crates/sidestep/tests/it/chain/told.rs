@@ -204,7 +204,7 @@ fn progress_means_what_the_task_asks_for() {
     let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a}, not {b}");
     near(progress("kind = \"rest\"\nlasts_s = 4.0", 10), 0.25);
     near(progress("kind = \"wander\"\nlasts_s = 4.0", 10), 0.25);
-    // Without an end, by what can be done in the 2000 cycles of the run.
+    // Without an end, by the most that can be done in the 2000 cycles of the run.
     near(progress("kind = \"wander\"\nturn_deg = 1", 10), 0.005);
     near(progress("kind = \"rest\"", 10), 0.005);
     let script = "kind = \"script\"\nscript = \"forward 0.5 turn 10 wait 100 forward 1\"";

@@ -1,4 +1,4 @@
-//! Robots on wheels roll: they slide nowhere, turn no faster than their wheels, and go through nobody.
+//! Robots on wheels roll: they slide nowhere, turn no faster than their wheels, and go through no other robot.
 
 use super::*;
 use sidestep_kernel::math::{cos, sin, wrap_angle};
@@ -25,7 +25,7 @@ patience_s = 30.0
 navigator = { noise_m = 0.01 }
 ";
 
-/// Robots whose leader goes where a script says, with sharp turns.
+/// Robots with a leader that goes where a script says, with sharp turns.
 const SCRIPTED: &str = "
 [[chains]]
 connectors = 5
