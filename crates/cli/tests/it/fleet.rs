@@ -118,7 +118,7 @@ fn a_fleet_that_the_studio_watches_is_seen_to_its_end_steered_by_nobody_and_has_
     }
     let place = place();
     let alone = place.json(&["run", "ring.toml"]);
-    // It waits for a node that is not started yet, so whoever watches sees all of it.
+    // It waits for a node that is not started yet, so a watcher sees all of it.
     let mut fleet = place.start(&["fleet", "ring.toml", "--nodes", "2", "--out", "r"]);
     let at = endpoint(&mut fleet);
     let studio = Studio::start(&place, &[&at]);
