@@ -13,8 +13,8 @@
 //! The third number of `origin` turns the image about its lower-left corner, counterclockwise. Pixels and
 //! boxes stay along the image; only places in the world are turned.
 //!
-//! Transparency is ignored, unlike in `map_server`, whose trinary mode takes it for one more color.
-//! Unknown keys are ignored, as in `map_server`.
+//! Transparency is ignored, unlike in `map_server`, where the trinary mode takes it for one more
+//! color. Unknown keys are ignored, as in `map_server`.
 
 use std::path::Path;
 
@@ -27,7 +27,7 @@ use super::image::Bitmap;
 use super::map_yaml::{MAX_YAML_BYTES, Metadata, Reading};
 use sidestep_scenario::file::read_text;
 
-/// Reads the map whose YAML file is at `path`. YAML file and image may be packed with gzip; an
+/// Reads the map with its YAML file at `path`. YAML file and image may be packed with gzip; an
 /// image that exists only with `.gz` after its name is found too.
 ///
 /// # Errors

@@ -1,5 +1,5 @@
-//! Scenarios as a whole: hand-written ones for each rule, and real ones against what others
-//! have read from them.
+//! Scenarios as a whole: hand-written ones for each rule, and real ones against the
+//! readings of other programs.
 
 use sidestep_testing::shared_data as shared;
 
