@@ -125,7 +125,7 @@ fn arrive(
     }
     pilots[to as usize].on_packet(from, &bytes, tick);
     if kind & 4 > 0 {
-        // It is told the real thing, too, or again.
+        // It gets the real packet, too, or again.
         pilots[to as usize].on_packet(from, &payload, tick);
     }
 }

@@ -17,7 +17,7 @@ use sidestep_record::{McapRun, RunView, read_table};
 use sidestep_server::protocol::Edit;
 use std::sync::LazyLock;
 
-/// A reader of text or bytes, by its name. A folder of the same name in `seeds` has inputs to begin with.
+/// A reader of text or bytes, by its name. A folder of the same name in `seeds` has inputs to start from.
 pub(crate) type Target = (&'static str, fn(&[u8]));
 
 pub(crate) const TARGETS: &[Target] = &[

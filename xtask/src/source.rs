@@ -74,7 +74,7 @@ impl Source {
 }
 
 fn parse(text: &str) -> syn::Result<(TokenStream, Vec<Item>)> {
-    // Lines are numbered alike with and without this first line, for it stays in place.
+    // Lines are numbered alike with and without this first line, because it stays in place.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let tokens: TokenStream = text.parse().map_err(syn::Error::from)?;
     let file: syn::File = syn::parse2(tokens.clone())?;

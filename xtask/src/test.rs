@@ -46,7 +46,7 @@ const ONE_PACKAGE: Part = Part { targets: &[], environment: &[] };
 pub(crate) fn run(chosen: &[String]) -> ExitCode {
     let skipped = Skipped::new();
     let runner: &[&str] = if has_nextest() {
-        // A filter that meets tests of one part alone is no mistake. Nextest wants no word of it where nothing runs.
+        // A filter that meets tests of one part alone is no mistake. Nextest refuses that option where nothing runs.
         let is_run = !chosen.iter().any(|word| word == "--no-run");
         if is_run { &["nextest", "run", "--no-tests", "pass"] } else { &["nextest", "run"] }
     } else {

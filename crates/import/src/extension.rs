@@ -1,4 +1,4 @@
-//! Kinds of files, as their names tell them.
+//! Kinds of files, by their names.
 
 use std::path::Path;
 

@@ -42,7 +42,7 @@ pub fn load(path: &Path) -> Result<PixelMap, InputError> {
     Ok(pixel_map(meta.resolution_m, meta.plane, meta.reading, &image))
 }
 
-/// Reads a plain image as `map_server` would with its usual thresholds: the corner in the south-west is
+/// Reads a plain image as `map_server` would with its usual thresholds: the corner in the southwest is
 /// the origin, a pixel with `p > 0.65` is occupied, one with `p < 0.196` free.
 ///
 /// # Errors

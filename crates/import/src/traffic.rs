@@ -49,7 +49,7 @@ pub struct Sample {
     pub ground_speed_kt: f64,
     /// Direction of motion over the ground in degrees, clockwise from true north, in [0, 360).
     pub track_deg: f64,
-    /// Vertical speed in ft/min, positive upwards.
+    /// Vertical speed in ft/min, positive upward.
     pub vertical_speed_fpm: Option<f64>,
 }
 
@@ -69,7 +69,7 @@ pub fn parse(place: &dyn fmt::Display, text: &str) -> Result<RecordedTraffic, In
     tracks(&CsvTable::parse(place, text)?)
 }
 
-/// The range of times in s since the start of 1970. Milliseconds of our days are beyond it.
+/// The range of times in s since the start of 1970. Milliseconds of the present day are beyond it.
 const TIMES_S: RangeInclusive<f64> = -1e11..=1e11;
 
 /// The longest time in s between the first row and the last one, in time: no recording takes 30 years.

@@ -104,7 +104,7 @@ const DT_S: f64 = 5.0;
 const LINK_BIT_S: f64 = 1e8;
 /// Seconds from the end of sending a message to its arrival; the default of `airspace.network`.
 const LATENCY_S: f64 = 0.001;
-/// Rates for which times are told beside, bits per second.
+/// Rates for which times are shown beside, bits per second.
 const LINKS_BIT_S: [f64; 4] = [1e6, 1e7, LINK_BIT_S, 1e9];
 /// Number of airplanes from which on the paper finds its coordinator slow.
 const MANY: u64 = 5;

@@ -130,7 +130,7 @@ impl Comparison {
         Self { agrees: estimate.mean.is_some_and(agrees), p }
     }
 
-    /// Compares a claim's "in more than so large a share of all runs".
+    /// Compares a claim's "in more than this share of all runs".
     pub(crate) fn share_above(share: &Share, threshold: f64) -> Self {
         let p =
             (share.n >= LEAST_RUNS as u64).then(|| share_p_value(share.hits, share.n, threshold));

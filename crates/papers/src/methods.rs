@@ -96,7 +96,7 @@ struct Flights<'a> {
     interrupt: &'a Interrupt,
 }
 
-/// Number of flights that tell whether seeds change anything, where the world cannot tell.
+/// Number of flights that show whether seeds change anything, where the world cannot tell.
 const TRIALS: usize = 2;
 
 impl Flights<'_> {

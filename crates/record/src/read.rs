@@ -227,7 +227,7 @@ impl<'a> Part<'a> {
             schema::checksums_from_text(&text(schema::CHECKSUMS)?).map_err(|e| bad(path, e))?;
         let about = match schema::key_value(file.metadata(), schema::ABOUT) {
             Some(json) => schema::about_from_json(json).map_err(|e| bad(path, e))?,
-            // Files of earlier versions tell nothing.
+            // Files of earlier versions have none.
             None => Vec::new(),
         };
         let schema = TableSchema { about, ..TableSchema::new(name, columns) };

@@ -139,7 +139,7 @@ impl PrintArgs {
     }
 }
 
-/// Checks that each label stands in some figure, before anything is written.
+/// Checks that each label occurs in some figure, before anything is written.
 ///
 /// # Errors
 /// When one is in none; the error names the first.
@@ -166,7 +166,7 @@ fn size_mm(text: &str) -> Result<[f64; 2], InputError> {
     }
 }
 
-/// Reads words and the ones that stand in their place.
+/// Reads words and their replacements.
 fn renamed(text: &str) -> Result<(String, String), InputError> {
     let parts = text.split_once('=').filter(|(from, _)| !from.is_empty());
     let (from, to) = parts.ok_or_else(|| {

@@ -95,7 +95,7 @@ fn wheels_and_scanner_of_a_simulated_run_come_back_from_its_bag() {
     assert_learned(&wheels, "turns", ["left", "turn"], 0.9, 50.0);
     assert_learned(&wheels, "turns", ["right", "turn"], 0.85, 50.0);
     assert_eq!((&wheels["box_m"], &wheels["warnings"]), (&json!(0.5), &json!([])));
-    // Ranges are told from the middle of the robot, a quarter of a meter behind its border.
+    // Ranges are measured from the middle of the robot, a quarter of a meter behind its border.
     let eye = ["--edges", "2.25", "--classes", "near,far", "--range", "6"];
     let learn = ["learn", "sensor", "--bag", "bag"];
     let eye = place.json(&[&learn[..], &TRUTH, &SCANS, &eye].concat());

@@ -53,7 +53,7 @@ impl Browser {
         serde_json::from_str(found).expect("JSON")
     }
 
-    /// A picture of the page, so wide, as columns, rows and RGB values.
+    /// A picture of the page at this width, as columns, rows and RGB values.
     pub(crate) fn picture(&self, page: &Path, width_px: u32) -> image::RgbImage {
         let folder = tempfile::tempdir().expect("a folder");
         let png = folder.path().join("page.png");

@@ -103,7 +103,7 @@ fn ctrl_c_ends_a_fleet_in_good_order() {
     assert!(folder.is_ok(), "it can be looked at: {:?}", folder.err());
 }
 
-/// Waits until a fleet tells where its server listens; returns the endpoint.
+/// Waits until a fleet reports where its server listens; returns the endpoint.
 fn endpoint(fleet: &mut Child) -> String {
     let mut lines = BufReader::new(fleet.stderr.as_mut().expect("errors")).lines();
     let mut told = lines.by_ref().map(|line| line.expect("text"));

@@ -263,7 +263,7 @@ fn draw_line(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body, poi
     let width = Num(width_px);
     let hides = if opacity < 1.0 { r#" stroke-opacity="0.45""# } else { "" };
     let data = path_data(points_m.iter().map(|&p| canvas.at(p)));
-    // In space the group around all parts says the rest.
+    // In space the group around all parts sets the rest.
     let ends = if canvas.is_above() { format!(" {LINE_LOOK}") } else { String::new() };
     if is_seamed(canvas, body) {
         let around = Num(width_px + 2.0 * SEAM_PX);

@@ -27,7 +27,7 @@ pub(crate) struct Shown<'a> {
     pub(crate) width_m: Option<f64>,
     /// First and last cycle of all trails.
     pub(crate) span: [Cycle; 2],
-    /// Its dashes, which tell it from others of its color; of ribbons, which have a name beside them, none.
+    /// Its dashes, which distinguish it from others of its color; of ribbons, which have a name beside them, none.
     pub(crate) dash: &'static str,
 }
 

@@ -31,7 +31,7 @@ pub fn encode<T: Cdr>(message: &T) -> Vec<u8> {
 /// The reason why bytes are no message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CdrError {
-    /// The encoding is none that is read here; its two bytes.
+    /// The encoding is not one that is read here; its two bytes.
     Encoding([u8; 2]),
     /// A value or its list lies beyond the end.
     Cut {

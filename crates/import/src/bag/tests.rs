@@ -174,7 +174,7 @@ fn every_kind_of_pose_is_a_truth() {
 #[test]
 fn frames_are_joined_through_those_between_them() {
     let mut entries = vec![
-        // Far from the end of the chain, and told once only.
+        // Far from the end of the chain, and reported only once.
         transforms("/tf", 0, &[("map", "odom", at(10.0, FRAC_PI_2))]),
         odometry(0, 0.0),
     ];

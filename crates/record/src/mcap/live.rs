@@ -38,7 +38,7 @@ pub struct Steering {
     pub seek_s: Option<f64>,
 }
 
-/// The state of the run, as viewers are told.
+/// The state of the run, as reported to viewers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Playback {
     /// Whether it goes on.
@@ -179,7 +179,7 @@ impl Sink for Output {
         let mut bytes = Vec::with_capacity(message.encoded_len().unwrap_or(0));
         message.encode(&mut bytes).map_err(|e| RecordError::new(topic, e))?;
         channel.log_with_meta(&bytes, PartialMetadata::with_log_time(log_time));
-        // An event is told once, not whenever a viewer comes.
+        // An event is sent once, not whenever a viewer comes.
         if topic != "/log" {
             let id = u64::from(channel.id());
             self.desk.lock().insert(id, Message { channel, log_time, bytes });

@@ -167,7 +167,7 @@ fn who(name: &str) -> Option<Who> {
     parts.next().is_none().then_some((kind, number, part))
 }
 
-/// Returns the event of a body that a message tells. Its words are all that is known of it.
+/// Returns the event of a body that a message reports. Its words are all that is known of it.
 fn entry(told: &Log, cycle_s: f64) -> Option<Entry> {
     let words = told.message.strip_prefix(&told.name).unwrap_or(&told.message).trim();
     let level = match log::Level::try_from(told.level) {

@@ -25,7 +25,7 @@ impl Completion {
     /// Appends runs to both.
     ///
     /// # Errors
-    /// Other columns than it was begun with; an I/O error.
+    /// Columns other than those it was started with; an I/O error.
     pub fn append<R>(
         &mut self,
         results: &[&RoleColumn<R>],

@@ -1,4 +1,4 @@
-//! A text that is mended step by step, and the way back to the text as it was given.
+//! A text that is repaired step by step, and the way back to the text as it was given.
 
 use crate::scenario::Source;
 use sidestep_kernel::InputError;
@@ -26,7 +26,7 @@ impl Change {
     }
 }
 
-/// A scenario with a mended text.
+/// A scenario with a repaired text.
 #[derive(Debug, Clone)]
 pub(super) struct Draft {
     source: Source,

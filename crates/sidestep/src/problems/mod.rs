@@ -1,14 +1,14 @@
 //! All that is wrong with a scenario, instead of the first thing alone.
 //!
-//! Readers and compilers stop at the first error. So it is reported, mended in a draft of the text,
-//! and the draft is compiled again, until nothing is wrong. A draft is never shown: places and
-//! quoted lines are those of the text as it was given. An error that may only follow from the
-//! mending is not reported; it will be once its cause is gone, if it is a mistake of its own.
+//! Readers and compilers stop at the first error. So it is reported, repaired in a draft of the
+//! text, and the draft is compiled again, until nothing is wrong. A draft is never shown: places
+//! and quoted lines are those of the text as it was given. An error that may only follow from the
+//! repair is not reported; it will be once its cause is gone, if it is a mistake of its own.
 //!
 //! ```text
-//!         ┌──────────────────── draft, with the mended text ◄───────────┐
+//!         ┌─────────────────── draft, with the repaired text ◄──────────┐
 //!         ▼                                                             │
-//!     compile ──error──> told, at its place in the given text ──> repairs, the likeliest first
+//!     compile ──error──> reported, at its place in the given text ──> repairs, the likeliest first
 //! ```
 
 mod draft;
@@ -28,7 +28,7 @@ const MOST_DRAFTS: usize = 150;
 
 /// Returns the errors of a scenario, in the order of its text and at most [`MOST`]; none if it
 /// compiles. Errors of syntax are reported alone, because nothing else is known before they are
-/// mended.
+/// repaired.
 pub fn problems(worlds: Worlds, source: &Source) -> Vec<InputError> {
     let Err(first) = worlds.compile(source) else { return Vec::new() };
     let mut told = source.syntax_errors();
@@ -90,8 +90,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Returns a draft in which an error is mended; none if there is no such draft. Of all repairs the
-    /// first is taken from which nothing seems to follow.
+    /// Returns a draft in which an error is repaired; none if there is no such draft. Of all repairs
+    /// the first is taken from which nothing seems to follow.
     fn mended(&mut self, draft: &Draft, error: &InputError) -> Option<Step> {
         let mut forced: Option<(Repair, Step)> = None;
         for repair in repairs(draft, error, &self.schema(draft)) {

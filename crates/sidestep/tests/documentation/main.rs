@@ -1,4 +1,4 @@
-//! Things that the pages for people say are there: paths, links, pictures, scenarios, code, columns.
+//! Things to which the pages for people refer exist: paths, links, pictures, scenarios, code, columns.
 
 mod columns;
 

@@ -1,4 +1,4 @@
-//! Independent mistakes are told together, each at its key, and nothing else is.
+//! Independent mistakes are reported together, each at its key, and nothing else is.
 
 use crate::shipped;
 use serde_json::Value;

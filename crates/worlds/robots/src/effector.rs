@@ -111,7 +111,7 @@ impl EffectorModel {
         }
     }
 
-    /// Returns whether some action may end otherwise than intended.
+    /// Returns whether some action may not end as intended.
     pub(super) fn errs(&self) -> bool {
         self.transitions.iter().any(|list| list[0].p < 1.0)
     }

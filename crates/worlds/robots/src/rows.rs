@@ -203,7 +203,7 @@ impl Books {
         }
     }
 
-    /// Starts to keep the events that frames tell.
+    /// Starts to keep the events that frames report.
     pub(super) fn watch(&mut self) {
         self.log.is_kept = true;
     }

@@ -21,7 +21,7 @@ pub(super) fn outcome(metrics: &Metrics) -> Lines {
         line("distance", distance(total.distance_m)),
         line("coverage", format!("{:.1} % of the free boxes", 100.0 * metrics.coverage)),
     ];
-    // Nothing to tell where no two bodies ever met.
+    // Nothing to report where no two bodies ever met.
     if metrics.largest_group > 0 {
         lines.push(line("conflict groups", groups(metrics)));
     }

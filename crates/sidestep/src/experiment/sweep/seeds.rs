@@ -1,8 +1,8 @@
 //! Variants in which seeds change nothing: one run says all.
 //!
 //! Where a scenario draws no random number, its world says so, and there is one run. Where draws
-//! only guide a search, the first two runs tell: if they end in the same state to the bit, with the
-//! same cycles, seeds are taken to change nothing, and there are no more runs.
+//! only guide a search, the first two runs decide: if they end in the same state to the bit, with
+//! the same cycles, seeds are taken to change nothing, and there are no more runs.
 
 use super::cell::Outcome;
 use super::plan::{Cell, Plan};

@@ -1,4 +1,4 @@
-//! Events that a run tells are those that its record shows.
+//! Events that a run reports are those that its record shows.
 
 use super::recount::balls;
 use super::*;
@@ -193,7 +193,8 @@ fn a_run_is_over_when_all_tasks_of_all_chains_are_done() {
     assert!(metrics.max_rod_violation_m <= 1e-9 && metrics.given_up.is_empty(), "{metrics:?}");
 }
 
-/// Progress is told of a time by time, of a script by motions, of targets by targets, without an end by the run.
+/// Progress is measured by time for a duration, by motions for a script, by targets for targets, and by the run
+/// without an end.
 #[test]
 fn progress_means_what_the_task_asks_for() {
     let progress = |task: &str, cycles: u64| {

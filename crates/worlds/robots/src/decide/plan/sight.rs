@@ -1,4 +1,4 @@
-//! Boxes that beams tell of: the places around a robot where it cannot stand now.
+//! Boxes that beams report: the places around a robot where it cannot stand now.
 
 use super::super::Percept;
 use crate::ray::crossings;

@@ -1,4 +1,4 @@
-//! A laser scanner learned from the scans of a bag: the ranges that a map lets expect against those measured.
+//! A laser scanner learned from the scans of a bag: the ranges expected from a map against those measured.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ const OBSERVATIONS: [&str; 2] = [NOTHING, WALL];
 const WALL: &str = "wall";
 /// Most beams of a profile, unless others are asked for; a scan has hundreds, a simulated robot few.
 const BEAMS_MAX: usize = 16;
-/// The longest way in meters that odometry alone tells since the last true pose.
+/// The longest way in meters that odometry alone measures since the last true pose.
 const RECKONED_MAX_M: f64 = 1.0;
 /// A scanner with this share of its beams ending before the wall sees things that are not on the map.
 const IN_FRONT_MAX: f64 = 0.1;
@@ -113,7 +113,7 @@ struct Judged {
     skipped: BTreeMap<String, u64>,
 }
 
-/// Compares scans with the ranges that a map lets expect.
+/// Compares scans with the ranges expected from a map.
 struct Judge<'a> {
     log: &'a BagLog,
     map: &'a PixelMap,

@@ -70,7 +70,7 @@ pub struct Scanner<'a> {
 /// Learns a scanner from the scans and true poses in a ROS 2 bag.
 ///
 /// A beam is expected to end at the first wall of the map, from the true pose at its time (L1; where true poses are
-/// farther apart, odometry tells the way since the last one, up to a meter). Beams that run into unmapped places
+/// farther apart, odometry gives the way since the last one, up to a meter). Beams that run into unmapped places
 /// are skipped, and so are ranges below the least that the scanner measures.
 ///
 /// # Errors

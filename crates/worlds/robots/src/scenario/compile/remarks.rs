@@ -4,7 +4,7 @@ use super::super::RobotsFile;
 use super::bodies::Group;
 use super::*;
 
-/// Returns warnings of effectors that move otherwise than their author may think.
+/// Returns warnings of effectors that move in a way that their author may not expect.
 pub(super) fn on_effectors(
     file: &RobotsFile,
     effectors: &BTreeMap<String, Located<EffectorSection>>,
@@ -59,7 +59,7 @@ pub(super) fn refuse_other_boxes(
     Ok(())
 }
 
-/// Returns words for each action that mostly comes to something else than its first transition.
+/// Returns words for each action that mostly ends in a transition other than its first.
 fn not_as_meant(name: &str, at: &Located<EffectorSection>) -> Vec<String> {
     let Ok(model) = tables::effector(name, at) else { return Vec::new() };
     let actions = model.actions.iter().zip(&model.transitions);
