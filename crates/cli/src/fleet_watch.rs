@@ -14,8 +14,8 @@ use std::time::Duration;
 /// Seconds that a fleet has to answer; after as long a silence it is taken to be gone.
 const PATIENCE_S: f64 = 10.0;
 
-/// Time after which it looks again whether a fleet flies where one has ended or was lost. A server that is about to end
-/// shows its last view for a second.
+/// Time after which it looks again whether a fleet flies where one has ended or was lost. A server that is about to
+/// end shows its last view for a second.
 const AGAIN: Duration = Duration::from_secs(2);
 
 /// Returns whether the command line names a fleet's endpoint here, e.g. `tcp/127.0.0.1:7600`, rather than a file.

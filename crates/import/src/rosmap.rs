@@ -31,8 +31,8 @@ use sidestep_scenario::file::read_text;
 /// image that exists only with `.gz` after its name is found too.
 ///
 /// # Errors
-/// When the YAML file does not end in `.yaml` or `.yml`, a file is missing, damaged or absurdly large, or a key is missing or has a wrong
-/// value.
+/// When the YAML file does not end in `.yaml` or `.yml`, a file is missing, damaged or absurdly large, or a key is
+/// missing or has a wrong value.
 pub fn load(path: &Path) -> Result<PixelMap, InputError> {
     extension::check(path, "a map of ROS", &["yaml", "yml"])?;
     let place = path.display().to_string();

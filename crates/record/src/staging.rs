@@ -76,8 +76,8 @@ impl Drop for Staging {
     }
 }
 
-/// Returns the place of a folder that is to be made, without `/` at its end: of a link, the folder that it leads to. A
-/// rename would replace the link itself, and write to another disk than the one that the user has chosen.
+/// Returns the place of a folder that is to be made, without `/` at its end: of a link, the folder that it leads to.
+/// A rename would replace the link itself, and write to another disk than the one that the user has chosen.
 ///
 /// # Errors
 /// A link to a missing folder.

@@ -3,8 +3,8 @@
 //! Efron, "Better bootstrap confidence intervals", Journal of the American Statistical Association
 //! 82 (1987); Efron and Tibshirani, An Introduction to the Bootstrap (1993), chapter 14. Resamples
 //! show how the statistic varies; `z0` corrects for a statistic that is biased, `a` (by the
-//! jackknife) for one with a spread that depends on its value. Its coverage error decreases with `1
-//! / n`, that of Student's interval with `1 / sqrt(n)` on skewed values.
+//! jackknife) for one with a spread that depends on its value. Its coverage error decreases with
+//! `1 / n`, that of Student's interval with `1 / sqrt(n)` on skewed values.
 
 use super::Interval;
 use super::moments::percentile;

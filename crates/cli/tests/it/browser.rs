@@ -31,7 +31,8 @@ pub(crate) fn chromium() -> Option<Browser> {
 pub(crate) struct Browser(String);
 
 impl Browser {
-    /// Opens the page, as wide as given or as the window, lets its scripts run, and returns the findings of [`PROBE`].
+    /// Opens the page, as wide as given or as the window, lets its scripts run, and returns the findings of
+    /// [`PROBE`].
     ///
     /// # Panics
     /// When the browser prints an error of the page.

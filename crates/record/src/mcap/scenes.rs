@@ -123,8 +123,8 @@ fn bodies(entity: &SceneEntity) -> Vec<Body> {
         .collect()
 }
 
-/// Returns the poses and shapes of an entity's primitives. Arrows are bodies only where there is nothing else; else they
-/// show where something heads.
+/// Returns the poses and shapes of an entity's primitives. Arrows are bodies only where there is nothing else; else
+/// they show where something heads.
 fn shapes(entity: &SceneEntity) -> Vec<(Pose, Shape)> {
     let at = messages::read_pose;
     let cubes = entity.cubes.iter().map(|cube| {

@@ -1,7 +1,7 @@
 //! The columns of a table of runs, as all outcomes together make them.
 //!
-//! A table that is written block by block needs them before its first block: a metric may appear, or turn out to be no
-//! whole number, in the last run.
+//! A table that is written block by block needs them before its first block: a metric may appear, or turn out to be
+//! no whole number, in the last run.
 
 use super::cell::Outcome;
 use super::table::Role;

@@ -19,7 +19,7 @@ fn numbers(values: impl IntoIterator<Item = f64>) -> Values {
 }
 
 /// A full grid: 2 regimes, counts 10, 20 and 40, 20 replicates. The delay is
-/// `count / 10 + 3 (of "rush") + a share of the replicate + noise`; robots arrive less often in
+/// `count / 10 + 3 (of "rush") + effect of the replicate + noise`; robots arrive less often in
 /// a rush; the noise says nothing.
 fn grid() -> RunTable {
     let mut rows = Vec::new();
