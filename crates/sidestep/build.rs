@@ -5,7 +5,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Folders of crates beside this one whose sources determine results.
+/// Folders of crates beside this one with sources that determine results.
 const CRATES: [&str; 6] = ["kernel", "scenario", "map", "import", "collectives", "statistics"];
 /// The sources of this crate that determine results.
 const OWN: &str = "src/experiment/sweep";

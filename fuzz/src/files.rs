@@ -23,7 +23,7 @@ pub(crate) fn file(name: &str, data: &[u8]) -> PathBuf {
     path
 }
 
-/// The YAML file of a map whose image is there.
+/// The YAML file of a map with an existing image.
 pub(crate) fn beside_an_image(data: &[u8]) -> PathBuf {
     file("image.pgm", b"P2\n3 2\n255\n0 128 255\n255 205 0\n");
     file("f.yaml", data)

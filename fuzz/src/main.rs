@@ -1,8 +1,8 @@
 //! Fuzzers of every parser and decoder, [`targets::TARGETS`].
 //!
 //! An input may be refused, but it may not panic, overflow, hang or take all memory (promise E1). `.ci/soak` compiles
-//! this with counters for libFuzzer (`--cfg fuzzing`). Without, it is a program that hands files to a target, as it
-//! takes to look into what a fuzzer found: `sidestep-fuzz TARGET FILE...`
+//! this with counters for libFuzzer (`--cfg fuzzing`). Without, it is a program that hands files to a target, for
+//! looking into the findings of a fuzzer: `sidestep-fuzz TARGET FILE...`
 
 #![cfg_attr(fuzzing, no_main)]
 
@@ -13,7 +13,7 @@ mod targets;
 use std::path::PathBuf;
 use targets::Target;
 
-/// The target that the environment names. Whoever starts a fuzzer makes a folder for its files, and takes it away.
+/// The target that the environment names. The starter of a fuzzer makes a folder for its files, and deletes it.
 #[cfg(fuzzing)]
 static CHOSEN: std::sync::LazyLock<Target> = std::sync::LazyLock::new(|| {
     files::keep_in(

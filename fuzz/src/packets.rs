@@ -1,4 +1,4 @@
-//! Agents of the worlds, to whom packets come that nobody checked.
+//! Agents of the worlds, which receive unchecked packets.
 
 use sidestep::kernel::network::{Draft, Seal, TalkId, open};
 use sidestep::scenario::Source;
@@ -12,7 +12,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, LazyLock};
 
 /// Hands packets to the agent of a connector in the middle of a chain: each begins with its sender and its
-/// length. Whatever they are, the agent comes to a decision once time is up.
+/// length. For any packets, the agent comes to a decision once time is up.
 pub(crate) fn to_a_connector(mut data: &[u8]) {
     static TEAM: LazyLock<Compiled<2>> = LazyLock::new(|| {
         let text = "format = 1\nworld = \"chain\"\n[chain]\nself_collision = false\nbacktracks = 0\n\
@@ -59,8 +59,8 @@ const TALKS: [&str; 7] = [
     "deployment = \"hierarchical-pim\"\npreset = \"paper\"\nnetwork = { loss = 0.1 }",
 ];
 
-/// Lets three pilots talk, on a network that does what the data says: the first byte chooses the settings, and then
-/// each four bytes are a step: a packet arrives as it is, or changed with a right checksum, or damaged, or time passes.
+/// Lets three pilots talk, on a network driven by the data: the first byte chooses the settings, and then each four
+/// bytes are a step: a packet arrives as it is, or changed with a right checksum, or damaged, or time passes.
 pub(crate) fn among_pilots(data: &[u8]) {
     static FLEETS: LazyLock<Vec<(Arc<AirspaceWorld>, Vec<Sight>)>> = LazyLock::new(|| {
         let fleet = |talk: &&str| {
@@ -125,7 +125,7 @@ fn arrive(
     }
     pilots[to as usize].on_packet(from, &bytes, tick);
     if kind & 4 > 0 {
-        // It is told the real thing, too, or again.
+        // It gets the real packet, too, or again.
         pilots[to as usize].on_packet(from, &payload, tick);
     }
 }

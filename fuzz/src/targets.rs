@@ -17,7 +17,7 @@ use sidestep_record::{McapRun, RunView, read_table};
 use sidestep_server::protocol::Edit;
 use std::sync::LazyLock;
 
-/// A reader of text or bytes, by its name. A folder of the same name in `seeds` has inputs to begin with.
+/// A reader of text or bytes, by its name. A folder of the same name in `seeds` has inputs to start from.
 pub(crate) type Target = (&'static str, fn(&[u8]));
 
 pub(crate) const TARGETS: &[Target] = &[
@@ -77,7 +77,7 @@ fn overridden(setting: &str) {
     }
 }
 
-/// Edits a text: the JSON of the edits is the first line, the text the rest. What was TOML stays TOML.
+/// Edits a text: the JSON of the edits is the first line, the text the rest. TOML stays TOML.
 fn edited(input: &str) {
     let Some((edits, text)) = input.split_once('\n') else { return };
     let Ok(edits) = serde_json::from_str::<Vec<Edit>>(edits) else { return };
@@ -92,7 +92,7 @@ fn script(script: &str) {
     let chain = "format = 1\nworld = \"chain\"\ncycles = 10\n[[chains]]\nconnectors = 4\n\
                  [[chains.tasks]]\nkind = \"script\"\n";
     let script = serde_json::Value::from(script).to_string();
-    // JSON and TOML write strings alike, but for the escape of a slash and of what is above 16 bits.
+    // JSON and TOML write strings alike, but for the escape of a slash and of characters above 16 bits.
     scenario(&format!("{chain}script = {script}\n"));
 }
 

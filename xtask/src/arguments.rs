@@ -1,4 +1,4 @@
-//! Words of the command line -> what to count and what to print.
+//! Words of the command line -> the things to count and to print.
 
 use std::path::PathBuf;
 

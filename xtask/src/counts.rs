@@ -153,7 +153,7 @@ fn of_one(member: &Member) -> Counts {
     }
 }
 
-/// Returns the figures of what was counted.
+/// Returns the figures of the counts.
 pub(crate) fn figures(counted: &[(String, Counts)]) -> Vec<Row> {
     let row = |(name, counts): &(String, Counts)| Row {
         name: name.clone(),

@@ -1,5 +1,6 @@
 //! Features of packages, equal for the command and the tests: every package has the same features in
-//! both. Else `cargo run` compiles again what the tests have, and all that stands on it.
+//! both. Otherwise `cargo run` compiles the packages of the tests again, and everything that depends
+//! on them.
 
 use std::collections::BTreeSet;
 use std::process::Command;

@@ -1,4 +1,4 @@
-//! Lines of a file, told apart: blank, comment, documentation, code.
+//! Lines of a file, distinguished: blank, comment, documentation, code.
 
 use std::ops::RangeInclusive;
 
@@ -35,7 +35,7 @@ pub(crate) fn of(text: &str, tokens: TokenStream) -> Vec<Line> {
     lines.map(|(text, kind)| Line { text: text.trim().to_string(), kind, is_test: false }).collect()
 }
 
-/// Kind of a line without tokens: blank or a comment, as there is nothing else.
+/// Kind of a line without tokens: blank or a comment, because nothing else is left.
 fn without_tokens(text: &str) -> Kind {
     if text.trim().is_empty() { Kind::Blank } else { Kind::Comment }
 }

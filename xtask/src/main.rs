@@ -39,7 +39,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Returns what the command prints.
+/// Returns the text that the command prints.
 fn run(words: impl Iterator<Item = String>) -> Result<String, String> {
     let arguments = arguments::parse(words)?;
     if arguments.print == Print::Help {

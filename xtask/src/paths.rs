@@ -58,7 +58,7 @@ impl<'ast> Visit<'ast> for Finder {
     }
 }
 
-/// Collects names with two colons between them: what macros are given is tokens and no paths yet.
+/// Collects names with two colons between them: the arguments of macros are tokens and no paths yet.
 fn chained(tokens: TokenStream, chains: &mut Vec<Vec<String>>) {
     let mut chain: Vec<String> = Vec::new();
     let mut colons = 0;

@@ -1,4 +1,4 @@
-//! Rules of the house that cargo cannot hold: who may name what, and no circles of imports.
+//! Rules of the house that cargo cannot enforce: permitted names and dependencies, and no circles of imports.
 //!
 //! Crates are known by their folders; a rule about one that is not there holds by itself.
 
@@ -16,7 +16,7 @@ use crate::source::{self, Role};
 /// Circles that are known, in the format of `cargo xtask shape --circles`.
 const KNOWN: &str = include_str!("../circles.txt");
 
-/// Folders whose code may name threads; tests may too.
+/// Folders of code that may name threads; tests may too.
 const THREADS: [&str; 5] =
     ["crates/kernel", "crates/session", "crates/server", "crates/link", "crates/cli"];
 
@@ -29,7 +29,7 @@ const RESERVED: [(&str, &[&str]); 9] = [
     ("clap", &["crates/cli"]),
     ("pyo3", &["python"]),
     ("axum", &["crates/server"]),
-    // The session names it for its features alone, so that all share what is compiled.
+    // The session names it for its features alone, so that all share the compiled crate.
     ("tokio", &["crates/server", "crates/session"]),
     ("zenoh", &["crates/link"]),
 ];
@@ -54,7 +54,7 @@ const WITHOUT_WORLDS: [&str; 10] = [
 /// Crates that drive runs of any world: the list of worlds is handed to them, and their code names none.
 const NAMES_NO_WORLD: [&str; 2] = ["crates/session", "crates/server"];
 
-/// Kinds of dependencies that get into what is built.
+/// Kinds of dependencies that get into the built programs.
 const BUILT: [&str; 2] = ["dependencies", "build-dependencies"];
 const ALL: [&str; 3] = ["dependencies", "build-dependencies", "dev-dependencies"];
 
@@ -97,7 +97,7 @@ fn needed<'a>(members: &'a [Member], start: &Member) -> Vec<&'a Member> {
     found
 }
 
-/// Returns who depends on a package that is reserved for other crates.
+/// Returns the crates that depend on a package reserved for others.
 fn trespassers(members: &[Member]) -> Vec<String> {
     let mut wrong = Vec::new();
     for (package, folders) in RESERVED {
@@ -228,7 +228,7 @@ fn headless(members: &[Member]) -> Vec<String> {
     wrong
 }
 
-/// Returns the same of what is not written in Rust, below the root of the repository.
+/// Returns the same of sources in other languages, below the root of the repository.
 fn headless_elsewhere(root: &Path) -> Vec<String> {
     let mut paths = Vec::new();
     for folder in OTHER_LANGUAGES {
@@ -275,7 +275,7 @@ fn circles_of(text: &str) -> BTreeSet<&str> {
     text.filter(|circle| circle.starts_with('[')).collect()
 }
 
-/// Returns what differs between the circles that are there and those that are known.
+/// Returns the differences between the circles that are there and those that are known.
 fn differing(found: &str, known: &str) -> Vec<String> {
     let (found, known) = (circles_of(found), circles_of(known));
     let new = found.difference(&known).map(|circle| {
@@ -287,7 +287,7 @@ fn differing(found: &str, known: &str) -> Vec<String> {
     new.chain(gone).collect()
 }
 
-/// All rules in one test, as reading the sources takes longer than the rules.
+/// All rules in one test, because reading the sources takes longer than the rules.
 #[test]
 fn the_rules_of_the_house_hold() {
     let members = members::read(&arguments::house()).unwrap();

@@ -1,4 +1,4 @@
-//! One file of Rust: its lines, and what it declares apart from tests.
+//! One file of Rust: its lines, and its items apart from tests.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -35,7 +35,7 @@ pub(crate) struct Source {
     pub(crate) role: Role,
     /// Lines, in order.
     pub(crate) lines: Vec<Line>,
-    /// Everything declared, without what is built for tests only.
+    /// Everything declared, without items that are built for tests only.
     pub(crate) items: Vec<Item>,
     /// Modules in files of their own that are built for tests only, as [`Source::items`] lacks them.
     pub(crate) test_modules: Vec<Item>,
@@ -74,7 +74,7 @@ impl Source {
 }
 
 fn parse(text: &str) -> syn::Result<(TokenStream, Vec<Item>)> {
-    // Lines are numbered alike with and without this first line, for it stays in place.
+    // Lines are numbered alike with and without this first line, because it stays in place.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let tokens: TokenStream = text.parse().map_err(syn::Error::from)?;
     let file: syn::File = syn::parse2(tokens.clone())?;
@@ -93,7 +93,7 @@ fn mark_test(lines: &mut [Line], range: Range) {
     }
 }
 
-/// Moves what is built for tests only out of `items`, from inline modules too.
+/// Moves items that are built for tests only out of `items`, from inline modules too.
 fn take_tests(items: &mut Vec<Item>, tests: &mut Vec<Item>) {
     tests.extend(items.extract_if(.., |item| is_test(attributes(item))));
     for item in items {
@@ -175,7 +175,7 @@ pub(crate) fn read_all(root: &Path, folder: &Path) -> Result<Vec<Source>, String
     Ok(sources)
 }
 
-/// Collects the files below a folder whose names end so, but not those of other packages or of builds.
+/// Collects the files below a folder with one of these endings, but not those of other packages or of builds.
 pub(crate) fn collect(
     folder: &Path,
     endings: &[&str],

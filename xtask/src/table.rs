@@ -38,7 +38,7 @@ fn number(value: Option<f64>) -> Value {
     }
 }
 
-/// Reads what [`json()`] wrote. A figure that it lacks is none.
+/// Reads the output of [`json()`]. A figure that it lacks is none.
 pub(crate) fn read(path: &Path) -> Result<Vec<Row>, String> {
     let text = fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
     parse(&text)

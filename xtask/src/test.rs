@@ -1,7 +1,7 @@
-//! `cargo xtask test`: every test of the workspace, in two builds that share all that others wrote.
+//! `cargo xtask test`: every test of the workspace, in two builds that share all third-party crates.
 //!
 //! Tests beside the code run with overflow checks and debug assertions on, in a build that is quick to make.
-//! Tests from outside (`tests/`: promises, the program itself) run against what is shipped, so that the
+//! Tests from outside (`tests/`: promises, the program itself) run against the shipped build, so that the
 //! program and its tests share all that cargo compiles.
 
 use crate::arguments::house;
@@ -28,7 +28,7 @@ struct Part {
 const BESIDE: Part = Part { targets: &["--lib", "--bins"], environment: &CHECKS };
 
 /// Tests from outside, some of which run examples: the promises of the library, too, so that its golden digests
-/// are those of what is shipped.
+/// are those of the shipped build.
 const OUTSIDE: Part = Part { targets: &["--test", "*"], environment: &[] };
 
 /// Examples as programs: among the targets of tests, cargo would compile each as a program of tests.
@@ -46,7 +46,7 @@ const ONE_PACKAGE: Part = Part { targets: &[], environment: &[] };
 pub(crate) fn run(chosen: &[String]) -> ExitCode {
     let skipped = Skipped::new();
     let runner: &[&str] = if has_nextest() {
-        // A filter that meets tests of one part alone is no mistake. Nextest wants no word of it where nothing runs.
+        // A filter that meets tests of one part alone is no mistake. Nextest refuses that option where nothing runs.
         let is_run = !chosen.iter().any(|word| word == "--no-run");
         if is_run { &["nextest", "run", "--no-tests", "pass"] } else { &["nextest", "run"] }
     } else {
@@ -58,14 +58,14 @@ pub(crate) fn run(chosen: &[String]) -> ExitCode {
         return ExitCode::FAILURE;
     }
     let parts = if all { &[BESIDE, OUTSIDE][..] } else { &[ONE_PACKAGE] };
-    // All are run, whatever the first come to: whoever mends wants to see every failure.
+    // All are run, even if the first fail: a developer wants to see every failure.
     let failed = parts.iter().filter(|part| !cargo(runner, part, chosen)).count();
     let passed = failed == 0 && (!chosen.is_empty() || cargo(&["test"], &EXAMPLES, &[]));
     skipped.tell();
     if passed { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// Reasons why tests were skipped: they say so in a file, as nobody sees what a test prints that passes.
+/// Reasons why tests were skipped: they say so in a file, because the output of a passing test is not shown.
 struct Skipped(PathBuf);
 
 impl Skipped {

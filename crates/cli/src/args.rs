@@ -46,7 +46,7 @@ impl Cli {
     }
 }
 
-/// Ends the process with help or with what is wrong about its arguments.
+/// Ends the process with help or with the error in its arguments.
 fn end(told: &clap::Error) -> ! {
     let code = match written(told.print().and_then(|()| std::io::stdout().flush())) {
         Err(failure) if !told.use_stderr() => {
@@ -70,7 +70,7 @@ fn without_help_of_help(words: impl Iterator<Item = OsString>) -> Vec<OsString> 
     words
 }
 
-/// Returns the command line, whose help lists the commands by what people do with them.
+/// Returns the command line; its help lists the commands by their use.
 pub(crate) fn command() -> clap::Command {
     // Without a terminal, clap would take 100 columns.
     let command = Cli::command().term_width(prose_columns().into());

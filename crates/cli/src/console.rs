@@ -98,8 +98,8 @@ fn write_out(text: &str) -> Result<(), Failure> {
     written(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
 }
 
-/// Returns whether standard output took what was written to it. A reader that has closed the pipe (`| head`) is not an
-/// error.
+/// Returns whether standard output took the text that was written to it. A reader that has closed the pipe (`| head`)
+/// is not an error.
 ///
 /// # Errors
 /// When it did not.

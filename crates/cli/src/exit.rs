@@ -6,7 +6,7 @@ pub(crate) use sidestep_session::Error as Failure;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum ExitCode {
-    /// The command did what was asked.
+    /// The command did its work.
     Done = 0,
     /// The command could not finish, or the answer is no: a full disk, a replay that differs from
     /// its recording, a target that no posture reaches.

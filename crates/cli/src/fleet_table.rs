@@ -63,7 +63,7 @@ impl Shown {
     }
 }
 
-/// Returns the table of a fleet in so many lines at most: nodes in trouble come first where not all fit.
+/// Returns the table of a fleet in `most_lines` lines at most: nodes in trouble come first where not all fit.
 fn table(now: &FleetNow, most_lines: usize) -> String {
     let mut nodes: Vec<&NodeNow> = now.nodes.iter().collect();
     let waits = usize::from(!now.waits_for.is_empty());
@@ -103,7 +103,7 @@ fn heading(now: &FleetNow) -> String {
     )
 }
 
-/// Returns a line that says for whom the fleet waits, if it does.
+/// Returns a line that names the nodes the fleet waits for, if it does.
 fn waits(now: &FleetNow) -> String {
     match now.waits_for.as_slice() {
         [] => String::new(),

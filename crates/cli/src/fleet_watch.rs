@@ -14,8 +14,8 @@ use std::time::Duration;
 /// Seconds that a fleet has to answer; after as long a silence it is taken to be gone.
 const PATIENCE_S: f64 = 10.0;
 
-/// Time after which it looks again whether a fleet flies where one has ended or was lost. A server that is about to end
-/// shows its last view for a second.
+/// Time after which it looks again whether a fleet flies where one has ended or was lost. A server that is about to
+/// end shows its last view for a second.
 const AGAIN: Duration = Duration::from_secs(2);
 
 /// Returns whether the command line names a fleet's endpoint here, e.g. `tcp/127.0.0.1:7600`, rather than a file.
@@ -28,7 +28,7 @@ pub(crate) fn is_endpoint(named: &Path) -> bool {
     is_one == Some(true) && !named.exists()
 }
 
-/// Divides what is named into files and endpoints of fleets.
+/// Divides the named things into files and endpoints of fleets.
 pub(crate) fn divided(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
     let (fleets, files): (Vec<&PathBuf>, Vec<&PathBuf>) =
         named.iter().partition(|path| is_endpoint(path));
@@ -54,7 +54,7 @@ pub(crate) fn watch(endpoint: &str, tls: Option<Tls>) -> Result<Arc<Screen>, Fai
     begins.recv().unwrap_or(Err(Failure::Interrupted))
 }
 
-/// Puts what is heard on a screen, of one fleet after the other that flies there, until the command is interrupted.
+/// Puts the news of one fleet after the other that flies there on a screen, until the command is interrupted.
 fn hear(job: &Job, endpoint: &str, began: &Sender<Result<Arc<Screen>, Failure>>) {
     let mut screen = None;
     while !interrupt::requested() {
@@ -70,7 +70,7 @@ fn hear(job: &Job, endpoint: &str, began: &Sender<Result<Arc<Screen>, Failure>>)
     }
 }
 
-/// Puts what is heard on a screen, until the fleet is over or gone.
+/// Puts the news of a fleet on a screen, until it is over or gone.
 fn hear_one(
     job: &Job,
     endpoint: &str,
@@ -80,7 +80,7 @@ fn hear_one(
     link::run(job, |told| match (told, &*screen) {
         (Told::Scene(staged), None) => {
             let made = Arc::new(Screen::new(endpoint.to_string(), *staged));
-            // Whoever waits is there until it has an answer.
+            // The waiting thread is there until it has an answer.
             let _ = began.send(Ok(made.clone()));
             *screen = Some(made);
         }

@@ -1,7 +1,7 @@
 //! Ctrl-C: the first one asks the run to stop in good order, the second one ends the process.
 //!
 //! Good order is between two cycles. A run that has not come to the end of its cycle after
-//! [`PATIENCE`] leaves it half done; what it has recorded continues from the last checkpoint.
+//! [`PATIENCE`] leaves it half done; its recording continues from the last checkpoint.
 
 use crate::exit::{ExitCode, Failure};
 use sidestep::kernel::Interrupt;

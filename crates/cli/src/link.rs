@@ -1,4 +1,4 @@
-//! The program `sidestep-link`, which alone carries the network: found, started, told what to do, and ended.
+//! The program `sidestep-link`, which alone carries the network: found, started, given a job, and ended.
 
 use crate::exit::Failure;
 use crate::interrupt;
@@ -11,7 +11,7 @@ use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// Variable with the path of the program, for who has it elsewhere.
+/// Variable with the path of the program, for users who have it elsewhere.
 const VARIABLE: &str = "SIDESTEP_LINK";
 
 /// Time between two looks at whether to end.
@@ -20,15 +20,15 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Options of the server and of nodes.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct LinkArgs {
-    /// Seconds after which a party that is not heard is taken to be gone
+    /// Timeout: seconds of silence after which a node or the server is taken to be gone
     #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = seconds)]
     lease: f64,
 
-    /// Show metrics in Prometheus' format to who asks at this address, e.g. 127.0.0.1:9100
+    /// Serve metrics in Prometheus format at this address, e.g. 127.0.0.1:9100
     #[arg(long, value_name = "HOST:PORT")]
     metrics: Option<String>,
 
-    /// Log to standard error from this level on: off, error, warn, info, debug or trace
+    /// Log level on standard error: off, error, warn, info, debug or trace
     #[arg(long, value_name = "LEVEL", default_value = "warn")]
     log: String,
 
@@ -40,10 +40,10 @@ pub(crate) struct LinkArgs {
     tls: TlsArgs,
 }
 
-/// Options of certificates, with which both ends of every link prove who they are.
+/// Options of certificates, with which both ends of every link prove their identity.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct TlsArgs {
-    /// Certificate of the authority that has signed those of all parties (PEM)
+    /// Certificate of the authority (CA) that signed those of all parties (PEM)
     #[arg(long, value_name = "FILE", requires_all = ["tls_cert", "tls_key"], help_heading = "Encryption")]
     tls_ca: Option<PathBuf>,
 
@@ -116,7 +116,7 @@ pub(crate) fn find() -> Result<PathBuf, InputError> {
     })
 }
 
-/// Lets the program do a job, and hands what it tells to `take`. Ctrl-C asks it to end in good order.
+/// Lets the program do a job, and hands its messages to `take`. Ctrl-C asks it to end in good order.
 ///
 /// # Errors
 /// When it is not there, cannot do it, or ends before it is done.
@@ -136,7 +136,7 @@ pub(crate) fn run(job: &Job, mut take: impl FnMut(Told)) -> Result<(), Failure> 
             Err(RecvTimeoutError::Disconnected) => break,
         }
         if interrupt::requested() {
-            // The program ends when nobody is left who could say more.
+            // The program ends when its standard input is closed.
             drop(stdin.take());
         }
     }
@@ -178,7 +178,7 @@ fn say(stdin: Option<&mut ChildStdin>, line: &str) {
     }
 }
 
-/// Returns what the program tells, as it does.
+/// Returns the messages of the program as they come.
 fn listen(child: &mut Child) -> Receiver<Told> {
     let (sender, told) = channel();
     let out = child.stdout.take();

@@ -30,7 +30,7 @@ pub(crate) struct ChangeArgs {
     #[arg(long, value_name = "S", value_parser = toml_integer())]
     pub(crate) seed: Option<u64>,
 
-    /// Error regime: errors of nothing, of effectors, of sensors, or of both
+    /// Error regime: no errors (reliable), those of effectors, of sensors, or of both
     #[arg(long, value_name = "R", value_parser = ["reliable", "effectors", "sensors", "both"])]
     pub(crate) regime: Option<String>,
 

@@ -79,8 +79,8 @@ impl PairwiseGame {
     /// Size of a pair in bytes per combination of two strategies.
     pub const BYTES_PER_ENTRY: u64 = 3 * size_of::<f64>() as u64;
 
-    /// Creates a game of players who pay for their own strategies alone; `own[i][x]` is the cost of
-    /// strategy `x` for player `i`.
+    /// Creates a game of players that pay for their own strategies alone; `own[i][x]` is the cost
+    /// of strategy `x` for player `i`.
     ///
     /// # Panics
     /// When a player has no strategy.
@@ -101,7 +101,7 @@ impl PairwiseGame {
 
     /// Adds a pair of which each player bears a part: `parts[x_a][x_b]` are those of `a` and `b`.
     /// The cost of a joint move is summed player by player, each player's own costs first and then
-    /// its parts by increasing number of the other player, so that players who sum separately get
+    /// its parts by increasing number of the other player, so that players that sum separately get
     /// the same bits.
     ///
     /// # Panics

@@ -1,5 +1,5 @@
 #![deny(clippy::disallowed_methods)]
-//! Probability collectives: optimization by players who learn distributions over strategies.
+//! Probability collectives: optimization by players that learn distributions over strategies.
 //!
 //! Source: the 2009 paper "Integration of Probability Collectives for Collision Avoidance in
 //! AGENTFLY", section 2, after Wolpert and Bieniawski. Instead of searching for the joint move
@@ -27,8 +27,8 @@
 //! a sum over pairs ([`PairwiseGame`]); it is the limit of infinitely many samples.
 //!
 //! **Two updates.** [`Update::NearestNewton`] steps along the natural gradient of `L_i`;
-//! [`Update::Brouwer`] moves toward the distribution that would be the minimum if nobody else
-//! moved, `q_i ~ exp(-E[G | x_i] / T)`.
+//! [`Update::Brouwer`] moves toward the distribution that would be the minimum if no other
+//! player moved, `q_i ~ exp(-E[G | x_i] / T)`.
 
 mod game;
 mod optimize;

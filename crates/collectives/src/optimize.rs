@@ -151,7 +151,7 @@ impl<'g, G: Game, U: Fn(usize, u64) -> f64> RoundTable<'g, G, U> {
     }
 
     /// Runs a round with a block of joint samples, sample `k` of all players being joint move `k`.
-    /// In sequence, each player draws a block anew with those before it. Returns the largest change
+    /// In sequence, each player draws a new block with those before it. Returns the largest change
     /// of a probability.
     fn sampled_round(&mut self, block: usize, ageing: f64) -> f64 {
         let mut samples = self.draw_block(block);
@@ -222,7 +222,7 @@ mod tests {
         }
     }
 
-    /// Costs in which strategy 1 is best for every player whatever the others do.
+    /// Costs in which strategy 1 is best for every player, whichever strategies the others choose.
     fn easy() -> super::super::PairwiseGame {
         let mut game = game(&[3, 3, 3], &[2.0, 0.0, 3.0]);
         game.add_pair(0, 1, vec![1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0]);

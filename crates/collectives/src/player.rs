@@ -214,7 +214,7 @@ mod tests {
                     prop_assert!(player.q.iter().all(|q| *q > 0.0 && q.is_finite()));
                 }
                 let best = player.choose(Choice::Argmax, 0.0);
-                // What costs differ by is told as a share of the spread, so that is their scale.
+                // Differences between costs are given as a share of the spread, so that is their scale.
                 let scale = costs.iter().fold(0.0f64, |most, c| most.max(c.abs()));
                 prop_assert!(costs.iter().all(|&c| c >= costs[best] - 1e-9 * scale));
             }
@@ -229,7 +229,7 @@ mod tests {
         }
     }
 
-    /// Checks what both updates come to without cooling.
+    /// Checks where both updates come to rest without cooling.
     fn rests_at_the_boltzmann_distribution(costs: &[f64]) {
         let low = costs.iter().copied().fold(f64::INFINITY, f64::min);
         let spread = costs.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;

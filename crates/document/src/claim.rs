@@ -13,9 +13,9 @@ pub enum Verdict {
     /// Our figures do not tell: an interval contains the threshold, there were too few runs, or the
     /// machine was not quiet or large enough.
     Undecided,
-    /// It cannot be judged by anybody: what the paper measured or compared is lost.
+    /// It can no longer be judged: the quantities that the paper measured or compared are lost.
     Lost,
-    /// It only states what was run, so there is nothing to judge.
+    /// It only states the runs, so there is nothing to judge.
     Setting,
 }
 

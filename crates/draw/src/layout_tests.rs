@@ -1,5 +1,5 @@
 //! Promises that hold for every kind of picture: well-formed, nothing clipped, no overlapping text,
-//! equal bytes for equal input, no panic whatever the numbers are.
+//! equal bytes for equal input, no panic for any numbers.
 
 use proptest::prelude::*;
 use resvg::usvg::{Group, Node, Rect};

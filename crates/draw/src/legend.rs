@@ -80,7 +80,7 @@ pub(crate) enum Symbol {
     Swatch { fill: Paint, rim: Paint, opacity: f64 },
     /// The mark at a track's start.
     Ring,
-    /// The mark of who leads.
+    /// The mark of a leader.
     Leader,
 }
 
@@ -191,7 +191,7 @@ pub(crate) fn start_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: 
     );
 }
 
-/// Draws the mark of who leads: a ring around a dot.
+/// Draws the mark of a leader: a ring around a dot.
 pub(crate) fn leader_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: &str) {
     start_mark(svg, center, radius, color);
     svg.circle(center, 0.45 * radius, format_args!(r#"class="leader" fill="{color}""#));

@@ -1,11 +1,11 @@
 //! Pictures of runs and of measurements: the visible part of a run, or plain numbers, in; SVG text
 //! and PNG bytes out.
 //!
-//! There is one drawing path: every picture is first an SVG ([`draw`], [`Plot`], [`BarChart`]);
-//! [`to_png`] rasterizes exactly that SVG, and a [`Film`] does so repeatedly. The crate reads no files, asks for no system font and knows no world: of a run it
-//! sees scenery, frames and trails (`sidestep_kernel::view`).
+//! There is one drawing path: every picture is first an SVG ([`draw`], [`Plot`], [`BarChart`]); [`to_png`] rasterizes
+//! exactly that SVG, and a [`Film`] does so repeatedly. The crate reads no files, asks for no system font and knows
+//! no world: of a run it sees scenery, frames and trails (`sidestep_kernel::view`).
 //!
-//! The same input gives the same bytes, whatever fonts and locale the machine has: numbers are
+//! The same input gives the same bytes, for any fonts and locale of the machine: numbers are
 //! rounded to a hundredth of a unit, logarithms come from `libm`, and the only font is the
 //! embedded DejaVu Sans.
 //!

@@ -11,8 +11,9 @@ const MOST_PX: u32 = 8192;
 
 /// Rasterizes an SVG picture so that its longer side is `max_px` pixels.
 ///
-/// Text is drawn in the embedded DejaVu Sans, whatever fonts the machine has, and nothing outside
-/// `svg` is read (an `<image>` in it stays undrawn), so the bytes depend only on the arguments.
+/// Text is drawn in the embedded DejaVu Sans, regardless of the machine's fonts, and nothing
+/// outside `svg` is read (an `<image>` in it stays undrawn), so the bytes depend only on the
+/// arguments.
 ///
 /// # Errors
 /// [`DrawError::Svg`] if `svg` is no SVG, [`DrawError::Value`] or [`DrawError::TooLarge`] if `max_px`

@@ -122,7 +122,7 @@ impl Svg {
     /// Writes `text` with its baseline at `y`.
     pub(crate) fn text(&mut self, x: f64, y: f64, text: &str, look: &TextLook<'_>) {
         let (x, y, size) = (Num(x), Num(y), Num(look.size_px));
-        // Ink is what the document fills with where nothing is said.
+        // Ink is the default fill of the document.
         let fill =
             if look.fill == INK { String::new() } else { format!(r#" fill="{}""#, look.fill) };
         let anchor = match look.anchor {

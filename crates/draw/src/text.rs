@@ -27,7 +27,7 @@ pub(crate) fn fonts() -> Arc<fontdb::Database> {
         fonts.load_font_data(dejavu::sans::regular().to_vec());
         fonts.load_font_data(dejavu::sans::bold().to_vec());
         fonts.set_sans_serif_family("DejaVu Sans");
-        // The fallback for text whose own font is missing.
+        // The fallback for text with a missing font.
         fonts.set_serif_family("DejaVu Sans");
         Arc::new(fonts)
     }))

@@ -1,4 +1,4 @@
-//! Kinds of files, as their names tell them.
+//! Kinds of files, by their names.
 
 use std::path::Path;
 
@@ -11,8 +11,9 @@ pub(crate) fn extension(path: &Path) -> String {
     name.rsplit_once('.').map_or("", |(_, extension)| extension).to_owned()
 }
 
-/// Refuses a file whose name does not say that it is of a kind. Files that name further files need it: one text can be a
-/// scenario and a map at once, so whoever may write scenarios alone could have files read that a scenario may not name.
+/// Refuses a file with a name that does not say that it is of a kind. Files that name further files need it: one text
+/// can be a scenario and a map at once, so a user who may only write scenarios could have files read that a scenario
+/// may not name.
 ///
 /// # Errors
 /// With the extensions of that kind.

@@ -23,8 +23,8 @@ pub struct PixelMap {
 }
 
 impl PixelMap {
-    /// Creates a map of `width` x `height` pixels with a side of `resolution_m` meters whose
-    /// lower-left corner is the origin of `plane`; `pixels` holds them row by row from the bottom.
+    /// Creates a map of `width` x `height` pixels with a side of `resolution_m` meters and its
+    /// lower-left corner at the origin of `plane`; `pixels` holds them row by row from the bottom.
     ///
     /// # Panics
     /// When `pixels` has another length than `width * height`, or `resolution_m` is not a
@@ -78,7 +78,7 @@ impl PixelMap {
     /// occupied, else unknown when any is unknown, else free; `unknown` then decides on the unknown
     /// boxes. Where boxes are smaller than pixels, a box that holds no center of a pixel takes the
     /// value of the pixel around its own center. The last column and row may extend past the edge
-    /// of the map; there is one for every pixel's center and for every box whose center lies on the
+    /// of the map; there is one for every pixel's center and for every box with its center on the
     /// map.
     ///
     /// # Errors
@@ -155,7 +155,7 @@ impl Axis {
         pixel..pixel + 1
     }
 
-    /// Returns the first pixel whose center is in the box `index` or after it.
+    /// Returns the first pixel with its center in the box `index` or after it.
     fn first_at_or_after(self, index: u64) -> u32 {
         // `box_of` never decreases, so bisection finds the edge with the very formula that defines
         // it.

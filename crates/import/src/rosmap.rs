@@ -13,8 +13,8 @@
 //! The third number of `origin` turns the image about its lower-left corner, counterclockwise. Pixels and
 //! boxes stay along the image; only places in the world are turned.
 //!
-//! Transparency is ignored, unlike in `map_server`, whose trinary mode takes it for one more color.
-//! Unknown keys are ignored, as in `map_server`.
+//! Transparency is ignored, unlike in `map_server`, where the trinary mode takes it for one more
+//! color. Unknown keys are ignored, as in `map_server`.
 
 use std::path::Path;
 
@@ -27,12 +27,12 @@ use super::image::Bitmap;
 use super::map_yaml::{MAX_YAML_BYTES, Metadata, Reading};
 use sidestep_scenario::file::read_text;
 
-/// Reads the map whose YAML file is at `path`. YAML file and image may be packed with gzip; an
+/// Reads the map with its YAML file at `path`. YAML file and image may be packed with gzip; an
 /// image that exists only with `.gz` after its name is found too.
 ///
 /// # Errors
-/// When the YAML file does not end in `.yaml` or `.yml`, a file is missing, damaged or absurdly large, or a key is missing or has a wrong
-/// value.
+/// When the YAML file does not end in `.yaml` or `.yml`, a file is missing, damaged or absurdly large, or a key is
+/// missing or has a wrong value.
 pub fn load(path: &Path) -> Result<PixelMap, InputError> {
     extension::check(path, "a map of ROS", &["yaml", "yml"])?;
     let place = path.display().to_string();
@@ -42,7 +42,7 @@ pub fn load(path: &Path) -> Result<PixelMap, InputError> {
     Ok(pixel_map(meta.resolution_m, meta.plane, meta.reading, &image))
 }
 
-/// Reads a plain image as `map_server` would with its usual thresholds: the corner in the south-west is
+/// Reads a plain image as `map_server` would with its usual thresholds: the corner in the southwest is
 /// the origin, a pixel with `p > 0.65` is occupied, one with `p < 0.196` free.
 ///
 /// # Errors

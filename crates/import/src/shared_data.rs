@@ -1,5 +1,5 @@
-//! Tests of the importers against results that others have computed for the same real files: pixel
-//! and box counts, components and distances of every map in `../shared/data`.
+//! Tests of the importers against results that other programs have computed for the same real
+//! files: pixel and box counts, components and distances of every map in `../shared/data`.
 
 use sidestep_testing::shared_data as shared;
 use std::collections::BTreeSet;

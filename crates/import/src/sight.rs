@@ -1,4 +1,4 @@
-//! Sight lines on a map of pixels: what a beam should meet.
+//! Sight lines on a map of pixels: the thing that a beam should meet.
 
 use sidestep_kernel::math::{cos, sin};
 use sidestep_map::Cell;
@@ -10,15 +10,15 @@ use super::PixelMap;
 pub enum Sight {
     /// A wall, at a range in meters.
     Wall(f64),
-    /// A pixel that nobody has mapped, or the edge of the map.
+    /// An unmapped pixel, or the edge of the map.
     Unknown,
     /// Nothing within the range.
     Nothing,
 }
 
 impl PixelMap {
-    /// Returns what a beam of `range_m` meters meets that starts at a place in the world, in a direction in
-    /// radians, counterclockwise from x.
+    /// Returns the thing met by a beam of `range_m` meters that starts at a place in the world, in a
+    /// direction in radians, counterclockwise from x.
     pub fn sight(&self, from_m: [f64; 2], direction_rad: f64, range_m: f64) -> Sight {
         let side_m = self.resolution_m();
         let [x, y] = self.plane().point(from_m).map(|along_m| along_m / side_m);

@@ -49,7 +49,7 @@ pub struct Sample {
     pub ground_speed_kt: f64,
     /// Direction of motion over the ground in degrees, clockwise from true north, in [0, 360).
     pub track_deg: f64,
-    /// Vertical speed in ft/min, positive upwards.
+    /// Vertical speed in ft/min, positive upward.
     pub vertical_speed_fpm: Option<f64>,
 }
 
@@ -69,7 +69,7 @@ pub fn parse(place: &dyn fmt::Display, text: &str) -> Result<RecordedTraffic, In
     tracks(&CsvTable::parse(place, text)?)
 }
 
-/// The range of times in s since the start of 1970. Milliseconds of our days are beyond it.
+/// The range of times in s since the start of 1970. Milliseconds of the present day are beyond it.
 const TIMES_S: RangeInclusive<f64> = -1e11..=1e11;
 
 /// The longest time in s between the first row and the last one, in time: no recording takes 30 years.
@@ -78,8 +78,8 @@ const LONGEST_S: f64 = 1e9;
 /// The range of altitudes, in ft.
 const ALTITUDES_FT: RangeInclusive<f64> = -1e6..=1e6;
 
-/// The greatest speed between two rows, in m/s: beyond it one of the two places is wrong. Airplanes of the simulator are
-/// bounded by it as well, so that what is too fast is told at its own row.
+/// The greatest speed between two rows, in m/s: beyond it one of the two places is wrong. Airplanes of the simulator
+/// are bounded by it as well, so that one that is too fast is reported at its own row.
 pub const FASTEST_M_S: f64 = 1e6;
 
 /// The indices of the columns.
@@ -216,7 +216,7 @@ fn check_times(place: &str, drafts: &[Draft<'_>]) -> Result<(), InputError> {
     Err(word.error(&place, cause, &remedy))
 }
 
-/// Refuses rows whose place nothing reaches from the one before, on the plane that is flown.
+/// Refuses rows with a place that nothing reaches from the one before, on the plane that is flown.
 fn check_speeds(place: &str, drafts: &[Draft<'_>]) -> Result<(), InputError> {
     let samples = drafts.iter().flat_map(|draft| &draft.track.samples);
     let Some(plane) = LocalPlane::about_all(samples.map(|sample| sample.position)) else {

@@ -27,8 +27,8 @@ pub fn map_files(
     [("map.yaml", yaml.into_bytes()), (IMAGE, image)]
 }
 
-/// Returns a binary PGM of gray values whose rows start at the bottom: the first row of the file is
-/// the north edge.
+/// Returns a binary PGM of gray values with rows that start at the bottom: the first row of the
+/// file is the north edge.
 pub fn pgm(width: u32, height: u32, grays: impl Iterator<Item = u8>) -> Vec<u8> {
     let grays: Vec<u8> = grays.collect();
     let mut bytes = format!("P5\n{width} {height}\n255\n").into_bytes();

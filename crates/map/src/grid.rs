@@ -23,7 +23,7 @@ pub enum Cell {
     Unknown,
 }
 
-/// The treatment of boxes that nobody has mapped.
+/// The treatment of unmapped boxes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum UnknownPolicy {
@@ -95,7 +95,7 @@ impl Rect {
 }
 
 /// A rectangle of boxes; box (0, 0) is the lower-left corner. `x` runs east and `y` north, except on
-/// a map whose plane is turned: there they are the axes of its image.
+/// a map with a turned plane: there they are the axes of its image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GridMap {
     width: u32,

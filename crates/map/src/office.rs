@@ -154,7 +154,7 @@ impl Plan {
         if self.corridors > 1 { u64::from(self.corridor_width) + 1 } else { 0 }
     }
 
-    // The sums below stay within the building, whose size `size` has checked.
+    // The sums below stay within the building, because `size` has checked its size.
 
     /// Number of boxes of a cross corridor and its wall, within a building of checked size.
     fn cross_width(&self) -> u32 {

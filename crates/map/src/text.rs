@@ -27,7 +27,7 @@ impl GridMap {
     }
 
     /// Returns the map as [`GridMap::to_text`] does, with rulers: the row of boxes before every fifth line,
-    /// the column of boxes below every tenth character, both counted from the south-west.
+    /// the column of boxes below every tenth character, both counted from the southwest.
     pub fn to_text_with_rulers(&self, max_cols: u32) -> String {
         let margin = self.height().to_string().len() + 1;
         let max_cols = max_cols.saturating_sub(margin as u32);

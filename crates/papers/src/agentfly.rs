@@ -7,8 +7,8 @@
 //!
 //! Time is that of deciding, which is measured, and of transmission, which follows from the messages
 //! and bytes that are counted: every airplane has one transmitter of 100 Mbit/s, and a message is
-//! under way for 1 ms. A coordinator's hops follow one another; agents of a team send at the
-//! same time, everybody to each of the others in turn.
+//! under way for 1 ms. A coordinator's hops follow one another; agents of a team send at the same
+//! time, each to each of the others in turn.
 
 mod sockets;
 
@@ -42,7 +42,7 @@ pub struct Plan {
     pub quick: bool,
 }
 
-/// The amount of work of the part over real sockets, whose flights come one after the other.
+/// The amount of work of the part over real sockets, with flights one after the other.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SocketsPlan {
     /// Numbers of airplanes.
@@ -104,7 +104,7 @@ const DT_S: f64 = 5.0;
 const LINK_BIT_S: f64 = 1e8;
 /// Seconds from the end of sending a message to its arrival; the default of `airspace.network`.
 const LATENCY_S: f64 = 0.001;
-/// Rates for which times are told beside, bits per second.
+/// Rates for which times are shown beside, bits per second.
 const LINKS_BIT_S: [f64; 4] = [1e6, 1e7, LINK_BIT_S, 1e9];
 /// Number of airplanes from which on the paper finds its coordinator slow.
 const MANY: u64 = 5;
@@ -182,8 +182,8 @@ impl Spent {
 fn spent(case: &Runs<'_>, run: &Run<'_>) -> Spent {
     let is_team = case.set("airspace.deployment") == Value::Word(BOTH[0].into());
     let n = case.set_number(AIRPLANES);
-    // All agents of a team send at once, each to all others; what it sends to them leaves in turn,
-    // but arrives at the same time.
+    // All agents of a team send at once, each to all others; the messages leave in turn, but
+    // arrive at the same time.
     let (senders, receivers) = if is_team { (n, n - 1.0) } else { (1.0, 1.0) };
     Spent {
         deciding_s: run.or_zero("optimize_cpu_s") / senders,
@@ -362,7 +362,7 @@ fn hardly_in_time(cells: &[Cell]) -> Claim {
 }
 
 impl Report {
-    /// Returns the report with what was measured over real sockets.
+    /// Returns the report with the measurements over real sockets.
     #[must_use]
     pub fn with_sockets(mut self, sockets: Sockets) -> Self {
         self.claims.extend(sockets.claim());

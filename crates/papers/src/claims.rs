@@ -91,8 +91,8 @@ impl File {
     }
 }
 
-/// Fewest runs that decide anything: below it nobody should trust Student's interval, and what held
-/// in every run was hardly tried.
+/// Fewest runs that decide anything: below it Student's interval should not be trusted, and a rule
+/// that held in every run was hardly tried.
 pub(crate) const LEAST_RUNS: usize = 5;
 
 /// Level of all tests; that of the 95 % intervals.
@@ -130,7 +130,7 @@ impl Comparison {
         Self { agrees: estimate.mean.is_some_and(agrees), p }
     }
 
-    /// Compares a claim's "in more than so large a share of all runs".
+    /// Compares a claim's "in more than this share of all runs".
     pub(crate) fn share_above(share: &Share, threshold: f64) -> Self {
         let p =
             (share.n >= LEAST_RUNS as u64).then(|| share_p_value(share.hits, share.n, threshold));
@@ -163,7 +163,7 @@ pub(crate) fn judged(family: impl IntoIterator<Item = Comparison>) -> Verdict {
     }
 }
 
-/// Judges what is to hold in every one of so many runs: a single counterexample refutes it.
+/// Judges a rule for every one of `runs` runs: a single counterexample refutes it.
 pub(crate) fn in_every_run(runs: usize, holds: bool) -> Verdict {
     match holds {
         false => Verdict::Refuted,
@@ -172,7 +172,7 @@ pub(crate) fn in_every_run(runs: usize, holds: bool) -> Verdict {
     }
 }
 
-/// Judges what is to hold in every run of every cell.
+/// Judges a rule for every run of every cell.
 pub(crate) fn every<'a>(
     cells: impl IntoIterator<Item = &'a Cell>,
     holds: impl Fn(&Cell) -> bool,
@@ -185,7 +185,7 @@ pub(crate) fn every<'a>(
     in_every_run(runs, all)
 }
 
-/// Judges what is to be true of every trial of every share.
+/// Judges a rule for every trial of every share.
 pub(crate) fn every_trial<'a>(shares: impl IntoIterator<Item = &'a Share>) -> Verdict {
     let (trials, hits) = shares.into_iter().fold((0, 0), |(n, hits), s| (n + s.n, hits + s.hits));
     in_every_run(trials as usize, hits == trials)

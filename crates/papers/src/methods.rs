@@ -96,11 +96,11 @@ struct Flights<'a> {
     interrupt: &'a Interrupt,
 }
 
-/// Number of flights that tell whether seeds change anything, where the world cannot tell.
+/// Number of flights that show whether seeds change anything, where the world cannot tell.
 const TRIALS: usize = 2;
 
 impl Flights<'_> {
-    /// Flies with as many seeds as are of use, and returns what they change.
+    /// Flies with as many seeds as are of use, and returns the effect of seeds.
     fn all(
         &self,
         (seed, runs): (u64, usize),
@@ -221,7 +221,7 @@ fn shielded(results: &[MethodResult]) -> Option<String> {
     })
 }
 
-/// Returns what a reader must know about the runs.
+/// Returns the note that a reader must know about the runs.
 fn note(results: &[MethodResult]) -> String {
     let of = |seeds: Seeds| -> Option<String> {
         let names = results.iter().filter(|r| r.seeds == seeds).map(|r| r.method);

@@ -133,7 +133,7 @@ impl Study {
         })
     }
 
-    /// Runs every variant by `run`, where a case and its seed say what the scenario sets.
+    /// Runs every variant by `run`, where a case and its seed give the settings of the scenario.
     ///
     /// # Errors
     /// The first error that `run` returns.
@@ -207,7 +207,7 @@ pub(crate) fn finish(run: &mut dyn Simulation, mut look: impl FnMut(&dyn Simulat
     }
 }
 
-/// Returns a run as that of a world which is known, for what only that world's state says.
+/// Returns a run as that of a known world, for facts that only that world's state has.
 ///
 /// # Panics
 /// When it is a run of another world.

@@ -47,7 +47,7 @@ pub enum Existing {
 pub enum ResumePoint {
     /// Cycle 0: the run was stopped before its first checkpoint.
     Start,
-    /// The checkpoint with these bytes, whose checksum the kernel verifies.
+    /// The checkpoint with these bytes; the kernel verifies their checksum.
     Checkpoint(Vec<u8>),
 }
 
@@ -57,7 +57,7 @@ pub struct RunFolder {
     path: PathBuf,
     manifest: Manifest,
     scenario: String,
-    /// Locked; the system releases the lock when the process ends, in whatever way.
+    /// Locked; the system releases the lock when the process ends in any way.
     _lock: File,
 }
 
@@ -77,7 +77,7 @@ impl RunFolder {
         let manifest = Manifest { build: Some(run.build.clone()), ..begun };
         fill(staging.path(), &manifest, scenario)
             .map_err(|e| disk::cannot_make(path, format!("{}: {}", e.place, e.cause)))?;
-        // Nobody may be writing the run that is about to be deleted.
+        // No process may be writing the run that is about to be deleted.
         let old_lock = if is_run(path) { Some(lock(path)?) } else { None };
         staging.take_place()?;
         drop(old_lock);
@@ -119,7 +119,7 @@ impl RunFolder {
     }
 
     /// Returns the recorder of the run's tables from `cycle` on: 0 for a new run, the checkpoint's
-    /// cycle for a resumed one, whose later rows are deleted.
+    /// cycle for a resumed one, of which later rows are deleted.
     ///
     /// # Errors
     /// A schema that cannot become a file; an I/O error.

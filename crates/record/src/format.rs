@@ -24,7 +24,7 @@ pub const CURRENT: FormatVersion = FormatVersion { major: 1, minor: 0 };
 pub struct FormatVersion {
     /// Rises when an older reader would misread.
     pub major: u32,
-    /// Rises when an older reader may ignore what was added.
+    /// Rises when an older reader may ignore the additions.
     pub minor: u32,
 }
 

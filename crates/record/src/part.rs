@@ -17,7 +17,7 @@ use crate::disk;
 use crate::encode::ColumnEncoder;
 use crate::schema;
 
-/// Returns the name of the part whose first cycle is `cycle`; names sort in the order of cycles.
+/// Returns the name of the part with `cycle` as its first cycle; names sort in the order of cycles.
 pub(crate) fn part_name(cycle: u64) -> String {
     format!("part-{cycle:015}.parquet")
 }

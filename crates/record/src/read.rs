@@ -57,7 +57,7 @@ fn position(schema: &TableSchema, name: &str) -> Option<usize> {
     schema.columns.iter().position(|c| c.name == name)
 }
 
-/// Reads the rows of the table `name` in the run folder `folder` whose `cycle` is in `cycles`; `..`
+/// Reads the rows of the table `name` in the run folder `folder` with a `cycle` in `cycles`; `..`
 /// reads all rows, also of a table without cycles. Parts of the files without such a cycle are not
 /// read.
 ///
@@ -227,7 +227,7 @@ impl<'a> Part<'a> {
             schema::checksums_from_text(&text(schema::CHECKSUMS)?).map_err(|e| bad(path, e))?;
         let about = match schema::key_value(file.metadata(), schema::ABOUT) {
             Some(json) => schema::about_from_json(json).map_err(|e| bad(path, e))?,
-            // Files of earlier versions tell nothing.
+            // Files of earlier versions have none.
             None => Vec::new(),
         };
         let schema = TableSchema { about, ..TableSchema::new(name, columns) };
@@ -363,7 +363,7 @@ fn bounds(group: &RowGroupMetaData, column: usize) -> Option<(u64, u64)> {
     }
 }
 
-/// Appends the rows whose cycle is in the range.
+/// Appends the rows with a cycle in the range.
 fn append(columns: &mut [Values], rows: Vec<Values>, cycle: Option<usize>, cycles: Cycles) {
     let keep: Option<Vec<bool>> = match cycle.map(|c| &rows[c]) {
         _ if cycles.is_all() => None,

@@ -45,7 +45,7 @@ impl Staging {
         &self.path
     }
 
-    /// Moves the folder to its place, replacing what is there.
+    /// Moves the folder to its place, replacing anything there.
     pub(crate) fn take_place(mut self) -> Result<(), InputError> {
         let target = &self.target;
         let failed = |e| cannot_make(target, e);
@@ -76,11 +76,11 @@ impl Drop for Staging {
     }
 }
 
-/// Returns the place of a folder that is to be made, without `/` at its end: of a link, the folder that it leads to. A
-/// rename would replace the link itself, and write to another disk than the one that the user has chosen.
+/// Returns the place of a folder that is to be made, without `/` at its end: of a link, the folder that it leads to.
+/// A rename would replace the link itself, and write to another disk than the one that the user has chosen.
 ///
 /// # Errors
-/// A link to what is not there.
+/// A link to a missing folder.
 pub fn followed(target: &Path) -> io::Result<PathBuf> {
     // With a `/` at its end, a link is not known as one, and a name beside the folder would be one inside.
     let target: PathBuf = target.components().collect();

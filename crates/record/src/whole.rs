@@ -267,7 +267,7 @@ impl Hash {
     }
 }
 
-/// A file whose bytes are hashed while they are written.
+/// A file with bytes that are hashed while they are written.
 #[derive(Debug)]
 struct Hashed {
     file: File,

@@ -55,7 +55,7 @@ fn point(p: &Point) -> sidestep_draw::Point {
     sidestep_draw::Point { x: p.x, y: p.y, interval: p.interval }
 }
 
-/// Returns a plot whose axes span the same length around the middle of the drawing.
+/// Returns a plot with axes that span the same length around the middle of the drawing.
 fn ways(figure: &Figure) -> Plot {
     let plot = plot(figure, Mark::Way);
     let points = || figure.series.iter().flat_map(|s| &s.points);

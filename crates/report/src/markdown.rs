@@ -78,7 +78,7 @@ fn pictured(title: &str, note: &str, folder: &str, picture: Option<&SvgFile>) ->
     format!("### {0}\n\n![{0}]({folder}/{1}.svg){note}", plain(title), picture.stem)
 }
 
-/// Returns a code block whose fence is longer than every row of backticks in the text.
+/// Returns a code block with a fence that is longer than every row of backticks in the text.
 fn fenced(code: &Code) -> String {
     let rows = code.text.split(|c| c != '`').map(str::len);
     let fence = "`".repeat(rows.max().unwrap_or(0).max(2) + 1);

@@ -1,5 +1,5 @@
-//! Figures for print: without titles and notes, which stand in the text around them, of a given size, and
-//! with a reader's own words.
+//! Figures for print: without titles and notes, which belong in the text around them, of a given size,
+//! and with a reader's own words.
 
 use crate::{SvgFile, chart, slug};
 use sidestep_document::document::Block;
@@ -39,7 +39,7 @@ impl Print {
         (1..).zip(figures).map(file).collect()
     }
 
-    /// Returns those of the labels that stand in no figure of a document.
+    /// Returns the labels that occur in no figure of a document.
     pub fn unused<'a>(&'a self, document: &Document) -> Vec<&'a str> {
         let is_used = |label: &str| {
             document.blocks.iter().any(|block| match block {

@@ -249,8 +249,8 @@ fn recording() {
     );
 }
 
-/// Prints what a frame and an inspection of 10,000 robots cost, in CPU time: the best of several; and
-/// inspections in other worlds.
+/// Prints the cost of a frame and of an inspection of 10,000 robots, in CPU time: the best of
+/// several; and inspections in other worlds.
 fn looking() {
     let case =
         Case { name: "10000-1x1-8x8", robots: 10_000, size: 1, ray_boxes: Some(8), promised: 0.0 };
@@ -280,7 +280,7 @@ fn looking() {
     inspections("the chains of the default scenario", chains.into());
 }
 
-/// Prints what inspections of some bodies of a scenario cost, in CPU time.
+/// Prints the cost of inspections of some bodies of a scenario, in CPU time.
 fn inspections(what: &str, text: String) {
     let source = Source::new(what, text, "");
     let compiled = WORLDS.compile(&source).expect("a valid scenario");

@@ -3,8 +3,8 @@
 //! Efron, "Better bootstrap confidence intervals", Journal of the American Statistical Association
 //! 82 (1987); Efron and Tibshirani, An Introduction to the Bootstrap (1993), chapter 14. Resamples
 //! show how the statistic varies; `z0` corrects for a statistic that is biased, `a` (by the
-//! jackknife) for one whose spread depends on its value. Its coverage error decreases with `1 / n`,
-//! that of Student's interval with `1 / sqrt(n)` on skewed values.
+//! jackknife) for one with a spread that depends on its value. Its coverage error decreases with
+//! `1 / n`, that of Student's interval with `1 / sqrt(n)` on skewed values.
 
 use super::Interval;
 use super::moments::percentile;
@@ -103,7 +103,7 @@ impl Bootstrap {
             return None;
         }
         resampled.sort_by(f64::total_cmp);
-        // A difference from the estimate by rounding alone is a tie, whatever the magnitudes.
+        // A difference from the estimate by rounding alone is a tie, at any magnitude.
         let rounding = 1e-10 * (resampled[resampled.len() - 1] - resampled[0]);
         let below = resampled.partition_point(|v| *v < estimate - rounding);
         let ties = resampled.partition_point(|v| *v <= estimate + rounding) - below;
@@ -246,7 +246,7 @@ mod tests {
         close(distinct.len() as f64 / items.len() as f64, 1.0 - math::exp(-1.0), 0.01);
     }
 
-    /// Share of 1,000 samples whose interval contains the mean of their distribution.
+    /// Share of 1,000 samples with an interval that contains the mean of their distribution.
     fn coverage(
         n: usize,
         truth: f64,
@@ -266,8 +266,8 @@ mod tests {
         Bootstrap { resamples: 1000, ..Bootstrap::default() }.mean(values)
     }
 
-    /// Fixed seed, 1,000 samples of 40: standard error of a coverage 0.008. What is asserted is
-    /// 3 errors below what the literature gives (about 0.94 for normal, 0.92 to 0.93 for
+    /// Fixed seed, 1,000 samples of 40: standard error of a coverage 0.008. The asserted bound
+    /// is 3 errors below the value in the literature (about 0.94 for normal, 0.92 to 0.93 for
     /// exponential and log-normal values), so that a right interval fails once in 1,000 seeds.
     #[test]
     fn the_bootstrap_covers_what_it_says_within_its_known_error() {

@@ -154,8 +154,9 @@ pub fn paired_difference(a: &[f64], b: &[f64]) -> Option<Interval> {
     mean_interval(&differences)
 }
 
-/// Returns the smallest number of runs whose mean is expected to have an interval of at most
-/// `half_width` to either side, if runs vary by `sd`: `t(n - 1) * sd / sqrt(n) <= half_width`.
+/// Returns the smallest number of runs with a mean that is expected to have an interval of at
+/// most `half_width` to either side, if runs vary by `sd`:
+/// `t(n - 1) * sd / sqrt(n) <= half_width`.
 ///
 /// An expectation, not a guarantee: `sd` is itself estimated, and at this number about half of
 /// all samples are a little wider. `None` where no number of runs (below 2^53) is enough.

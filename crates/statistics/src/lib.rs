@@ -24,9 +24,9 @@
 //! | how often does it happen (a share of runs) | [`wilson`] | from the first run on; its coverage is 95 % on average over shares | where coverage must never fall below 95 %: [`clopper_pearson`] |
 //! | mean of a roughly symmetric metric | [`mean_interval`] | from 5 runs on; exact for normal values at any n >= 2 | with a long tail and fewer than 50 runs: it is too low on the side of the tail |
 //! | mean of a skewed metric | [`Bootstrap::mean`] | from some 20 runs on; it leans to the side of the tail | below 10 runs: it cannot know a tail it has not seen, and is too narrow |
-//! | a typical run (median), a bad run (95th percentile) | [`quantile_interval`] | always, whatever the distribution; it reports its exact coverage | it is absent below 6 runs (median) or 72 runs (5th, 95th): no interval would be honest |
+//! | a typical run (median), a bad run (95th percentile) | [`quantile_interval`] | always, for any distribution; it reports its exact coverage | it is absent below 6 runs (median) or 72 runs (5th, 95th): no interval would be honest |
 //! | is A better than B | [`Pairs`]: run both on the same seeds | the interval of the difference; `k of n pairs` needs no assumption | the two separate intervals: their overlap says nothing about pairs |
-//! | by which factor does A differ from B | [`Pairs::ratio`] (Fieller) | with a baseline whose mean is well away from 0 | a ratio to a mean that may be 0: it is absent |
+//! | by which factor does A differ from B | [`Pairs::ratio`] (Fieller) | with a baseline mean that is well away from 0 | a ratio to a mean that may be 0: it is absent |
 //! | does one quantity go with another | [`rank_correlation`] | from some 10 pairs on; it sees any steady rise or fall | for a rise that turns into a fall: it may be 0 |
 //! | which of many variants differ | [`holm`] on the p-values | the adjusted ones | the smallest of twenty raw p-values |
 //!

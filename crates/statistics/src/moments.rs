@@ -10,7 +10,7 @@ pub struct Sample {
     pub values: Vec<f64>,
     /// Number of runs without a value, or with one that is infinite or not a number.
     pub missing: usize,
-    /// Number of runs among these whose value is infinite or not a number.
+    /// Number of runs among these with a value that is infinite or not a number.
     pub not_finite: usize,
 }
 

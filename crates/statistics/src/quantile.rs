@@ -23,9 +23,10 @@ const TAIL: f64 = 0.025;
 /// ranks, because the library's incomplete beta function converges too slowly there.
 const EXACT: usize = 10_000;
 
-/// Returns an interval of the `q`-quantile of whatever distribution the values of `sorted` come
-/// from, by order statistics (Conover, Practical Nonparametric Statistics, 3.2): the number of
-/// values below the quantile is binomial, so that each end misses with at most 2.5 %.
+/// Returns an interval of the `q`-quantile of the distribution that the values of `sorted` come
+/// from, of any kind, by order statistics (Conover, Practical Nonparametric Statistics, 3.2):
+/// the number of values below the quantile is binomial, so that each end misses with at most
+/// 2.5 %.
 ///
 /// `None` where `n` is too small for 95 %, see [`runs_for_quantile`], and for `q` outside (0, 1).
 pub fn quantile_interval(sorted: &[f64], q: f64) -> Option<QuantileInterval> {

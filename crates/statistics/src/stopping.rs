@@ -102,9 +102,9 @@ impl Reason {
 impl StoppingRule {
     /// Returns the next step after these runs, one value each, in the order of the runs.
     ///
-    /// A function of the values alone: it goes through the rounds from the first run on, whatever
-    /// the number of values. The result therefore does not depend on the number of workers, on how
-    /// far they ran ahead, or on whether a sweep was killed in the middle of a round.
+    /// A function of the values alone: it goes through the rounds from the first run on, for any
+    /// number of values. The result therefore does not depend on the number of workers, on how far
+    /// they ran ahead, or on whether a sweep was killed in the middle of a round.
     pub fn next(&self, values: &[Option<f64>]) -> Next {
         self.next_of(&[values])
     }

@@ -54,7 +54,7 @@ fn placed(member: &Member) -> impl Iterator<Item = (&Source, &Place)> {
     member.sources.iter().filter_map(|source| Some((source, source.module.as_ref()?)))
 }
 
-/// Modules of one root, by their names, and what they import.
+/// Modules of one root, by their names, and their imports.
 struct Graph<'a> {
     /// File of every module, inline modules included.
     files: HashMap<Vec<String>, &'a Path>,
@@ -102,7 +102,7 @@ impl<'a> Graph<'a> {
         edges
     }
 
-    /// Returns the file that declares what a path names, seen from `module`; none if it is foreign.
+    /// Returns the file that declares the item a path names, seen from `module`; none if it is foreign.
     fn declaring(&self, module: &[String], path: &[String], detours: usize) -> Option<&'a Path> {
         let mut here = match path.first()?.as_str() {
             "crate" => Vec::new(),

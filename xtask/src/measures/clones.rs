@@ -37,7 +37,7 @@ struct Counted<'a> {
     text: &'a str,
 }
 
-/// Lines of all files; `None` parts what does not go on.
+/// Lines of all files; `None` parts lines that do not follow each other.
 type Text<'a> = Vec<Option<Counted<'a>>>;
 
 /// Counts the clones of each crate, and of all together: a pair may lie in two crates.
@@ -79,7 +79,7 @@ fn crate_of(text: &Text, at: usize) -> usize {
     text[at].as_ref().map_or(0, |line| line.member)
 }
 
-/// Returns what may be a clone: code but imports, and no tests.
+/// Returns the lines that may be clones: code without imports, and no tests.
 fn text(members: &[Member]) -> Text<'_> {
     let mut text = Vec::new();
     for (member, sources) in members.iter().enumerate() {

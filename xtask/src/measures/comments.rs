@@ -10,7 +10,7 @@ use crate::members::Member;
 pub(crate) fn count(member: &Member) -> u64 {
     functions::code(member)
         .map(|source| {
-            // A set, as a function within another would count its comments twice.
+            // A set, because a function within another would count its comments twice.
             let inside: BTreeSet<usize> =
                 functions::of(source).iter().filter_map(|f| f.inside()).flatten().collect();
             inside.into_iter().map(|line| source.count(Kind::Comment, line..=line)).sum::<u64>()

@@ -1,4 +1,4 @@
-//! Public items of libraries: what bears a `pub` of its own, without restriction.
+//! Public items of libraries: those with a `pub` of their own, without restriction.
 
 use syn::visit::{self, Visit};
 use syn::{Field, ImplItem, Item, ItemImpl, Visibility};

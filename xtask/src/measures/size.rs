@@ -1,4 +1,4 @@
-//! Size: lines with code, by what they are for. Blank lines and comments do not count.
+//! Size: lines with code, by their purpose. Blank lines and comments do not count.
 
 use crate::lines::Kind;
 use crate::members::Member;

@@ -17,11 +17,11 @@ pub(crate) struct ArmArgs {
     #[arg(value_name = "URDF")]
     urdf: PathBuf,
 
-    /// Base link, which positions are relative to [default: the root link]
+    /// Base link, to which positions are relative [default: the root link]
     #[arg(long, value_name = "LINK")]
     base: Option<String>,
 
-    /// Tip link, whose position is computed [default: the end of the longest arm]
+    /// Tip link; its position is computed [default: the end of the longest arm]
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
 
@@ -162,7 +162,7 @@ fn rod(rod: &Rod) -> RodSize {
 }
 
 impl Placed {
-    /// Returns the arm as a picture, with where its tip shall be and what is in the way.
+    /// Returns the arm as a picture, with the target of its tip and the obstacles.
     pub(crate) fn picture<'a>(
         &'a self,
         target: Option<Vector>,

@@ -19,7 +19,7 @@ pub(crate) struct ArmPicture<'a> {
     pub(crate) robot: &'a str,
     /// Positions of the connectors in m, from the base out.
     pub(crate) connectors: &'a [Vector],
-    /// Position that the tip shall have, in m.
+    /// Target position of the tip, in m.
     pub(crate) target: Option<Vector>,
     /// The obstacles in the way.
     pub(crate) obstacles: &'a [Sphere],

@@ -33,11 +33,11 @@ pub(crate) struct CheckArgs {
 /// Runs the command.
 ///
 /// # Errors
-/// When one thing is wrong with the scenario. Several are printed, and told by the exit code alone.
+/// When one thing is wrong with the scenario. Several are printed, and reported by the exit code alone.
 pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Failure> {
     let foreign = worlds().translate(&args.scenario.file)?;
     if let Some(Foreign { scenario: Err(error), json, lines }) = foreign {
-        // The report says what was found in the file, and the error why it cannot be run.
+        // The report lists the contents of the file, and the error says why it cannot be run.
         let mut json = json;
         json["no_scenario"] = error.to_string().into();
         console.result(&json, || aligned(&lines))?;
@@ -99,7 +99,7 @@ fn peak_bytes() -> Option<u64> {
     Some(kib * 1024)
 }
 
-/// Returns remarks as text: severity and key on a line, and what is to be said below.
+/// Returns remarks as text: severity and key on a line, and the text below.
 fn in_words(remarks: &[Remark]) -> String {
     let one = |r: &Remark| format!("{}: {}\n  {}\n", r.severity.name(), r.key, r.words);
     remarks.iter().map(one).collect()

@@ -44,7 +44,7 @@ enum Name {
     Orca,
     /// Modified voltage potential (MVP)
     Mvp,
-    /// No avoidance: everybody flies straight on
+    /// No avoidance: all airplanes fly straight on
     None,
 }
 

@@ -1,4 +1,4 @@
-//! `sidestep completions`: what a shell completes after `sidestep`.
+//! `sidestep completions`: the words that a shell completes after `sidestep`.
 
 use crate::args;
 use crate::console::Console;

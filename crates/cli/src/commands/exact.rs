@@ -41,7 +41,7 @@ pub(crate) struct ExactArgs {
     #[arg(long, value_name = "N", default_value_t = 10)]
     top: usize,
 
-    /// Compare with this many simulated runs, of the cycles that the scenario or --cycles gives
+    /// Compare with this many simulated runs, each as long as the scenario or --cycles says
     #[arg(long, value_name = "R")]
     runs: Option<u32>,
 
@@ -65,7 +65,7 @@ struct ExportArgs {
     #[arg(default_value_t = PomdpOptions::default().discount)]
     discount: f64,
 
-    /// A beam that is observed, counted from 0; repeatable [default: the one ahead]
+    /// Beam to observe, counted from 0; repeatable [default: the one ahead]
     #[arg(long, value_name = "SENSOR:N", value_parser = parse_beam, requires = "pomdp")]
     beam: Vec<Beam>,
 
@@ -119,7 +119,7 @@ pub(crate) fn exact(args: &ExactArgs, console: Console) -> Result<ExitCode, Fail
     console.result(&summary, || text(&summary, named(compiled, &source)))?;
     Ok(match summary.comparison {
         None | Some(Comparison { agrees: Some(true), .. }) => ExitCode::Done,
-        // Runs that are too few confirm nothing, and whoever asked for them wants to know.
+        // Runs that are too few confirm nothing, and the user who asked for them wants to know.
         Some(_) => ExitCode::Failed,
     })
 }

@@ -129,7 +129,7 @@ pub(crate) struct ExportArgs {
 ///
 /// # Errors
 /// When the recorded run or an option is wrong, or the result cannot be stored or differs from
-/// what was recorded.
+/// the recording.
 pub(crate) fn export(args: &ExportArgs, console: Console) -> Result<ExitCode, Failure> {
     check_options(args)?;
     let recorded = Recorded::open(worlds(), &args.recorded)?;

@@ -1,4 +1,4 @@
-//! `sidestep fleet`: a world whose agents are processes on a network.
+//! `sidestep fleet`: a world with agents that are processes on a network.
 
 use crate::console::{Console, aligned, grouped};
 use crate::exit::{ExitCode, Failure};
@@ -35,16 +35,16 @@ continues with `sidestep resume DIR`.";
 enum ClockName {
     /// The server waits for every agent: the same results as in one process
     Lockstep,
-    /// Each cycle is a deadline: an airplane that is late stays on its orbit, a chain stands
+    /// Each cycle is a deadline: a late airplane stays on its orbit, a late chain stands still
     Realtime,
 }
 
 /// The way from node to node, by its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum TopologyName {
-    /// Each node is connected with each
+    /// Every node is connected to every other
     Mesh,
-    /// Through the server
+    /// All packets go through the server
     Star,
 }
 
@@ -60,19 +60,19 @@ pub(crate) struct FleetArgs {
     #[arg(long, value_name = "N")]
     nodes: Option<usize>,
 
-    /// The course of time
+    /// Clock: how time passes
     #[arg(long, value_enum, default_value_t = ClockName::Lockstep)]
     clock: ClockName,
 
-    /// Seconds of the scenario in a second of real time
+    /// Speed: seconds of the scenario per second of real time
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed)]
     speed: f64,
 
-    /// The way of packets from node to node
+    /// Network topology: the way of packets from node to node
     #[arg(long, value_enum, default_value_t = TopologyName::Mesh)]
     topology: TopologyName,
 
-    /// Endpoint at which the server listens, e.g. tcp/10.0.0.1:7600; repeatable
+    /// Endpoint on which the server listens, e.g. tcp/10.0.0.1:7600; repeatable
     /// [default: any free port of this machine alone]
     #[arg(long, value_name = "ENDPOINT")]
     listen: Vec<String>,
@@ -89,7 +89,7 @@ pub(crate) struct FleetArgs {
     #[arg(long, requires = "out")]
     replace: bool,
 
-    /// Record every packet, too: the table `packets`
+    /// Also record every packet, in the table `packets`
     #[arg(long, requires = "out")]
     packets: bool,
 
@@ -112,14 +112,14 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
     let mut ended = None;
     let done = run(&Job::Fleet(args.job()), |told| match told {
         Told::Listens(endpoints) => {
-            // Lockstep is over before anybody could watch, unless it waits for nodes.
+            // Lockstep is over before it could be watched, unless it waits for nodes.
             if args.nodes.is_some() || args.clock == ClockName::Realtime {
                 console.note(format!("The server listens at {}", endpoints.join(", ")));
             }
         }
         Told::Fleet(now) => shown.show(&now),
         Told::Ended { summary, outcome, fleet } => ended = Some((summary, outcome, fleet)),
-        // The caller has it already; the others are told to who watches.
+        // The caller has it already; the others are for watchers.
         Told::Failed(_) | Told::Scene(_) | Told::Seen(_) => {}
     });
     shown.clear();

@@ -280,8 +280,8 @@ pub(crate) fn learn(args: &LearnArgs, console: Console) -> Result<ExitCode, Fail
     Ok(ExitCode::Done)
 }
 
-/// Prints what was learned and `written`, the line about the profile, with what the profile takes for granted; if
-/// quiet, that line alone.
+/// Prints the result and `written`, the line about the profile, with the assumptions of the profile; if quiet,
+/// that line alone.
 fn tell(
     report: &(impl Serialize + Display),
     written: &str,
@@ -298,7 +298,7 @@ fn tell(
     )
 }
 
-/// Returns what the log does not tell about a sensor, and the profile must say.
+/// Returns the facts about a sensor that the log does not tell, and the profile must state.
 fn assumptions(profile: &SensorProfile) -> String {
     let bearings: Vec<String> = profile.bearings_deg.iter().map(f64::to_string).collect();
     let (bearings, range_m) = (bearings.join(", "), profile.range_m);
@@ -386,7 +386,7 @@ fn no_log() -> InputError {
 const MAX_PROFILE_BYTES: u64 = 64 << 20;
 
 impl TargetArgs {
-    /// Adds a section to the profile, if one is named, in one step. Returns a line that says what was done.
+    /// Adds a section to the profile, if one is named, in one step. Returns a line that says so.
     fn add(
         &self,
         group: &str,

@@ -29,7 +29,7 @@ use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use clap::Subcommand;
 
-/// The commands by what people do with them, in the order in which they meet them.
+/// The commands by their use, in the order in which people meet them.
 pub(crate) const GROUPS: &[(&str, &[&str])] = &[
     ("Prepare", &["new", "check", "schema", "map", "learn"]),
     ("Run and look at it", &["run", "studio", "resume", "replay", "report", "export"]),

@@ -33,11 +33,11 @@ pub(crate) struct NodeArgs {
     #[command(flatten)]
     scenario: ScenarioArgs,
 
-    /// Id of the airplane, from 0 on
+    /// Id of the airplane, from 0
     #[arg(long, value_name = "ID", group = "agent")]
     airplane: Option<EntityId>,
 
-    /// The chain and the number of the connector in it, both from 0 on, e.g. 0.3
+    /// Chain and number of the connector in it, both from 0, e.g. 0.3
     #[arg(long, value_name = "CHAIN.K", group = "agent", value_parser = connector)]
     connector: Option<AgentName>,
 

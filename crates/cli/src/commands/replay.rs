@@ -40,7 +40,7 @@ pub(crate) struct ReplayArgs {
     #[command(flatten)]
     workers: WorkersArg,
 
-    /// Print the state of every body, not of the first ones alone
+    /// Print the state of all bodies, not only of the first
     #[arg(long, requires = "cycle")]
     all: bool,
 

@@ -45,7 +45,7 @@ pub(crate) struct ReportArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Figures for print")]
 struct PrintArgs {
-    /// Write every figure by itself too, without title, in these formats: svg, png
+    /// Also write every figure to a file of its own, without title, in these formats: svg, png
     #[arg(long = "figure", value_name = "FORM,...", value_delimiter = ',')]
     forms: Vec<Form>,
 
@@ -57,7 +57,7 @@ struct PrintArgs {
     #[arg(long, value_name = "PT", default_value_t = 8.0, requires = "forms")]
     figure_font: f64,
 
-    /// Write a label of an axis or the name of a series in other words; repeatable
+    /// Rename the label of an axis or a series in these figures; repeatable
     #[arg(long = "label", value_name = "WORDS=OTHERS", requires = "forms")]
     labels: Vec<String>,
 }
@@ -67,7 +67,7 @@ struct PrintArgs {
 enum Form {
     Svg,
     Png,
-    /// Refused, with what gives it.
+    /// Refused, with a way to get it.
     #[value(hide = true)]
     Pdf,
 }
@@ -139,7 +139,7 @@ impl PrintArgs {
     }
 }
 
-/// Checks that each label stands in some figure, before anything is written.
+/// Checks that each label occurs in some figure, before anything is written.
 ///
 /// # Errors
 /// When one is in none; the error names the first.
@@ -166,7 +166,7 @@ fn size_mm(text: &str) -> Result<[f64; 2], InputError> {
     }
 }
 
-/// Reads words and the ones that stand in their place.
+/// Reads words and their replacements.
 fn renamed(text: &str) -> Result<(String, String), InputError> {
     let parts = text.split_once('=').filter(|(from, _)| !from.is_empty());
     let (from, to) = parts.ok_or_else(|| {

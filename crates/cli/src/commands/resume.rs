@@ -60,7 +60,7 @@ pub(crate) fn resume(args: &ResumeArgs, console: Console) -> Result<ExitCode, Fa
     travel(journey, console)
 }
 
-/// Tells what a finished run came to: whoever resumes all of their runs need not know which had ended.
+/// Prints the results of a finished run: a user who resumes all runs need not know which had ended.
 fn nothing_left(view: &RunView, console: Console) -> Result<ExitCode, Failure> {
     let folder = view.path.display();
     let cycles = grouped(view.manifest.cycles_done);

@@ -53,8 +53,8 @@ pub(crate) struct RunArgs {
         value_parser = clap::value_parser!(u64).range(1..))]
     mcap_every: Cycle,
 
-    /// Show the run live to Foxglove and Lichtblick ("Open connection", Foxglove WebSocket), which may
-    /// pause it and set its speed; until they do it goes as fast as it can
+    /// Show the run live in Foxglove and Lichtblick ("Open connection", Foxglove WebSocket), which may
+    /// pause it and set its speed; until then it runs as fast as it can
     #[arg(long, value_name = "ADDR", value_parser = clap::value_parser!(ViewersAt))]
     foxglove: Option<ViewersAt>,
 
@@ -62,7 +62,7 @@ pub(crate) struct RunArgs {
     #[arg(long, requires = "written")]
     replace: bool,
 
-    // Last, for its heading is that of all options that follow.
+    // Last, because its heading is that of all options that follow.
     #[command(flatten)]
     many: ManyArgs,
 }
@@ -115,7 +115,7 @@ fn serve(journey: &mut Journey, at: &ViewersAt, console: Console) -> Result<(), 
     Ok(())
 }
 
-/// Prints the warnings that `sidestep check` gives, too: hardly anybody wants a run that they are about.
+/// Prints the warnings of `sidestep check`, too: few users want a run to which they apply.
 fn warn_of(remarks: &[Remark], console: Console) {
     for remark in remarks.iter().filter(|remark| remark.severity == Severity::Warning) {
         console.warn(wrapped(&format!("{}: {}", remark.key, remark.words), LINE_COLS).join("\n  "));

@@ -41,7 +41,7 @@ pub(crate) struct StudioArgs {
     #[arg(value_name = "SCENARIO|DIR|FILE|ENDPOINT")]
     named: Vec<PathBuf>,
 
-    /// Address to listen at; any but a loopback address asks for a token
+    /// Address to listen on; any but a loopback address requires a token
     #[arg(long, value_name = "HOST", default_value = "127.0.0.1")]
     addr: String,
 
@@ -53,12 +53,12 @@ pub(crate) struct StudioArgs {
     #[arg(long)]
     no_open: bool,
 
-    /// Refuse scenario texts that are changed in the page
+    /// Read-only: refuse scenario texts that are changed in the page
     #[arg(long)]
     read_only: bool,
 
-    /// Show the scenario or recording that was opened last to Foxglove and Lichtblick, too, which may
-    /// play, pause and seek
+    /// Also show the scenario or recording opened last in Foxglove and Lichtblick, which may play,
+    /// pause and seek
     #[arg(long, value_name = "ADDR", value_parser = clap::value_parser!(ViewersAt))]
     foxglove: Option<ViewersAt>,
 
@@ -72,7 +72,7 @@ pub(crate) struct StudioArgs {
 /// Runs the command until it is interrupted.
 ///
 /// # Errors
-/// When something that is named is not there, a fleet does not answer, or the port cannot be had.
+/// When a named file or folder is not there, a fleet does not answer, or the port cannot be had.
 pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Failure> {
     interrupt::listen()?;
     let foxglove = args.foxglove.as_ref().map(ViewersAt::settled).transpose()?;
@@ -99,7 +99,7 @@ pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Fa
     Ok(ExitCode::Done)
 }
 
-/// Tells the address of the studio, who else can reach it, and opens it in a browser where that is safe.
+/// Tells the address of the studio and whether others can reach it, and opens it in a browser where that is safe.
 fn invite(studio: &Studio, no_open: bool, console: Console) -> Result<(), Failure> {
     let url = studio.url();
     if studio.is_open_to_others() {
@@ -148,7 +148,7 @@ fn open(url: &str, console: Console) {
     command.args(args).arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     let started = command.spawn();
     match started {
-        // Its end is nobody's business, but must be waited for.
+        // Its end does not matter, but must be waited for.
         Ok(mut child) => drop(std::thread::spawn(move || child.wait())),
         Err(_) => console.note("No browser could be started: open the address yourself."),
     }

@@ -55,7 +55,7 @@ pub(crate) struct SweepArgs {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
-    // Last, for its heading is that of all options that follow.
+    // Last, because its heading is that of all options that follow.
     #[command(flatten)]
     many: ManyArgs,
 }
@@ -66,7 +66,7 @@ enum Step {
     Plan(Box<PlanArgs>),
     /// Run one share (shard) of a planned sweep
     Run(ShareArgs),
-    /// Show how far a sweep is that others work on: shares, rate, time left, failed runs
+    /// Show the progress of a sweep that other processes run: shares, rate, time left, failed runs
     Status(FolderArgs),
     /// Collect the shares of a sweep into one table
     Collect(FolderArgs),
@@ -88,7 +88,7 @@ struct PlanArgs {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 
-    // Last, for its heading is that of all options that follow.
+    // Last, because its heading is that of all options that follow.
     #[command(flatten)]
     many: ManyArgs,
 }
@@ -194,8 +194,8 @@ fn plan(args: &PlanArgs, console: Console) -> Result<ExitCode, Failure> {
     Ok(ExitCode::Done)
 }
 
-/// Returns what was planned, and the commands that run it. Where a precision ends the sweep it has no shares, because
-/// the rule takes all runs to be seen.
+/// Returns the plan in words, and the commands that run it. Where a precision ends the sweep it has no shares,
+/// because the rule takes all runs to be seen.
 fn planned(plan: &Plan, out: &Path) -> Vec<(String, String)> {
     let (dir, all) = (out.display(), grouped(plan.runs()));
     let most = if plan.until.is_some() { "at most " } else { "" };

@@ -1,4 +1,4 @@
-//! The state of a sweep that others work on, as text and as JSON.
+//! The state of a sweep that other processes run, as text and as JSON.
 
 use super::say::counted;
 use crate::console::{Console, aligned, duration, grouped};
@@ -56,7 +56,7 @@ fn lines(folder: &Folder, status: &Status) -> Vec<(String, String)> {
     let is_all = status.runs == status.of;
     let next = match status.is_complete {
         true => Some(("look at it", format!("sidestep report {path}"))),
-        // Two processes that do the same only stand in each other's way.
+        // Two processes that do the same only get in each other's way.
         false if status.is_worked_on => None,
         false if is_all => Some(("join them", format!("sidestep sweep collect {path}"))),
         false => Some(("go on", format!("sidestep resume {path}"))),

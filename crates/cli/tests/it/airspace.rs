@@ -52,7 +52,7 @@ fn every_deployment_gives_the_digest_of_one_process() {
 }
 
 /// One airplane's radio is dead from half-way, every tenth message is lost; all arrive, that one
-/// by what it sees.
+/// by the traffic that it sees.
 #[test]
 fn trouble_on_the_network_is_told_and_recorded_and_nobody_comes_too_near() {
     let place = Place::new();

@@ -1,4 +1,4 @@
-//! ROS 2 bags: what is exported is what was simulated, what is learned is what was put in, and a bag that is
+//! ROS 2 bags: the export equals the simulation, learning gives back the known errors, and a bag that is
 //! wrong is refused with place, cause and remedy.
 
 use crate::readers::{has, script};
@@ -59,8 +59,8 @@ fn exported(cycles: &str) -> Place {
     place
 }
 
-/// Asserts that a learned probability is the known one, within four standard deviations of what its count
-/// gives, which is at least `least`.
+/// Asserts that a learned probability is the known one, within four standard deviations by its count,
+/// which is at least `least`.
 fn assert_learned(report: &Value, table: &str, cell: [&str; 2], known: f64, least: f64) {
     assert_learned_in(report, table, cell, known, [least, 1.0]);
 }
@@ -95,7 +95,7 @@ fn wheels_and_scanner_of_a_simulated_run_come_back_from_its_bag() {
     assert_learned(&wheels, "turns", ["left", "turn"], 0.9, 50.0);
     assert_learned(&wheels, "turns", ["right", "turn"], 0.85, 50.0);
     assert_eq!((&wheels["box_m"], &wheels["warnings"]), (&json!(0.5), &json!([])));
-    // Ranges are told from the middle of the robot, a quarter of a meter behind its border.
+    // Ranges are measured from the middle of the robot, a quarter of a meter behind its border.
     let eye = ["--edges", "2.25", "--classes", "near,far", "--range", "6"];
     let learn = ["learn", "sensor", "--bag", "bag"];
     let eye = place.json(&[&learn[..], &TRUTH, &SCANS, &eye].concat());
@@ -157,7 +157,7 @@ fn the_bag_of_the_examples_is_what_its_commands_make() {
             bytes(place.path("bag").join(name)) == bytes(examples.join("logs/rounds").join(name))
         );
     }
-    // How chunks are packed is up to a library; what is in them is not.
+    // The packing of chunks is up to a library; their contents are not.
     let learned = |bag: &Path| {
         let bag = ["learn", "effector", "--bag", bag.to_str().expect("text"), "--box", "0.25"];
         let mut report = place.json(&[&bag[..], &ODOM, &TRUTH].concat());
@@ -220,7 +220,7 @@ fn a_bag_of_another_program_gives_its_robots_wheels_back() {
         let p = said["forward"][k][1].as_f64().expect("a probability");
         assert_learned(&wheels, "moves", ["forward", outcome], p, 900.0);
     }
-    // A turn is several windows, which are not independent: a fourth of them is what counts.
+    // A turn is several windows, which are not independent: a fourth of them counts.
     let p = said["turn"][0][1].as_f64().expect("a probability");
     for side in ["left", "right"] {
         assert_learned_in(&wheels, "turns", [side, "turn"], p, [100.0, 4.0]);

@@ -1,4 +1,4 @@
-//! Every command that the README and the book show runs as it stands, from a fresh copy of what a clone has.
+//! Every command that the README and the book show runs as it stands, from a fresh copy of the files of a clone.
 //!
 //! Commands are the lines of blocks in the language `sh` that begin with `sidestep` or
 //! `cargo run --release --`. A block that no test can run is marked `sh ignore`, and its page says why.
@@ -50,7 +50,7 @@ fn run_all(page: &Path) -> usize {
     let binaries = Path::new(BINARY).parent().expect("a folder").display();
     let path = format!("{binaries}:{}", std::env::var("PATH").unwrap_or_default());
     let mut all = commands(&std::fs::read_to_string(page).expect("the page"));
-    // They need a program that not everybody builds; what reads their folders goes with them.
+    // They need a program that is not always built; the commands that read their folders go with them.
     let is_of_fleets = |line: &String| line.starts_with("sidestep fleet");
     if all.iter().any(is_of_fleets) && !crate::fleet::is_there() {
         all.truncate(all.iter().position(is_of_fleets).unwrap_or(0));
@@ -80,7 +80,7 @@ fn every_command_of_the_book_runs() {
     assert!(commands > 15, "the book shows how: {commands}");
 }
 
-/// Whoever goes on from the README to the book does so in one clone, where a folder can hold one run.
+/// A reader goes on from the README to the book in one clone, where a folder can hold one run.
 #[test]
 fn no_two_pages_record_into_one_folder() {
     let mut pages = vec![root().join("README.md")];

@@ -31,7 +31,8 @@ pub(crate) fn chromium() -> Option<Browser> {
 pub(crate) struct Browser(String);
 
 impl Browser {
-    /// Opens the page, as wide as given or as the window, lets its scripts run, and returns the findings of [`PROBE`].
+    /// Opens the page, as wide as given or as the window, lets its scripts run, and returns the findings of
+    /// [`PROBE`].
     ///
     /// # Panics
     /// When the browser prints an error of the page.
@@ -53,7 +54,7 @@ impl Browser {
         serde_json::from_str(found).expect("JSON")
     }
 
-    /// A picture of the page, so wide, as columns, rows and RGB values.
+    /// A picture of the page at this width, as columns, rows and RGB values.
     pub(crate) fn picture(&self, page: &Path, width_px: u32) -> image::RgbImage {
         let folder = tempfile::tempdir().expect("a folder");
         let png = folder.path().join("page.png");

@@ -36,7 +36,7 @@ fn refused(place: &Place, name: &str, more: &[&str]) -> String {
         told = ended.err();
         assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{name}: {told}");
         assert!(told.starts_with("error: ") && told.contains("\n  help: "), "{name}: {told}");
-        // `check` tells all that is wrong, `run` the first.
+        // `check` reports all errors, `run` the first.
         let is_one = told.matches("error: ").count() == 1;
         assert!(is_one || command == ["check", "c.toml"], "{name}: {told}");
         assert_eq!(place.names(), before, "{name}: something was written");

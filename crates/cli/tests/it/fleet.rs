@@ -103,7 +103,7 @@ fn ctrl_c_ends_a_fleet_in_good_order() {
     assert!(folder.is_ok(), "it can be looked at: {:?}", folder.err());
 }
 
-/// Waits until a fleet tells where its server listens; returns the endpoint.
+/// Waits until a fleet reports where its server listens; returns the endpoint.
 fn endpoint(fleet: &mut Child) -> String {
     let mut lines = BufReader::new(fleet.stderr.as_mut().expect("errors")).lines();
     let mut told = lines.by_ref().map(|line| line.expect("text"));
@@ -118,7 +118,7 @@ fn a_fleet_that_the_studio_watches_is_seen_to_its_end_steered_by_nobody_and_has_
     }
     let place = place();
     let alone = place.json(&["run", "ring.toml"]);
-    // It waits for a node that is not started yet, so whoever watches sees all of it.
+    // It waits for a node that is not started yet, so a watcher sees all of it.
     let mut fleet = place.start(&["fleet", "ring.toml", "--nodes", "2", "--out", "r"]);
     let at = endpoint(&mut fleet);
     let studio = Studio::start(&place, &[&at]);

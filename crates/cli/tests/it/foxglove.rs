@@ -1,4 +1,4 @@
-//! Foxglove and Lichtblick as viewers: what a recording has they get live, and no result depends on them.
+//! Foxglove and Lichtblick as viewers: they get the contents of a recording live, and no result depends on them.
 
 use crate::studio::Studio;
 use crate::support::{Place, signal};
@@ -169,7 +169,7 @@ fn a_run_is_seen_live_by_the_topics_of_a_recording_and_held_and_its_digest_is_th
         let found = viewer.channels.iter().find(|(live, _)| live.starts_with(topic));
         assert_eq!(found.map(|(_, (name, _))| name.as_str()), Some(schema), "{topic}");
     }
-    // One that takes nothing of what it asks for.
+    // One that asks for messages and takes none.
     let mut idle = Viewer::connect(port);
     idle.subscribe();
     viewer.subscribe();

@@ -113,7 +113,7 @@ fn all(place: &Place) -> Vec<Vec<String>> {
     found
 }
 
-/// Returns what a command prints where a terminal has so many columns.
+/// Returns the output of a command on a terminal of this many columns.
 fn at_width(place: &Place, args: &[&str], columns: &str) -> String {
     let output = place.command(args).env("COLUMNS", columns).output().expect("the binary starts");
     String::from_utf8(output.stdout).expect("text")

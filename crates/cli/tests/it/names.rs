@@ -1,4 +1,4 @@
-//! Files and folders whose names are no text (E1): nothing panics, and no run is lost for its name.
+//! Files and folders with names that are no text (E1): nothing panics, and no run is lost for its name.
 #![cfg(target_os = "linux")]
 
 use crate::support::{Ended, Place, SCENARIO};

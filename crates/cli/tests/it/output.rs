@@ -1,4 +1,4 @@
-//! Results that cannot be written are told, with exit code 1; a reader that has seen enough is no fault.
+//! Results that cannot be written are reported, with exit code 1; a reader that has seen enough is no fault.
 #![cfg(target_os = "linux")]
 
 use crate::support::{Ended, Place};

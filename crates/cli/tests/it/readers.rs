@@ -1,4 +1,4 @@
-//! Other people's programs read what we write: `mcap`, `pyarrow` and `polars` of Python. The
+//! Other people's programs read our files: `mcap`, `pyarrow` and `polars` of Python. The
 //! interpreter is that of SIDESTEP_PYTHON, else `python3`; where it or its modules are not here
 //! these tests are skipped, unless SIDESTEP_REQUIRE names `python`.
 

@@ -69,7 +69,7 @@ fn ctrl_c_without_a_folder_reports_what_was_done() {
     assert_eq!(place.names(), ["s.toml"]);
 }
 
-/// Returns `summary.json` without what a clock measured and what names the place.
+/// Returns `summary.json` without the times of a clock and the names of the place.
 fn told(place: &Place, folder: &str) -> Value {
     let text = place.read(&format!("{folder}/summary.json"));
     let mut summary: Value = serde_json::from_str(&text).expect("JSON");

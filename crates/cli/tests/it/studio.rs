@@ -164,7 +164,7 @@ impl Page {
     fn play_to_the_end(&mut self) -> Value {
         self.ask(json!({ "do": "credit", "session": 1, "frames": 5 }));
         self.ask(json!({ "do": "play", "session": 1, "speed": "fastest" }));
-        // What was told of an earlier end is over.
+        // Notices of an earlier end are over.
         self.notices.retain(|notice| notice["notice"] != "status");
         loop {
             if let Some(status) = self.last_over(&json!(1)) {
@@ -233,7 +233,7 @@ fn noise_is_answered_with_problems_and_the_session_goes_on() {
     }
     (0..1000).for_each(|_| drop(page.wait_reply(0)));
     page.ask(json!({ "do": "step", "session": 1, "cycles": 3 }));
-    // A page that breaks off in the middle of a word harms nobody else.
+    // A page that breaks off in the middle of a word harms no other.
     let mut other = studio.page();
     other.open("s.toml");
     other.socket.get_mut().write_all(&[0x81, 0xfe, 0xff]).expect("sent");

@@ -1,4 +1,5 @@
-//! Scenarios that are edited and saved in the studio: nothing of them is lost, whatever else happens to their files.
+//! Scenarios that are edited and saved in the studio: nothing of them is lost, even if other programs change their
+//! files.
 
 use crate::studio::{Page, Studio};
 use crate::support::{Place, SmallDisk};
@@ -53,7 +54,7 @@ fn comments_outlive_ten_edits_and_saving_and_the_session_goes_on_with_the_file()
     assert_eq!(page.ask(save(&text, None, false)), json!({ "is": "saved", "place": "s.toml" }));
     assert_eq!(text, place.read("s.toml"));
     page.ask(json!({ "do": "restart", "session": 1, "seed": null, "text": text }));
-    // What it has written itself is no surprise.
+    // A file that it has written itself is no surprise.
     let again = page.edit(&text, json!([{ "op": "set", "key": "seed", "value": 3 }]));
     assert_eq!(page.ask(save(&again, None, false))["is"], "saved");
     assert!(place.read("s.toml").contains("# On the seed.\nseed = 3   # why\n"));
@@ -95,7 +96,7 @@ fn a_file_that_another_program_changed_is_not_overwritten_unasked() {
     assert_eq!(place.read("s.toml"), changed);
     assert_eq!(page.ask(save(&mine, None, true))["is"], "saved");
     assert_eq!(mine, place.read("s.toml"));
-    // A file that was written anew with the same content has not changed; one that is gone has nothing to lose.
+    // A file that was written again with the same content has not changed; one that is gone has nothing to lose.
     std::fs::remove_file(place.path("s.toml")).expect("removed");
     place.write("s.toml", mine.as_str().expect("text"));
     assert_eq!(page.ask(save(&text, None, false))["is"], "saved");

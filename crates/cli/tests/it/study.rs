@@ -1,5 +1,5 @@
 //! Sweeps and comparisons as a newcomer meets them: baselines, seeds that change nothing, lines that
-//! fit, and errors that name what was typed.
+//! fit, and errors that name the typed words.
 
 use crate::support::{Ended, Place};
 use serde_json::Value;

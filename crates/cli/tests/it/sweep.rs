@@ -1,5 +1,5 @@
-//! Many runs: the same table for any number of workers, in shares or in one go, and every row is
-//! what `run` gives for its scenario and seed.
+//! Many runs: the same table for any number of workers, in shares or in one go, and every row
+//! equals the result of `run` for its scenario and seed.
 
 use crate::support::{Place, names, wait_for};
 use std::path::Path;

@@ -65,7 +65,8 @@ fn fifty_kills_at_any_time_lose_no_finished_run_and_repeat_none() {
         let folder = format!("d{k}");
         let mut before = Vec::new();
         // Each sweep is killed up to three times, and then goes to its end. The first kill comes at
-        // any time, be it before a folder is there; the others when so and so many runs are made.
+        // any time, even before a folder is there; the others once a certain number of runs are
+        // made.
         for (again, fraction) in fractions.by_ref().take(3).enumerate() {
             let line = words(&sweep(&folder));
             let mut child = place.start(&line.iter().map(String::as_str).collect::<Vec<_>>());

@@ -1,4 +1,4 @@
-//! Tables of recorded runs name their bodies: what other programs need to join and to draw them.
+//! Tables of recorded runs name their bodies, which other programs need to join and to draw them.
 
 use crate::support::Place;
 use sidestep::kernel::ports::{ColumnSpec, Values};

@@ -1,4 +1,4 @@
-//! ROS maps whose image is turned: boxes stay along the image, and places are told in the world.
+//! ROS maps with a turned image: boxes stay along the image, and places are given in the world.
 
 use crate::support::{Place, SCENARIO};
 use serde_json::Value;

@@ -132,7 +132,7 @@ def scanner(bag, folder):
     for k in range(1200):
         t = 0.1 * k
         angle = 0.05 * t
-        # A round about the origin of `odom`, which is the middle of the room and turned by a quarter.
+        # A circle around the origin of `odom`, which is the middle of the room and turned by a quarter.
         x, y, yaw = 1.5 * math.cos(angle), 1.5 * math.sin(angle), angle + math.pi / 2
         bag.write("/tf", t, message([transform(t, "odom", "base_link", x, y, turned(yaw))]))
         in_map, heading = (4.0 - y, 3.0 + x), yaw + math.pi / 2

@@ -26,8 +26,8 @@ const TARGET_PX: f64 = 3.0;
 const TARGET_LETTERS_PX: f64 = 11.0;
 /// Most targets with numbers: with more there is no room.
 const MOST_NUMBERED: usize = 12;
-/// Width of the seam around what agents are made of in space, and the least thickness of what has one: parts that lie
-/// over each other would be one blot without it.
+/// Width of the seam around the parts of agents in space, and the least thickness of parts that have one: those that
+/// lie over each other would be one blot without it.
 const SEAM_PX: f64 = 1.0;
 const LEAST_SEAMED_PX: f64 = 8.0;
 /// Number of balls in space above which those of one size and about one depth are one path, without rims.
@@ -36,7 +36,7 @@ const MOST_BALLS: usize = 400;
 const SHADES: f64 = 16.0;
 /// The look that lines share.
 const LINE_LOOK: &str = r#"fill="none" stroke-linecap="round" stroke-linejoin="round""#;
-/// Time whose way a moving body's arrow shows, seconds.
+/// Time of the way that a moving body's arrow shows, seconds.
 const ARROW_S: f64 = 1.0;
 /// Corners of a circle that is seen from the side.
 const CORNERS: usize = 32;
@@ -263,7 +263,7 @@ fn draw_line(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body, poi
     let width = Num(width_px);
     let hides = if opacity < 1.0 { r#" stroke-opacity="0.45""# } else { "" };
     let data = path_data(points_m.iter().map(|&p| canvas.at(p)));
-    // In space the group around all parts says the rest.
+    // In space the group around all parts sets the rest.
     let ends = if canvas.is_above() { format!(" {LINE_LOOK}") } else { String::new() };
     if is_seamed(canvas, body) {
         let around = Num(width_px + 2.0 * SEAM_PX);
@@ -372,7 +372,7 @@ fn circle(pose: &Pose, radius_m: f64) -> [Place; CORNERS] {
     })
 }
 
-/// Returns an arrowhead whose middle is at the pose.
+/// Returns an arrowhead with its middle at the pose.
 fn dart(pose: &Pose, length_m: f64, width_m: f64) -> [Place; 4] {
     let (half_m, wing_m) = (0.5 * length_m, 0.5 * width_m);
     let corners = [[half_m, 0.0], [-half_m, wing_m], [-0.5 * half_m, 0.0], [-half_m, -wing_m]];

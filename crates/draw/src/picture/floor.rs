@@ -19,7 +19,7 @@ struct Block {
     height: u32,
 }
 
-/// Draws a floor, in a group whose unit is one box, y upward.
+/// Draws a floor, in a group with one box as its unit, y upward.
 pub(super) fn draw(svg: &mut Svg, floor: &Floor, canvas: &Canvas) {
     let [x_m, y_m] = floor.plane.origin_m;
     let (x, y) = canvas.at([x_m, y_m, 0.0]);

@@ -14,10 +14,10 @@ use sidestep_kernel::view::{Body, Kind, Shape};
 const MOST_LABELS: usize = 12;
 /// Distance between a name and the named body.
 const GAP_PX: f64 = 4.0;
-/// Radius of the mark at the start of a line, and length of the head that tells its direction.
+/// Radius of the mark at the start of a line, and length of the head that shows its direction.
 const LINE_START_PX: f64 = 2.6;
 const HEAD_PX: f64 = 8.0;
-/// Distances at which room is searched, in gaps.
+/// Distances at which room is searched for, in gaps.
 const FURTHER: [f64; 4] = [1.0, 3.0, 6.0, 10.0];
 
 /// Marks where a trail starts and ends, and writes the name of its body if there is room.
@@ -68,7 +68,7 @@ fn bodies_to_spare(scene: &Scene<'_>, canvas: &Canvas) -> impl Iterator<Item = R
     bodies.map(|body| around(canvas.at(body.pose.at_m), radius_m(body) * canvas.px_per_m))
 }
 
-/// Draws an arrowhead in the middle of a line, which tells where it goes.
+/// Draws an arrowhead in the middle of a line, which shows where it goes.
 fn draw_direction(svg: &mut Svg, trail: &Shown<'_>, canvas: &Canvas, color: &str) {
     let points: Vec<Px> = trail.way.iter().map(|&(_, at)| canvas.at(at)).collect();
     let length = |pair: &[Px]| hypot(pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);

@@ -93,7 +93,7 @@ impl<'a> Scene<'a> {
         Self { scenery, frame, trails: trails::shown(scenery, frame, trails) }
     }
 
-    /// Returns the same scene with trails as thin lines, for bodies whose steps are far apart.
+    /// Returns the same scene with trails as thin lines, for bodies with steps that are far apart.
     pub(crate) fn with_thin_trails(mut self) -> Self {
         self.trails.iter_mut().for_each(|trail| trail.width_m = None);
         self

@@ -83,8 +83,8 @@ fn draw_box(svg: &mut Svg, canvas: &Canvas, box_m: [Place; 2], style: &Style) {
     (0..3).for_each(|k| draw_numbers(svg, canvas, (box_m, k), style, &mut taken));
 }
 
-/// Writes numbers along the edge `k` of the box, on the side where nothing is. Those that would lie on what is
-/// `taken` already, in pixels, are left out.
+/// Writes numbers along the edge `k` of the box, on the side where nothing is. Those that would lie on a place
+/// that is `taken` already, in pixels, are left out.
 fn draw_numbers(
     svg: &mut Svg,
     canvas: &Canvas,

@@ -27,7 +27,7 @@ pub(crate) struct Shown<'a> {
     pub(crate) width_m: Option<f64>,
     /// First and last cycle of all trails.
     pub(crate) span: [Cycle; 2],
-    /// Its dashes, which tell it from others of its color; of ribbons, which have a name beside them, none.
+    /// Its dashes, which distinguish it from others of its color; of ribbons, which have a name beside them, none.
     pub(crate) dash: &'static str,
 }
 
@@ -40,8 +40,8 @@ impl Shown<'_> {
     }
 }
 
-/// Returns agents whose ways can be distinguished in one picture: at most one of each color, or
-/// sixty if ways are thin lines; for chains who leads and the other end.
+/// Returns agents with ways that can be distinguished in one picture: at most one of each
+/// color, or sixty if ways are thin lines; for chains the leader and the other end.
 pub fn worth_a_trail(scenery: &Scenery, frame: &Frame) -> Vec<Who> {
     let agents = agents(scenery, frame);
     let kind = agents.first().map(|&(kind, _)| kind);

@@ -1,7 +1,8 @@
 //! CDR, the encoding of ROS 2 messages: values one after the other, each aligned to its own size.
 //!
 //! The first four bytes of a message tell the encoding and the order of bytes; offsets of alignment count
-//! from behind them. What a message is made of is said once, by `message!`, and serves reading and writing.
+//! from behind them. The fields of a message are listed once, by `message!`, which serves reading and
+//! writing.
 
 /// The first four bytes of messages that are written here: plain CDR, little end first.
 const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
@@ -30,7 +31,7 @@ pub fn encode<T: Cdr>(message: &T) -> Vec<u8> {
 /// The reason why bytes are no message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CdrError {
-    /// The encoding is none that is read here; its two bytes.
+    /// The encoding is not one that is read here; its two bytes.
     Encoding([u8; 2]),
     /// A value or its list lies beyond the end.
     Cut {

@@ -103,7 +103,7 @@ fn chain<'a>(
 }
 
 /// Returns the poses of the last link's child in the first link's parent, at the times of the last; the
-/// others stay as they were last told, as those of a localization program do.
+/// others stay as they were last reported, as those of a localization program do.
 fn joined(links: &[Vec<&Placed>]) -> Vec<TruePose> {
     let Some((last, before)) = links.split_last() else { return Vec::new() };
     let at = |placed: &&Placed| {

@@ -44,7 +44,7 @@ impl Placed {
         Self::new(transform.header, transform.child_frame_id, transform.transform)
     }
 
-    /// Returns the pose with an orientation of norm 1; says what is wrong with it otherwise.
+    /// Returns the pose with an orientation of norm 1; or the reason why it is wrong.
     fn checked(mut self) -> Result<Self, &'static str> {
         let numbers = self.pose.at_m.iter().chain(&self.pose.turn);
         if !numbers.copied().all(f64::is_finite) {
@@ -96,7 +96,7 @@ fn decoded(schema: &str, bytes: &[u8]) -> Result<Vec<Placed>, CdrError> {
     })
 }
 
-/// Returns the pose in the outermost frame of what has the pose `inner` in a frame that has the pose `outer`.
+/// Returns the pose in the outermost frame of a thing that has the pose `inner` in a frame with the pose `outer`.
 pub(super) fn compose(outer: &Turned, inner: &Turned) -> Turned {
     let [ax, ay, az, aw] = outer.turn;
     let [bx, by, bz, bw] = inner.turn;

@@ -175,7 +175,7 @@ fn listed(path: &Path) -> Result<Vec<String>, InputError> {
     Ok(names.map(|name| name.trim_matches(['"', '\'']).to_owned()).collect())
 }
 
-/// Kinds of files that are taken for bags, by their first bytes, and what to do with them.
+/// Kinds of files that are taken for bags, by their first bytes, and the remedy.
 const OTHERS: [(&[u8], &str, &str); 3] = [
     (b"#ROSBAG", "is a bag of ROS 1", "convert it: `rosbags-convert --src FILE --dst FOLDER`"),
     (b"SQLite f", "is a bag in SQLite", "convert it to MCAP: `ros2 bag convert`"),

@@ -174,7 +174,7 @@ fn every_kind_of_pose_is_a_truth() {
 #[test]
 fn frames_are_joined_through_those_between_them() {
     let mut entries = vec![
-        // Far from the end of the chain, and told once only.
+        // Far from the end of the chain, and reported only once.
         transforms("/tf", 0, &[("map", "odom", at(10.0, FRAC_PI_2))]),
         odometry(0, 0.0),
     ];
@@ -215,7 +215,7 @@ fn the_scanner_sits_where_static_transforms_put_it() {
         ("base", "plate", at(1.0, FRAC_PI_2)),
         ("plate", "laser", at(2.0, FRAC_PI_2)),
     ];
-    // The messages of odometry place `base`: what is below does not count.
+    // The messages of odometry place `base`: frames below do not count.
     let found = mount(&tree, "laser").unwrap();
     assert!(
         (found.at_m[0] - 1.0).abs() < 1e-12 && (found.at_m[1] - 2.0).abs() < 1e-12,

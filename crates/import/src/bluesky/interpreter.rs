@@ -16,7 +16,7 @@ use crate::local_plane::LatLon;
 use crate::table::Word;
 use sidestep_kernel::InputError;
 
-/// Commands to one aircraft, whose name may stand in front of them.
+/// Commands to one aircraft; its name may stand in front of them.
 const AIRCRAFT_COMMANDS: [&str; 27] = [
     "ADDWPT", "AFTER", "ALT", "AT", "ATALT", "ATDIST", "ATSPD", "BEFORE", "DEL", "DELETE",
     "DELRTE", "DELWPT", "DEST", "DIRECT", "HDG", "HEADING", "LISTRTE", "LNAV", "MOVE", "ORIG",

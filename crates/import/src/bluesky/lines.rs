@@ -14,7 +14,7 @@ const MIN_LINE_CHARS: usize = 10;
 /// word's column.
 const MAX_LINE_BYTES: usize = 10_000;
 
-/// The separators of words besides the comma.
+/// The separators of words other than the comma.
 const BLANKS: [char; 2] = [' ', '\t'];
 
 /// One command and its words, the first of which is its name or an aircraft.

@@ -1,5 +1,5 @@
-//! Scenarios as a whole: hand-written ones for each rule, and real ones against what others
-//! have read from them.
+//! Scenarios as a whole: hand-written ones for each rule, and real ones against the
+//! readings of other programs.
 
 use sidestep_testing::shared_data as shared;
 
@@ -281,7 +281,7 @@ fn absurd_patterns_are_refused() {
     }
 }
 
-/// Results that others have read from the shared files.
+/// Results that other programs have read from the shared files.
 fn expected(name: &str) -> Option<Value> {
     let text = std::fs::read_to_string(shared(name)?).expect("readable");
     Some(serde_json::from_str(&text).expect("JSON"))

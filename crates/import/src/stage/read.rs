@@ -140,7 +140,7 @@ impl Reader {
             "position" => self.robot(model, &definition, parent),
             "model" => self.thing(model, &definition, parent, depth),
             _ if definition.properties.contains_key("bitmap") => {
-                // A floor plan whose definition is in a file that is missing.
+                // A floor plan with its definition in a file that is missing.
                 self.thing(model, &definition, parent, depth)
             }
             root => {

@@ -60,7 +60,7 @@ pub struct Solid {
     pub shape: Shape,
 }
 
-/// The solids of a model, and remarks on what is not among them.
+/// The solids of a model, and remarks on shapes that are not among them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Solids {
     /// All solids, in the order of links.
@@ -72,7 +72,7 @@ pub struct Solids {
 impl Model {
     /// Returns the solids of all links. Meshes are replaced by their bounding boxes: STL files,
     /// which are looked for beside `urdf`, the model's own file, and for `package://NAME/REST` in the
-    /// folders above it. What cannot be read is left out with a remark.
+    /// folders above it. A mesh that cannot be read is left out with a remark.
     pub fn solids(&self, urdf: &Path) -> Solids {
         let mut found = Solids::default();
         let (mut boxes, mut lost) = (0, Vec::new());

@@ -42,7 +42,7 @@ pub struct Group {
 pub struct NamedPosture {
     /// Its name. Postures of several groups may share one.
     pub name: String,
-    /// The group whose joints it sets.
+    /// The group of the joints that it sets.
     pub group: String,
     /// Index of a joint in [`Model::joints`], and its value in rad or m.
     pub values: Vec<(usize, f64)>,

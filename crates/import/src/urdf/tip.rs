@@ -1,4 +1,4 @@
-//! The tip of an arm whose file does not say which link it is.
+//! The tip of an arm with a file that does not say which link it is.
 
 use super::Model;
 

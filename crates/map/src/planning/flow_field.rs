@@ -8,8 +8,9 @@ use super::{Distances, FreeSpace, STEPS};
 /// Neighbors differ by at most one step, so the distance modulo 3 is enough to tell which of them is
 /// nearer to the goal.
 ///
-/// Of several shortest paths it takes the one whose step has the lowest direction (0 east, 1 north,
-/// 2 west, 3 south), so it depends neither on the order of the goals nor on that of the search.
+/// Of several shortest paths it takes the one with the lowest direction of its step (0 east, 1
+/// north, 2 west, 3 south), so it depends neither on the order of the goals nor on that of the
+/// search.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FlowField {
     width: u32,

@@ -18,7 +18,7 @@ pub use octile::octile_distance;
 /// The four steps on a grid as (columns, rows), by direction: 0 east, 1 north, 2 west, 3 south.
 pub const STEPS: [(i32, i32); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
 
-/// Returns the free boxes of a drawing whose first line is the north edge; `#` is a wall.
+/// Returns the free boxes of a drawing with the north edge as its first line; `#` is a wall.
 #[cfg(test)]
 fn drawn(art: &str) -> FreeSpace {
     use crate::{Cell, GridMap};

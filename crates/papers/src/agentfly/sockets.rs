@@ -1,9 +1,9 @@
 //! The same flights by processes, which talk over real sockets, beside those in one process.
 //!
-//! Who runs the experiments hands over how a fleet is flown: this crate opens no socket and starts no process.
-//! Messages and bytes are counted at the nodes, heads of packets included and those of the network below not. Time is
-//! that of a clock from when all nodes have joined to the end of the flight, so it depends on the machine and on
-//! what else runs on it.
+//! The caller hands over the function that flies a fleet: this crate opens no socket and starts no process. Messages
+//! and bytes are counted at the nodes, heads of packets included and those of the network below not. Time is that of
+//! a clock from when all nodes have joined to the end of the flight, so it depends on the machine and on other load
+//! on it.
 
 use super::{AIRPLANES, Plan, SCENARIO, claim};
 use crate::claims::{Comparison, judged, listed};
@@ -15,7 +15,7 @@ use sidestep_document::claim::Claim;
 use sidestep_document::{Estimate, Table};
 use std::time::Instant;
 
-/// Deployments whose agents can be processes.
+/// Deployments with agents that can be processes.
 const DEPLOYMENTS: [&str; 4] = ["team", "compact-team", "pim", "hierarchical-pim"];
 
 /// A flight, as it was measured.
@@ -118,7 +118,7 @@ impl Case {
 }
 
 impl Sockets {
-    /// Returns the claim about time, judged by what was measured; none without measurements.
+    /// Returns the claim about time, judged by the measurements; none without any.
     pub(super) fn claim(&self) -> Option<Claim> {
         let Self::Measured(cases) = self else { return None };
         let times = |name: &str, airplanes: usize| {
@@ -183,7 +183,7 @@ mod tests {
         Plan { sockets, ..Plan::quick() }
     }
 
-    /// Measures what takes as long as `times` says of the flights of a deployment.
+    /// Returns measurements in which the flights of a deployment take as long as `times` says.
     fn measured(seeds: usize, times: impl Fn(&str) -> f64) -> Sockets {
         let mut flies = |text: &str| -> Result<Measured, InputError> {
             let name = DEPLOYMENTS.iter().find(|name| text.contains(&format!("\"{name}\"")));

@@ -8,8 +8,8 @@
 //! ```
 //!
 //! with `n` agents, `m` active objects, `p` the share of bodies in conflict, and `f` the boxes
-//! whose occupation changes. (In the paper an update also refreshes the distributions around a
-//! body; here those are computed when needed, so a change costs only its boxes.)
+//! that change their occupation. (In the paper an update also refreshes the distributions
+//! around a body; here those are computed when needed, so a change costs only its boxes.)
 //!
 //! Each parameter is identified as follows:
 //! - `t_p`, `t_o`: by runs of different `n : m`.

@@ -6,9 +6,9 @@
 //! - Sensor: every row of the confusion matrix has `1 - e` on its diagonal. Distance classes
 //!   are exact, so a reading is right with probability `1 - e` exactly. A spurious report
 //!   draws its distance class evenly.
-//! - Effector: every action does what is intended with probability `1 - e`. The rest is
-//!   spread evenly over the paper's other transitions (forward: stays, slips two boxes, drifts
-//!   left, drifts right; turns: stays, turns half around).
+//! - Effector: every action ends as intended with probability `1 - e`. The rest is spread
+//!   evenly over the paper's other transitions (forward: stays, slips two boxes, drifts left,
+//!   drifts right; turns: stays, turns half around).
 //!
 //! The distribution of a sensor's error mass decides how much it hurts, so there are two recipes;
 //! and beams that look the same way compensate for each other's errors, so there are two rings.

@@ -21,7 +21,7 @@ pub(super) enum Mind {
     Touch,
     /// Steps around things that its sonar reports, as soon as one beam does.
     Avoid,
-    /// The same, but believes only what two reports agree on.
+    /// The same, but believes only things on which two reports agree.
     Filter,
 }
 

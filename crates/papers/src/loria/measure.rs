@@ -122,7 +122,7 @@ pub(super) fn values(outcomes: &[Outcome], measure: Measure) -> Vec<Option<f64>>
 /// Length of the windows in which straightness is measured, in cycles.
 pub(super) const WINDOW_CYCLES: usize = 20;
 
-/// Shortest path of a window whose shape means anything, in boxes.
+/// Shortest path of a window that has a meaningful shape, in boxes.
 const SHORTEST_PATH_BOXES: f64 = 10.0;
 
 /// Runs every variant with seeds `1..=seeds`; the outcomes are by variant, then by seed.

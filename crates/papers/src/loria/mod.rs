@@ -3,8 +3,8 @@
 //!
 //! The paper's tables are lost, so its *claims* are examined: which quantity is larger, smaller,
 //! faster. Every figure is our own, with the number of runs and a 95 % interval. `claims` says of
-//! each claim whether it held, is refuted or undecided, whether what it would take is lost, or
-//! that it states a setting.
+//! each claim whether it held, is refuted or undecided, whether its evidence is lost, or that it
+//! states a setting.
 //!
 //! ```text
 //! floor.rs, errors.rs              the buildings, the error tables

@@ -1,9 +1,9 @@
 //! Parallel performance: 1 to W workers, recorded or not, over density and cost of decisions.
 //!
-//! Time is measured as the paper does: all cycles and the recording, without initialization, whose
-//! share is given separately. Runs of all worker counts take turns, so that other load on the
-//! machine affects all alike. Arithmetic without any world takes its turn too, because its speed-up
-//! is the most that the machine could give at that moment.
+//! Time is measured as the paper does: all cycles and the recording, without initialization, the
+//! share of which is given separately. Runs of all worker counts take turns, so that other load on
+//! the machine affects all alike. Arithmetic without any world takes its turn too, because its
+//! speed-up is the most that the machine could give at that moment.
 
 use super::floor::Floor;
 use super::timing::{Load, STRETCHES, Timed, arithmetic, race, seconds};
@@ -48,10 +48,10 @@ pub(super) struct Initialization {
     pub(super) share_together: Estimate,
 }
 
-/// Cycles of the run whose initialization is counted; the paper's number is lost.
+/// Cycles of the run in which initialization is counted; the paper's number is lost.
 pub(super) const REFERENCE_CYCLES: u64 = 1000;
 
-/// Worker counts whose digests are compared; more than the machine has processors is allowed.
+/// Worker counts of which the digests are compared; more than the machine has processors is allowed.
 const DIGEST_WORKERS: [usize; 6] = [1, 2, 3, 4, 8, 16];
 
 /// The parallel performance experiment.

@@ -167,7 +167,7 @@ impl Reliability {
         rules.into_iter().chain(floors).chain(minds).collect()
     }
 
-    /// Returns who causes more contacts at every point of the sweep over equal error levels.
+    /// Returns the errors that cause more contacts, at every point of the sweep over equal error levels.
     pub(super) fn larger(&self) -> Vec<Larger> {
         let points = SweepCase::all().flat_map(|case| self.levels.iter().map(move |&e| (case, e)));
         let pair = [Regime::Sensors, Regime::Effectors];

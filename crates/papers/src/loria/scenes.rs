@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// Cycles of a run: by then all robots are on their way.
 const CYCLES: Cycle = 600;
-/// Cycles at the end of the run whose ways are shown.
+/// Cycles at the end of the run for which ways are shown.
 const SEEN: Cycle = 400;
 /// The seed of all scenes.
 const SEED: u64 = 1;

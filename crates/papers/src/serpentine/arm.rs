@@ -1,5 +1,6 @@
-//! An arm of six joints, whose tool is sent to places (slides K1 to K4, E3): in the open and between pillars, by local
-//! rules alone and with a planner. Every cycle is looked at: whether a joint is outside its limits or too fast.
+//! An arm of six joints, with a tool that is sent to places (slides K1 to K4, E3): in the open and between pillars,
+//! by local rules alone and with a planner. Every cycle is looked at: whether a joint is outside its limits or too
+//! fast.
 
 use super::{DT_S, Plan, draws};
 use crate::cells::{Cell, Columns, Value, column};
@@ -162,7 +163,7 @@ fn watched(source: &Source) -> Result<Json, InputError> {
     });
     let run: &ChainRun<3> = known(&*run);
     let came = run.world().metrics_of(run.state(), 0);
-    // The task itself is one of what is done, if it ended.
+    // The task itself is one of the tasks done, if it ended.
     let targets = TARGETS - came.tally.given_up.len().min(TARGETS);
     let is_over = run.is_over();
     Ok(json!({

@@ -1,5 +1,5 @@
-//! A chain whose middle parts are thrown about, or partly missing, is joined again between its two
-//! whole ends (slide F3).
+//! A chain with middle parts that are thrown about, or partly missing, is joined again between its
+//! two whole ends (slide F3).
 
 use super::{Plan, draws};
 use crate::cells::{Cell, Columns, Value, column};

@@ -3,7 +3,7 @@
 //!
 //! The slides show pictures and no numbers, so their *claims* are examined. Every figure is our
 //! own, with the number of runs, and an interval where runs are random. `claims` says of each
-//! claim whether it held, is refuted or undecided, or what it would take is lost.
+//! claim whether it held, is refuted or undecided, or its evidence is lost.
 //!
 //! ```text
 //! corridor.rs, rotation.rs, field.rs    the swarm and its leader
@@ -77,7 +77,7 @@ pub struct Plan {
     pub snake_connectors: Vec<usize>,
     /// Cycles of its runs.
     pub snake_cycles: u64,
-    /// Connectors of chains whose motions are timed.
+    /// Connectors of chains with timed motions.
     pub sizes: Vec<usize>,
     /// Numbers of far obstacles.
     pub far_balls: Vec<usize>,

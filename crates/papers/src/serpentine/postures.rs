@@ -111,7 +111,7 @@ fn direction(draws: &mut Draws) -> Point<3> {
     unit([0; 3].map(|_: u8| normal(draws))).unwrap_or([1.0, 0.0, 0.0])
 }
 
-/// Returns a random chain whose rods are as long as on average.
+/// Returns a random chain of rods that are as long as on average.
 fn chain(case: &Case, draws: &mut Draws) -> Result<Chain<3>, InputError> {
     let (slack, n) = (case.slack, case.links);
     let rod = Rod { min_m: 1.0 - slack, max_m: 1.0 + slack, radius_m: 0.01 };

@@ -42,7 +42,7 @@ const COLUMNS: Columns = Columns {
 fn of_fields(case: &Variant, key: &str) -> f64 {
     let number = |value: &toml::Value| value.as_float().or(value.as_integer().map(|n| n as f64));
     let fields = case.value("fields").and_then(toml::Value::as_array).into_iter().flatten();
-    // From 0, for the sum of none is -0.
+    // From 0, because the sum of none is -0.
     fields.filter_map(|field| number(field.get(key)?)).fold(0.0, |all, of_one| all + of_one)
 }
 

@@ -66,7 +66,7 @@ impl Bounds {
 }
 
 impl ColumnEncoder {
-    /// Returns an encoder for the column `spec`, whose place in the file is `descriptor`.
+    /// Returns an encoder for the column `spec`, at the place `descriptor` in the file.
     pub(crate) fn new(spec: &ColumnSpec, descriptor: ColumnDescPtr) -> Self {
         let encoder = match spec.ty {
             ColumnType::U32 => Encoder::U32(DeltaEncoder::new()),

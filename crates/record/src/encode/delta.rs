@@ -11,7 +11,7 @@ const BLOCK: usize = 128;
 /// Number of groups of [`PACK`] differences in a block.
 const GROUPS: usize = BLOCK / PACK;
 
-/// An integer whose differences wrap around in its own width.
+/// An integer with differences that wrap around in its own width.
 pub(crate) trait Integer: Copy + Ord {
     /// The type of a difference.
     type Delta: Copy + Default + Ord;
@@ -102,7 +102,7 @@ fn put_any_block(deltas: &[i64; BLOCK], packer: &Packer, out: &mut Vec<u8>) {
     }
 }
 
-/// Appends a block whose differences fit 32 bits.
+/// Appends a block of differences that fit 32 bits.
 fn put_narrow_block(deltas: &[i32; BLOCK], packer: &Packer, out: &mut Vec<u8>) {
     let least = deltas.iter().copied().fold(i32::MAX, i32::min);
     let above = deltas.map(|d| d.wrapping_sub(least) as u32);

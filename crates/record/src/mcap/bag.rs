@@ -116,7 +116,7 @@ impl BagWriter {
         fs::write(&path, metadata).map_err(|e| RecordError::new(path.display(), e))
     }
 
-    /// Returns what stands in `metadata.yaml`.
+    /// Returns the text of `metadata.yaml`.
     fn metadata(&self) -> String {
         let (first, last) = self.span_ns.unwrap_or_default();
         let messages: u32 = self.topics.values().map(|topic| topic.messages).sum();

@@ -1,7 +1,7 @@
 //! Frames for viewers that watch while a run goes on.
 //!
-//! The server is the library's, with the library's threads: what a viewer does or leaves undone happens there. It keeps
-//! some messages for each viewer and drops the oldest, so that frames are passed on without waiting.
+//! The server is the library's, with the library's threads: viewers and their delays affect only those. It keeps some
+//! messages for each viewer and drops the oldest, so that frames are passed on without waiting.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -32,13 +32,13 @@ const MOST_WAITING: usize = 1024;
 pub struct Steering {
     /// Whether the run is to go on.
     pub play: bool,
-    /// Simulated seconds per second; any number at all, for it comes from outside.
+    /// Simulated seconds per second; any number at all, because it comes from outside.
     pub speed: f64,
     /// The time to go to.
     pub seek_s: Option<f64>,
 }
 
-/// The state of the run, as viewers are told.
+/// The state of the run, as reported to viewers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Playback {
     /// Whether it goes on.
@@ -115,12 +115,12 @@ impl LiveServer {
         self.handle.as_ref().map_or(0, WebSocketServerHandle::port)
     }
 
-    /// Returns whether somebody watches.
+    /// Returns whether a viewer watches.
     pub fn is_watched(&self) -> bool {
         self.handle.as_ref().is_some_and(|handle| handle.client_count() > 0)
     }
 
-    /// Tells all viewers what the run does.
+    /// Tells all viewers the state of the run.
     pub fn tell(&self, playback: Playback) {
         if let Some(handle) = &self.handle {
             handle.broadcast_time(to_ns(playback.time_s));
@@ -132,14 +132,14 @@ impl LiveServer {
 impl Drop for LiveServer {
     fn drop(&mut self) {
         if let Some(handle) = self.handle.take() {
-            // Nobody waits for viewers that do not read: connections end with this.
+            // Viewers that do not read are not waited for: connections end with this.
             drop(handle.stop());
         }
     }
 }
 
 impl LiveFrames {
-    /// Passes a frame on to those who watch.
+    /// Passes a frame on to viewers.
     ///
     /// # Errors
     /// When it cannot be encoded.
@@ -179,7 +179,7 @@ impl Sink for Output {
         let mut bytes = Vec::with_capacity(message.encoded_len().unwrap_or(0));
         message.encode(&mut bytes).map_err(|e| RecordError::new(topic, e))?;
         channel.log_with_meta(&bytes, PartialMetadata::with_log_time(log_time));
-        // An event is told once, not whenever somebody comes.
+        // An event is sent once, not whenever a viewer comes.
         if topic != "/log" {
             let id = u64::from(channel.id());
             self.desk.lock().insert(id, Message { channel, log_time, bytes });
@@ -198,7 +198,7 @@ struct Message {
     bytes: Vec<u8>,
 }
 
-/// The server's side of what viewers ask.
+/// The server's side of viewers' requests.
 struct Desk {
     /// The last message of each channel, for viewers that come later.
     latest: Mutex<BTreeMap<u64, Message>>,

@@ -45,12 +45,12 @@ fn pose(pose: &ViewPose) -> Option<Pose> {
     Some(Pose { position: vector(pose.at_m), orientation: rotation(pose) })
 }
 
-/// Returns a vector that was read; what is not said is 0.
+/// Returns a vector that was read; missing numbers are 0.
 pub(super) fn read_vector(read: Option<&Vector3>) -> Place {
     read.map_or([0.0; 3], |v| [v.x, v.y, v.z])
 }
 
-/// Returns a pose that was read; what is not said is the origin, not turned.
+/// Returns a pose that was read; missing parts are the origin, without a turn.
 pub(super) fn read_pose(read: Option<&Pose>) -> ViewPose {
     let plain = ViewPose::at([0.0; 3]);
     read.map_or(plain, |read| ViewPose {
@@ -129,7 +129,7 @@ pub(super) fn scene(frame: &Frame, dimensions: u8, shown: &mut BTreeSet<String>)
     SceneUpdate { deletions, entities }
 }
 
-/// Returns the deletion of whatever was shown before.
+/// Returns the deletion of everything shown before.
 pub(super) fn all_gone(now_ns: u64) -> Vec<SceneEntityDeletion> {
     vec![SceneEntityDeletion {
         timestamp: timestamp(now_ns),

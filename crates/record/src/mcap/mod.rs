@@ -4,7 +4,7 @@
 //! | topic | schema | when |
 //! | --- | --- | --- |
 //! | `/map` | `foxglove.Grid` | once: the floor, `occupancy` 0 free, 100 wall, 255 unknown |
-//! | `/scenery` | `foxglove.SceneUpdate` | once: what never moves |
+//! | `/scenery` | `foxglove.SceneUpdate` | once: things that never move |
 //! | `/scene` | `foxglove.SceneUpdate` | each frame: one entity per body; those that left are deleted |
 //! | `/tf` | `foxglove.FrameTransforms` | each frame: from `world` to each agent, by its name |
 //! | `/poses/KIND` | `foxglove.PosesInFrame` | each frame: agents of a kind, in the order of `/tf` |
@@ -18,8 +18,8 @@
 //! metadata record `sidestep` describes the run and how it ended. While it is incomplete, the file
 //! is called `NAME.partial`. Equal runs give equal bytes.
 //!
-//! Whoever watches a run live gets the same topics: of each the last message at once, and then each frame that it
-//! keeps up with. As it may miss some, a live `/scene` deletes all bodies before it shows them.
+//! A live viewer gets the same topics: of each the last message at once, and then each frame that it keeps up
+//! with. Because it may miss some, a live `/scene` deletes all bodies before it shows them.
 
 mod bag;
 mod live;

@@ -100,7 +100,7 @@ impl McapRun {
     }
 }
 
-/// Returns what a recording says of its run.
+/// Returns a recording's description of its run.
 pub(super) fn described(
     source: &mut Source,
     summary: &Summary,

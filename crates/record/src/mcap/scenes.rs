@@ -1,4 +1,4 @@
-//! Bodies and events of a recording, read back for whoever shows it without computing it again.
+//! Bodies and events of a recording, read back in order to show it without computing it again.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -29,7 +29,7 @@ pub struct McapScenes {
 }
 
 impl McapScenes {
-    /// Opens a recording that this program made, in whatever version.
+    /// Opens a recording that any version of this program made.
     ///
     /// # Errors
     /// A missing file; one of another program; one that is cut off or damaged.
@@ -88,7 +88,7 @@ impl McapScenes {
             // The reader would take no such topic for all topics.
             return Ok(());
         }
-        // What is packed may be larger, but a damaged length must not ask for all memory.
+        // Unpacked data may be larger, but a damaged length must not ask for all memory.
         let most = self.source.length.saturating_mul(1 << 10).max(LEAST_LIMIT);
         let limit = usize::try_from(most).unwrap_or(usize::MAX);
         let options = options.include_topics([topic]).with_record_length_limit(limit);
@@ -123,8 +123,8 @@ fn bodies(entity: &SceneEntity) -> Vec<Body> {
         .collect()
 }
 
-/// Returns the poses and shapes of an entity's primitives. Arrows are bodies only where there is nothing else; else they
-/// show where something heads.
+/// Returns the poses and shapes of an entity's primitives. Arrows are bodies only where there is nothing else; else
+/// they show where something heads.
 fn shapes(entity: &SceneEntity) -> Vec<(Pose, Shape)> {
     let at = messages::read_pose;
     let cubes = entity.cubes.iter().map(|cube| {
@@ -167,7 +167,7 @@ fn who(name: &str) -> Option<Who> {
     parts.next().is_none().then_some((kind, number, part))
 }
 
-/// Returns what a message tells of a body. Its words are all that is known of it.
+/// Returns the event of a body that a message reports. Its words are all that is known of it.
 fn entry(told: &Log, cycle_s: f64) -> Option<Entry> {
     let words = told.message.strip_prefix(&told.name).unwrap_or(&told.message).trim();
     let level = match log::Level::try_from(told.level) {

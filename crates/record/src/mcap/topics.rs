@@ -1,4 +1,4 @@
-//! The messages of each topic, whoever takes them.
+//! The messages of each topic, for any taker.
 
 use std::collections::BTreeSet;
 

@@ -25,7 +25,7 @@ impl Completion {
     /// Appends runs to both.
     ///
     /// # Errors
-    /// Other columns than it was begun with; an I/O error.
+    /// Columns other than those it was started with; an I/O error.
     pub fn append<R>(
         &mut self,
         results: &[&RoleColumn<R>],
@@ -103,7 +103,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     fn table<R: DeserializeOwned + Clone>(&self, name: &str) -> Result<WholeTable<R>, InputError> {
         let path = self.path().join(name);
         self.check_own(&path).and_then(|()| whole::read(&path)).map_err(|e| {
-            // The results are what says that the sweep is done: without them all is joined again.
+            // The results mark the sweep as done: without them everything is joined again.
             let remedy = format!(
                 "delete `{RESULTS}`; `sidestep resume DIR` makes it again from the runs in `{SHARES}`"
             );

@@ -47,7 +47,7 @@ pub struct SweepFolder<P> {
     manifest: SweepManifest<P>,
 }
 
-/// A folder that goes with whoever holds it.
+/// A folder that is deleted when this is dropped.
 #[derive(Debug)]
 pub struct Scratch(PathBuf);
 
@@ -65,8 +65,8 @@ impl Drop for Scratch {
 }
 
 impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
-    /// Creates the folder at `path`, completely or not at all. `fill` writes the variants into what
-    /// becomes the folder (see [`write_variant`](Self::write_variant)) and returns the plan, the
+    /// Creates the folder at `path`, completely or not at all. `fill` writes the variants into the
+    /// future folder (see [`write_variant`](Self::write_variant)) and returns the plan, the
     /// fingerprints of its variants and the table of its cells.
     ///
     /// # Errors
@@ -195,8 +195,8 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         self.path.join(RUNS).join(format!("{cell:06}"))
     }
 
-    /// Returns an empty folder of its own in this one, for what does not fit in memory while runs are joined. What a
-    /// kill has left there is taken away.
+    /// Returns an empty folder of its own in this one, for data that does not fit in memory while runs are joined.
+    /// Remains of a killed process are deleted there.
     ///
     /// # Errors
     /// An I/O error.

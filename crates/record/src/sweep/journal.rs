@@ -128,7 +128,7 @@ pub(super) fn is_locked(path: &Path) -> Option<bool> {
     }
 }
 
-/// Locks a file, against others who write it. Checking for a lock takes one briefly, so a few further tries are made.
+/// Locks a file, against other writers. Checking for a lock takes one briefly, so a few further tries are made.
 fn try_lock(file: &File) -> Result<(), TryLockError> {
     for _ in 0..LOCK_TRIES {
         match file.try_lock() {

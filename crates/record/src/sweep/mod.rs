@@ -12,9 +12,9 @@
 //! runs/000012/              run folders, if they were requested
 //! ```
 //!
-//! A run is finished once its line is in a journal: then no kill loses it, and nobody repeats it. A
-//! killed process leaves at most an incomplete line, which the next one deletes. Only the owner of
-//! a share writes its journal; everything else is written once, and appears by a rename.
+//! A run is finished once its line is in a journal: then no kill loses it, and it is not repeated.
+//! A killed process leaves at most an incomplete line, which the next one deletes. Only the owner
+//! of a share writes its journal; everything else is written once, and appears by a rename.
 
 mod completion;
 mod folder;

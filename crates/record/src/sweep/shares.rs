@@ -100,7 +100,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         Ok(())
     }
 
-    /// Returns the shares that somebody has begun, in order, and whether each is done.
+    /// Returns the shares that were begun, in order, and whether each is done.
     ///
     /// # Errors
     /// A folder that cannot be read.
@@ -177,7 +177,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     }
 }
 
-/// Returns the share whose file has this name.
+/// Returns the share with this file name.
 fn share_of(name: &str, extension: &str) -> Option<Share> {
     let (index, count) = name.strip_suffix(extension)?.strip_suffix('.')?.split_once("-of-")?;
     Some(Share { index: index.parse().ok()?, count: count.parse().ok()? })

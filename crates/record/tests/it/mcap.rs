@@ -187,7 +187,7 @@ fn damage_is_an_error_and_never_a_panic() {
         std::fs::write(&path, &whole[..length]).unwrap();
         assert!(McapRun::open(&path).is_err(), "{length} bytes of {}", whole.len());
     }
-    // A changed byte may lie where nothing is read from; then what is read is as it was.
+    // A changed byte may lie where nothing is read from; then the result is as it was.
     let sound = {
         std::fs::write(&path, &whole).unwrap();
         McapRun::open(&path).unwrap()

@@ -6,7 +6,7 @@ use sidestep_kernel::ports::Recorder;
 
 use crate::support::{recorder, rows};
 
-/// Prints the table's types and what it holds, in a form that is easy to compare.
+/// Prints the table's types and contents, in a form that is easy to compare.
 const SCRIPT: &str = "
 import sys, pyarrow.parquet as pq
 t = pq.read_table(sys.argv[1])

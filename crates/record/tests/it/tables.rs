@@ -228,7 +228,7 @@ proptest! {
     }
 }
 
-/// Columns of every type with `rows` rows; of those that may be missing, every so many are.
+/// Columns of every type with `rows` rows; one in every `missing` values is missing.
 fn every_type(rows: u64, missing: u64) -> (TableSchema, Vec<Values>) {
     let value = |k: u64| (missing > rows || k % missing != 1).then_some(k);
     let all = || (0..rows).map(value);

@@ -98,7 +98,8 @@ fn image(svg: &str, class: Option<&str>, words: &str) -> Markup {
 }
 
 /// Returns an SVG as the address of an image, for an attribute in single quotes. Addresses take marks of
-/// HTML as they are, and so do attributes, so that only what would end either is written in another way.
+/// HTML as they are, and so do attributes, so that only characters that would end either are written in
+/// another way.
 fn data_address(svg: &str) -> String {
     let mut address = String::with_capacity(svg.len() + svg.len() / 8);
     address.push_str("data:image/svg+xml;charset=utf-8,");

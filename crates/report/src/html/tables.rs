@@ -6,8 +6,8 @@ use sidestep_document::Table;
 use sidestep_document::claim::{self, Claim, Verdict};
 use sidestep_document::document::Text;
 
-/// Returns a table that can be sorted by a click on a heading. What has no room waits behind a button; a
-/// folded table is shown by a click on its title.
+/// Returns a table that can be sorted by a click on a heading. Columns without room wait behind a
+/// button; a folded table is shown by a click on its title.
 pub(super) fn table(table: &Table, id: &str) -> Markup {
     let note = html! {
         @if !table.note.is_empty() { p .note { (text(&Text::marked(&table.note))) } }

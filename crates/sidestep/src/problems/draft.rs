@@ -1,4 +1,4 @@
-//! A text that is mended step by step, and the way back to the text as it was given.
+//! A text that is repaired step by step, and the way back to the text as it was given.
 
 use crate::scenario::Source;
 use sidestep_kernel::InputError;
@@ -14,8 +14,8 @@ struct Change {
 }
 
 impl Change {
-    /// Returns the place before the change of a place after it; within what was inserted, the start of
-    /// what was removed, or its end.
+    /// Returns the place before the change of a place after it; within an insertion, the start of the
+    /// removed bytes, or their end.
     fn back(&self, offset: usize, is_end: bool) -> usize {
         match offset {
             _ if offset < self.at || (is_end && offset == self.at) => offset,
@@ -26,7 +26,7 @@ impl Change {
     }
 }
 
-/// A scenario with a mended text.
+/// A scenario with a repaired text.
 #[derive(Debug, Clone)]
 pub(super) struct Draft {
     source: Source,

@@ -1,14 +1,14 @@
 //! All that is wrong with a scenario, instead of the first thing alone.
 //!
-//! Readers and compilers stop at the first error. So it is told, mended in a draft of the text, and
-//! the draft is compiled again, until nothing is wrong any more. A draft is never shown: places and
-//! quoted lines are those of the text as it was given. What may only follow from the mending is not
-//! told; it will be once its cause is gone, if it is a mistake of its own.
+//! Readers and compilers stop at the first error. So it is reported, repaired in a draft of the
+//! text, and the draft is compiled again, until nothing is wrong. A draft is never shown: places
+//! and quoted lines are those of the text as it was given. An error that may only follow from the
+//! repair is not reported; it will be once its cause is gone, if it is a mistake of its own.
 //!
 //! ```text
-//!         ┌──────────────────── draft, with the mended text ◄───────────┐
+//!         ┌─────────────────── draft, with the repaired text ◄──────────┐
 //!         ▼                                                             │
-//!     compile ──error──> told, at its place in the given text ──> repairs, the likeliest first
+//!     compile ──error──> reported, at its place in the given text ──> repairs, the likeliest first
 //! ```
 
 mod draft;
@@ -21,13 +21,14 @@ use repair::{Guess, Repair, repairs};
 use serde_json::Value;
 use sidestep_kernel::InputError;
 
-/// Most errors that are told.
+/// Most errors that are reported.
 pub const MOST: usize = 20;
-/// Most compilations of drafts, as some take long.
+/// Most compilations of drafts, because some take long.
 const MOST_DRAFTS: usize = 150;
 
-/// Returns what is wrong with a scenario, in the order of its text and at most [`MOST`] errors; none
-/// if it compiles. Errors of syntax are told alone, as nothing else is known before they are mended.
+/// Returns the errors of a scenario, in the order of its text and at most [`MOST`]; none if it
+/// compiles. Errors of syntax are reported alone, because nothing else is known before they are
+/// repaired.
 pub fn problems(worlds: Worlds, source: &Source) -> Vec<InputError> {
     let Err(first) = worlds.compile(source) else { return Vec::new() };
     let mut told = source.syntax_errors();
@@ -51,7 +52,7 @@ struct Search<'a> {
     drafts: usize,
 }
 
-/// A draft, and what is wrong with it.
+/// A draft, and its error.
 struct Step {
     draft: Draft,
     error: Option<InputError>,
@@ -76,7 +77,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Tells an error, unless it was told before or may follow from what a draft says.
+    /// Reports an error, unless it was reported before or may follow from a guess in a draft.
     fn tell(&mut self, draft: &Draft, error: &InputError) {
         let told = draft.in_the_given_text(self.source, error);
         let follows = self.guessed.iter().any(|guess| guess.may_lead_to(error));
@@ -89,8 +90,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Returns a draft in which an error is mended; none if there is no such draft. Of all repairs the
-    /// first is taken from which nothing seems to follow.
+    /// Returns a draft in which an error is repaired; none if there is no such draft. Of all repairs
+    /// the first is taken from which nothing seems to follow.
     fn mended(&mut self, draft: &Draft, error: &InputError) -> Option<Step> {
         let mut forced: Option<(Repair, Step)> = None;
         for repair in repairs(draft, error, &self.schema(draft)) {

@@ -1,4 +1,4 @@
-//! Repairs of an error: what its author may have meant, or nothing at all.
+//! Repairs of an error: the change that its author may have meant, or nothing at all.
 
 use super::draft::Draft;
 use super::tree::{find, way};
@@ -47,7 +47,7 @@ pub(super) fn repairs(draft: &Draft, error: &InputError, schema: &Value) -> Vec<
     all
 }
 
-/// Returns what the error's remedy takes for what was meant.
+/// Returns the change that the error's remedy takes for the meaning of the author.
 fn meant(draft: &Draft, error: &InputError, own: &[String]) -> Vec<Repair> {
     let meant = between(error.remedy(), "did you mean `", "`");
     let (Some(meant), Some(wrong)) = (meant, between(error.cause(), "`", "`")) else {
@@ -104,7 +104,7 @@ impl Repair {
         Self { target: target.to_vec(), what, is_meant: false }
     }
 
-    /// Returns what its author did not mean, if that is what it makes.
+    /// Returns the guess that it makes, unless its author is likely to have meant it.
     pub(super) fn guess(&self) -> Option<Guess> {
         (!self.is_meant).then(|| self.clone().into())
     }

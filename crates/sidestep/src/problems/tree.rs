@@ -25,7 +25,7 @@ pub(super) fn way(key: &str) -> Vec<String> {
     parts.iter().map(|part| part.get().to_string()).collect()
 }
 
-/// Returns what stands at a key; none if it is not there. The empty way is the whole text.
+/// Returns the parts of the text at a key; none if it is not there. The empty way is the whole text.
 pub(super) fn find(text: &str, way: &[String]) -> Option<Found> {
     let root = DeTable::parse(text).ok()?;
     let root = Spanned::new(0..0, DeValue::Table(root.into_inner()));

@@ -54,7 +54,7 @@ const EXTERNAL: [(&str, &str); 3] = [
 const FLOWN: &str = "[airspace]\ndeployment = \"team\"\n[airspace.generator]\nkind = \"superconflict\"\nn = 2\n\
                      [record]\ncontrols = true\n";
 
-/// An arm, whose joints are a table that no other chain has.
+/// An arm, with joints that are a table that no other chain has.
 const ARM: &str = "[chain]\ndimensions = 3\n[[chains]]\narm = { urdf = \"scenarios/chain/arm.urdf\" }\n\
                    [[chains.tasks]]\nkind = \"rest\"\n";
 
@@ -118,7 +118,7 @@ fn metrics(value: &Value, path: &str) -> Vec<String> {
     members.flat_map(|(key, value)| metrics(value, &format!("{path}.{key}"))).collect()
 }
 
-/// Compares a marked part of the chapter with what it should be, or writes it.
+/// Compares a marked part of the chapter with the expected text, or writes it.
 fn compare(name: &str, expected: &str) {
     // Two tests that write would undo each other's parts.
     static WRITING: Mutex<()> = Mutex::new(());

@@ -1,4 +1,4 @@
-//! Things that the pages for people say are there: paths, links, pictures, scenarios, code, columns.
+//! Things to which the pages for people refer exist: paths, links, pictures, scenarios, code, columns.
 
 mod columns;
 
@@ -7,7 +7,7 @@ use sidestep::worlds::WORLDS;
 use std::path::{Path, PathBuf};
 
 const BOOK: &str = "docs/src";
-/// Pages whose named paths all begin at the root.
+/// Pages on which all named paths begin at the root.
 const PAGES: [&str; 3] = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md"];
 
 fn root() -> PathBuf {
@@ -35,8 +35,8 @@ fn pages_below(folder: &str) -> Vec<String> {
 }
 
 /// Returns the text between single backticks, outside of code blocks, that looks like a path: it
-/// has a `/` and only characters that paths of this repository have. Outputs of runs and sweeps, what is in
-/// their folders, and data outside of the repository are left out.
+/// has a `/` and only characters that paths of this repository have. Outputs of runs and sweeps, the
+/// contents of their folders, and data outside of the repository are left out.
 fn named_paths(text: &str) -> Vec<&str> {
     let is_path = |span: &&str| {
         let plain = |c: char| c.is_ascii_alphanumeric() || "/._-".contains(c);

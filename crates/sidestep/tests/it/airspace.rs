@@ -1,6 +1,6 @@
 //! D1 for the airspace: the same build, scenario and seed give identical bits for 1, 2, 3 and 8
-//! workers, recorded or not, resumed or not. L1 for airplanes: with the shield nobody comes
-//! nearer than the separation, whatever the method, once the first fallbacks are apart.
+//! workers, recorded or not, resumed or not. L1 for airplanes: with the shield no two come
+//! nearer than the separation, by any method, once the first fallbacks are apart.
 
 use sidestep::kernel::ports::MemoryRecorder;
 use sidestep::kernel::{Interrupt, Simulation};
@@ -25,7 +25,7 @@ fn run(source: &Source, workers: usize) -> AirspaceRun {
 pub(crate) const ERRING: &str =
     "position_noise_m = 20.0\nheading_noise_deg = 1.0\nwind_m_s = [5.0, -3.0]";
 
-/// Nobody avoids anybody, so that pairs lose their separation.
+/// No airplane avoids another, so that pairs lose their separation.
 pub(crate) const LOSING: &str = "method = \"none\"\nshield = \"off\"";
 
 #[test]
@@ -236,7 +236,7 @@ fn wrong_scenarios_are_refused_with_a_remedy() {
 }
 
 /// Counts looks instead of time: between two of them lies at most the work of one pair of airplanes, or
-/// of one player, whose size the scenario's bounds limit.
+/// of one player, with a size that the scenario's bounds limit.
 #[test]
 fn no_cycle_of_many_airplanes_works_long_without_a_look_at_the_interrupt() {
     let looks = |n: u64, more: &str| {

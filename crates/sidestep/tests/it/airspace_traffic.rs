@@ -1,5 +1,5 @@
-//! Airplanes that others have recorded, told on their way, or let appear: replayed, flown, and
-//! kept apart, to the same bits for any number of workers.
+//! Airplanes that were recorded, are given orders on their way, or appear later: replayed,
+//! flown, and kept apart, to the same bits for any number of workers.
 
 use proptest::prelude::*;
 use sidestep::import::{bluesky, traffic};
@@ -185,7 +185,7 @@ fn orders_in_words() -> impl Strategy<Value = String> {
     })
 }
 
-/// Airplanes that appear at any time in a small space, and are told this and that.
+/// Airplanes that appear at any time in a small space, and are given various orders.
 fn appearing() -> impl Strategy<Value = String> {
     let coordinate = || -6000.0f64..6000.0;
     let one = (
@@ -204,7 +204,7 @@ fn appearing() -> impl Strategy<Value = String> {
 
 type Pairs = BTreeSet<(u32, u32)>;
 
-/// Pairs that lost separation, and pairs that were told to be too close when they came in.
+/// Pairs that lost separation, and pairs that were reported to be too close when they came in.
 fn lost_and_told(run: &AirspaceRun) -> (Pairs, Pairs) {
     let ledger = &run.books().ledger;
     let lost = ledger.pairs.iter().filter(|(_, record)| record.losses > 0).map(|(pair, _)| *pair);
@@ -214,7 +214,7 @@ fn lost_and_told(run: &AirspaceRun) -> (Pairs, Pairs) {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// L1 for traffic that comes and goes and is told what to do: only pairs that were told to
+    /// L1 for traffic that comes and goes and follows orders: only pairs that were reported to
     /// be too close when they came in ever lose separation.
     #[test]
     fn the_shield_keeps_all_pairs_apart_that_did_not_come_in_too_close(
@@ -230,7 +230,7 @@ proptest! {
     }
 }
 
-/// Everything at once: a generator, airplanes that appear and are told, and tracks.
+/// Everything at once: a generator, airplanes that appear and are given orders, and tracks.
 fn everything() -> Source {
     let mut airplanes = two_tracks();
     for k in 0..12 {
@@ -245,7 +245,7 @@ fn everything() -> Source {
         );
         airplanes.push_str(&plane([x, sign * 4000.0], -90.0 * sign, [x, -sign * 4000.0], &more));
     }
-    // Right behind the first one: whoever comes in there is too close.
+    // Right behind the first one: an airplane that comes in there is too close.
     airplanes.push_str(&plane([-5000.0, 4000.0], -90.0, [-5000.0, -4000.0], "appears_s = 5.0"));
     let more = "replay_until_s = 62.0\n[airspace.generator]\nkind = \"random\"\nn = 8\nradius_m = 9000.0\n";
     scenario(more, &airplanes)

@@ -1,5 +1,5 @@
 //! D1 for many worlds at once: a world of a batch has the bits of a run of its own, on any number of workers and
-//! whatever becomes of the others; a fresh start by seed is that of a scenario compiled with it.
+//! independently of the others; a fresh start by seed is that of a scenario compiled with it.
 
 use crate::chain::SEVERAL;
 use crate::common::CROWD;
@@ -37,7 +37,7 @@ fn compiled(source: &Source) -> Box<dyn Compiled> {
     WORLDS.compile(source).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Returns all that depends on a seed: the digest after some cycles, the teams, and what is told of the scenario.
+/// Returns all that depends on a seed: the digest after some cycles, the teams, and the texts about the scenario.
 fn told(compiled: &dyn Compiled, source: &Source) -> (Digest, String) {
     let mut run = compiled.start(source, 1);
     let mut told = format!("{:?}", run.teams());
@@ -150,7 +150,7 @@ fn a_batch_has_the_bits_of_runs_alone_on_any_number_of_workers() {
         let source = source("robots", ORDERED, seed);
         let mut run = compiled(&source).start(&source, 1);
         for cycle in from..30 {
-            // In cycle 20 half of the worlds stand still, and what they were ordered is dropped.
+            // In cycle 20 half of the worlds stand still, and their orders are dropped.
             if cycle != 20 || k % 2 == 0 {
                 let values: Vec<f64> =
                     (0..6).map(|agent| action(seed, agent, run.cycle())).collect();

@@ -44,7 +44,7 @@ fn segments_agree<const D: usize>([body, core]: [[Point<D>; 2]; 2]) -> Result<()
     Ok(())
 }
 
-/// Both ways: the point as a ball of no size, and the segment or box as what it is.
+/// Both ways: the point as a ball of no size, and the segment or box as it is.
 fn points_agree<const D: usize>(
     p: Point<D>,
     ours: &Core<D>,

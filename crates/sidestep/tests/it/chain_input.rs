@@ -1,4 +1,4 @@
-//! E1 for chains: whatever stands in a scenario, it is refused or it runs; nothing panics.
+//! E1 for chains: a scenario with any contents is refused or runs; nothing panics.
 
 use sidestep::kernel::Simulation;
 use sidestep::scenario::Source;

@@ -1,5 +1,6 @@
-//! Promise: what is learned from a recorded run is what the run was made with. Simulate with
-//! known tables, record, write CSV, learn, write a profile, load it, and compare.
+//! Promise: the tables learned from a recorded run are those that the run was made with.
+//! Simulate with known tables, record, write CSV, learn, write a profile, load it, and
+//! compare.
 
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{ColumnSpec, MemoryRecorder, TableSchema, Values};

@@ -78,7 +78,7 @@ fn every_regime_and_law_gives_the_same_bits_for_three_workers() {
             seen.insert(alone);
         }
     }
-    // With reliable effectors the one path is blocked or not, whatever the law: 2 + 2 * 3.
+    // With reliable effectors the one path is blocked or not, under every law: 2 + 2 * 3.
     assert_eq!(seen.len(), 8, "regimes and laws make a difference");
 }
 

@@ -1,5 +1,5 @@
-//! Promise L2 in action: what robots report and how they move follows the tables of the
-//! scenario, and what is impossible never happens.
+//! Promise L2 in action: the reports and moves of robots follow the tables of the
+//! scenario, and impossible outcomes never happen.
 
 use super::tiles::{Tiles, assert_fits, law, repeating};
 use sidestep::kernel::Simulation;
@@ -141,8 +141,8 @@ fn reports_follow_the_joint_distribution_of_observation_and_class() {
     }
 }
 
-/// The contingency table of what is reported and how far, against the product of its own
-/// margins: no table of the scenario enters.
+/// The contingency table of reported observations and distances, against the product of
+/// its own margins: no table of the scenario enters.
 #[test]
 fn observation_and_class_are_drawn_independently() {
     for (truth, counts) in reports(&watchers("sensors"), 20_000) {
@@ -323,7 +323,7 @@ fn two_robots_side_by_side_never_cross_diagonally() {
             *seen.entry(pair).or_insert(0u64) += 1;
         }
     }
-    // A fair draw says who goes first; the other is stopped where the first stands.
+    // A fair draw says which goes first; the other is stopped where the first stands.
     let expected = BTreeMap::from([
         ([(2, 4), (5, 4)], 1.0 / 4.0),
         ([(2, 4), (3, 4)], 1.0 / 8.0),

@@ -1,5 +1,5 @@
-//! Promise: what the simulator does in the long run is what the exact Markov chain says, and
-//! the exported POMDP is that chain.
+//! Promise: in the long run the simulator does as the exact Markov chain says, and the
+//! exported POMDP is that chain.
 
 use super::tiles::{Tiles, assert_fits, law};
 use sidestep::kernel::{InputError, Simulation};

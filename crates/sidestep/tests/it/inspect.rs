@@ -1,5 +1,5 @@
-//! D1 for those who ask: what a body is about to do can be asked of every world, at any time, and changes no
-//! result; and what is told is what then comes.
+//! D1 for inspections: every world can be asked for the next action of a body, at any time, without changing
+//! a result; and the answer is then what happens.
 
 use crate::chain::{BROKEN, CAUGHT, PLANNED, SEVERAL, SNAKE, SWARM};
 use crate::common::{CROWD, source};

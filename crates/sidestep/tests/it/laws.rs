@@ -1,4 +1,4 @@
-//! L1: no two bodies in one box, nobody in a wall; no door closes on a body.
+//! L1: no two bodies in one box, no body in a wall; no door closes on a body.
 
 use crate::common::{CROWD, simulation, source};
 use proptest::prelude::*;
@@ -56,7 +56,7 @@ forward = [{ p = 0.5, path = "F" }, { p = 0.5, path = "FF" }]
 }
 
 /// Robots that cross diagonally through each other's paths (`FL` against `FR`, slips of two
-/// boxes), from all relative places: the audit finds no shared box, whoever goes first.
+/// boxes), from all relative places: the audit finds no shared box, whichever goes first.
 #[test]
 fn diagonal_crossings_and_two_box_slips_never_collide() {
     for (dx, dy) in (0..4).flat_map(|x| (0..4).map(move |y| (x, y))).filter(|p| *p != (0, 0)) {

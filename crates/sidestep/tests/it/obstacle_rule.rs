@@ -1,5 +1,5 @@
-//! Promise L1: a blocked path is what the law of the scenario says, in the simulator and in
-//! the exact computation, for every shape of obstacle.
+//! Promise L1: a blocked path has the outcome that the law of the scenario gives, in the
+//! simulator and in the exact computation, for every shape of obstacle.
 //!
 //! Every table below was computed by hand. The effector `nomad` goes ahead with 0.88, stays
 //! with 0.04, slips two boxes with 0.02, and drifts to the left or the right of the box ahead

@@ -1,5 +1,5 @@
-//! Promise: the exported POMDP is a valid file of Cassandra's format, whose rows sum to 1 to
-//! the last printed digit, and it says what the simulator does.
+//! Promise: the exported POMDP is a valid file of Cassandra's format, with rows that sum to
+//! 1 to the last printed digit, and it agrees with the simulator.
 
 use super::tiles::{Tiles, assert_fits};
 use sidestep::kernel::Simulation;

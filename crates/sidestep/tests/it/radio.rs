@@ -1,5 +1,5 @@
-//! D1 for robots that talk: identical bits for 1, 2 and 3 workers and from every checkpoint, whatever
-//! the periods of the senders. And what talking is good for.
+//! D1 for robots that talk: identical bits for 1, 2 and 3 workers and from every checkpoint, for any
+//! periods of the senders. And the use of talking.
 
 use crate::common::{simulation, source};
 use sidestep::scenario::Source;

@@ -1,5 +1,5 @@
-//! D1, "resumed or not", for everything that a run tells at its end: a run that was resumed from any
-//! checkpoint has the metrics of a whole one, in all and of each agent and pair, but for times.
+//! D1, "resumed or not", for everything that a run reports at its end: a run that was resumed from
+//! any checkpoint has the metrics of a whole one, in all and of each agent and pair, but for times.
 
 use crate::common::CROWD;
 use crate::{airspace, chain};

@@ -17,11 +17,11 @@ pub(crate) const WALL: u8 = 1;
 /// Number of the kind `person`.
 pub(crate) const PERSON: u8 = 3;
 
-/// A drawing that is repeated `across` x `across` times, walled off from its neighbors: so
-/// many robots of the same place that know nothing of each other.
+/// A drawing that is repeated `across` x `across` times, walled off from its neighbors:
+/// that many robots at the same place, which know nothing of each other.
 ///
 /// `#` is a wall, `P` a person who stands still, and one of `>^<v` the lower-left box of the
-/// robot, whose other boxes are drawn free.
+/// robot; its other boxes are drawn free.
 #[derive(Debug, Clone)]
 pub(crate) struct Tiles {
     art: Vec<String>,
@@ -71,7 +71,7 @@ impl Tiles {
         (self.art[0].len() as u32 + 1, self.art.len() as u32 + 1)
     }
 
-    /// Column, row and character of what is drawn, rows counted from the south.
+    /// Column, row and character of the drawing, rows counted from the south.
     fn drawn(&self) -> impl Iterator<Item = (u32, u32, char)> + '_ {
         let numbered = self.art.iter().rev().enumerate();
         numbered.flat_map(|(r, line)| {
@@ -88,7 +88,7 @@ impl Tiles {
         self.drawn().find_map(robot).expect("a robot is drawn")
     }
 
-    /// Kind of what stands in a box of a tile.
+    /// Kind of the thing in a box of a tile.
     pub(crate) fn kind_at(&self, col: i32, row: i32) -> u8 {
         let line = self.art.len() as i32 - 1 - row;
         let found = usize::try_from(line).ok().and_then(|line| {
@@ -154,7 +154,7 @@ impl Tiles {
         robots_run(&self.source(), 2).unwrap_or_else(|e| panic!("{e}"))
     }
 
-    /// Counts of the robots' places, seen from their tile, and what they touched.
+    /// Counts of the robots' places, seen from their tile, and the kinds they touched.
     pub(crate) fn outcomes(&self, simulation: &RobotsRun) -> BTreeMap<Outcome, u64> {
         let (width, height) = self.pitch();
         let robots = simulation.agents();

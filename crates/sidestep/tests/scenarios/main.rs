@@ -1,4 +1,4 @@
-//! All scenarios of the repository, and what is told of them: schemas and problems.
+//! All scenarios of the repository, and the answers about them: schemas and problems.
 
 mod problems;
 mod schema;

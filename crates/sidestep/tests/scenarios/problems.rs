@@ -1,4 +1,4 @@
-//! Independent mistakes are told together, each at its key, and nothing else is.
+//! Independent mistakes are reported together, each at its key, and nothing else is.
 
 use crate::shipped;
 use serde_json::Value;
@@ -9,7 +9,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// A mistake that can be made in a text: the key at which it is to be told, and what is replaced.
+/// A mistake that can be made in a text: the key at which it is to be reported, and the replaced text.
 #[derive(Debug, Clone, PartialEq)]
 struct Mistake {
     key: Vec<String>,
@@ -24,7 +24,7 @@ impl Mistake {
     }
 }
 
-/// Tables whose keys are names that the scenario gives.
+/// Tables with keys that are names given by the scenario.
 const NAMES: [&str; 9] = [
     "sensors",
     "effectors",
@@ -188,7 +188,7 @@ fn are_independent(a: &Mistake, b: &Mistake) -> bool {
     !one.starts_with(&other) && !other.starts_with(&one) && a.at.start != b.at.start
 }
 
-/// Returns so many independent mistakes, from one to the next by a stride.
+/// Returns `count` independent mistakes, from one to the next by a stride.
 fn some_of(all: &[Mistake], count: usize, start: usize) -> Vec<&Mistake> {
     let stride = if all.len().is_multiple_of(17) { 19 } else { 17 };
     let mut chosen: Vec<&Mistake> = Vec::new();

@@ -62,7 +62,7 @@ fn misspelled(value: &Value, at: &str, found: &mut Vec<String>) {
     }
 }
 
-/// Tables whose keys are names that a scenario gives.
+/// Tables with keys that are names given by a scenario.
 fn has_names(at: &str) -> bool {
     let parts: Vec<&str> = at.split('/').skip(1).collect();
     matches!(
@@ -102,7 +102,7 @@ fn a_default_scenario_shows_every_key_of_its_schema_and_no_other() {
     }
 }
 
-/// Gathers the keys of a schema, with what it says of them.
+/// Gathers the keys of a schema, with their own schemas.
 fn keys(root: &Value, part: &Value, way: &str, found: &mut Vec<(String, Value)>) {
     if let Some(target) = part.get("$ref").and_then(Value::as_str) {
         return keys(root, &root[&target[2..7]][&target[8..]], way, found);

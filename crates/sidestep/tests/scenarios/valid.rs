@@ -18,7 +18,7 @@ const NOTES: [&str; 10] = [
     "x-infinite",
 ];
 
-/// Returns what is wrong with a value, each with its place; nothing if the schema takes it.
+/// Returns the errors of a value, each with its place; none if the schema takes it.
 pub(crate) fn wrong(root: &Value, value: &Value) -> Vec<String> {
     let mut told = Vec::new();
     check(root, root, value, "", &mut told);

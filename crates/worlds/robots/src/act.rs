@@ -205,7 +205,7 @@ impl<T: BoxWord> Scene<'_, T> {
         Ok(Categorical::new(&row).expect("a rescaled row is a distribution"))
     }
 
-    /// Opens a door, or closes it when nobody stands in the way; otherwise closing waits.
+    /// Opens a door, or closes it when no body stands in the way; otherwise closing waits.
     fn toggle(&self, slot: Slot, scratch: &mut Scratch) {
         let (floor, cell) = (self.floor, self.cell(slot));
         let (base, own) = (self.base(cell), &self.type_of(cell).own);

@@ -2,7 +2,7 @@
 //!
 //! A body bids its priority for every box it covers or may come to cover. It acts when its bid is
 //! the highest in all of them, because then all bodies that conflict with it and come before it
-//! have acted. So the outcome is that of the policy `random`, whose draws the bids are.
+//! have acted. So the outcome is that of the policy `random`, because the bids are its draws.
 
 use super::scene::{Scene, at, with_scene};
 use super::world::RobotsWorld;
@@ -50,7 +50,7 @@ impl<T: BoxWord> Scene<'_, T> {
     }
 
     /// Calls `each` for all boxes that a bidder covers, or may come to cover if it acts; walls
-    /// included, which nobody contends for.
+    /// included, for which no body contends.
     fn for_each_box_of(&self, bid: Bid, mut each: impl FnMut(usize)) {
         let cell = self.cell(bid.slot);
         let body = self.type_of(cell);

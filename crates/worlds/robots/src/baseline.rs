@@ -1,19 +1,19 @@
 //! The two parallel strategies that the source paper rejects, for measuring against them.
 //!
 //! Both use the very functions of the double pool (perceive and decide, claim, act); they differ in
-//! which worker does what, and when. Neither promises what the double pool promises: results depend
+//! which worker does what, and when. Neither keeps the promises of the double pool: results depend
 //! on the number of workers, and under the lock also on the scheduling of threads. Both keep the
-//! world's laws: no two bodies in a box, no body in a wall, and
-//! body acts once a cycle when it is due.
+//! world's laws: no two bodies in a box, no body in a wall, and each body acts once a cycle when it
+//! is due.
 //!
 //! - *Spatial partition*: each worker owns a vertical band of the map and the bodies anchored
-//!   in it. It perceives for them, then moves those whose claims stay inside the band. Bodies
-//!   that stand or may come across a border are moved by one worker, after all others; then
-//!   bodies are handed over to the bands they have entered. Within a band the order is that of a
-//!   list, without draws for priority: cheaper than the double pool, and less fair.
+//!   in it. It perceives for them, then moves those with claims that stay inside the band.
+//!   Bodies that stand or may come across a border are moved by one worker, after all others;
+//!   then bodies are handed over to the bands they have entered. Within a band the order is that
+//!   of a list, without draws for priority: cheaper than the double pool, and less fair.
 //! - *One lock*: each worker takes a body, locks the world, perceives and acts, and unlocks, as
-//!   krABMaga's parallel schedule does per agent (which also starts its threads anew every
-//!   step; here they live on). So bodies perceive a world that others have half changed.
+//!   krABMaga's parallel schedule does per agent (which also starts new threads every step;
+//!   here they live on). So bodies perceive a world that others have half changed.
 //!
 //! Both write claims, as the double pool does; the lock does not use them.
 

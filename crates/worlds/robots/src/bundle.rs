@@ -1,7 +1,7 @@
 //! A robots scenario that needs no other file, as a run folder keeps it.
 //!
 //! The map goes along as the program saw it, one pixel per box, so that a later version of
-//! an importer cannot change what is replayed. Profiles and lists of starts are kept as they are.
+//! an importer cannot change the replayed map. Profiles and lists of starts are kept as they are.
 
 use super::scenario::Compiled;
 use serde_json::Value;

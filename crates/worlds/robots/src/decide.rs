@@ -34,7 +34,7 @@ use sidestep_kernel::{Cycle, EntityId};
 use sidestep_map::planning::FlowField;
 use std::sync::Arc;
 
-/// A robot's memory between its actions: four words whose meaning is up to the behavior.
+/// A robot's memory between its actions: four words; their meaning is up to the behavior.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Memory {
     /// The words; all 0 at the start of a run.
@@ -172,8 +172,8 @@ pub trait Behaviour: std::fmt::Debug + Send + Sync {
         false
     }
 
-    /// Returns whether it does what a caller orders ([`External`]) and looks at nothing, so that its robots
-    /// need not perceive twice.
+    /// Returns whether it follows the orders of a caller ([`External`]) and looks at nothing, so that its
+    /// robots need not perceive twice.
     fn is_external(&self) -> bool {
         false
     }

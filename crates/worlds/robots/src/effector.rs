@@ -111,7 +111,7 @@ impl EffectorModel {
         }
     }
 
-    /// Returns whether some action may end otherwise than intended.
+    /// Returns whether some action may not end as intended.
     pub(super) fn errs(&self) -> bool {
         self.transitions.iter().any(|list| list[0].p < 1.0)
     }
@@ -123,7 +123,7 @@ impl EffectorModel {
     }
 }
 
-/// The rule for a transition whose path meets an obstacle.
+/// The rule for a transition with a path that meets an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum ObstacleRule {

@@ -1,5 +1,5 @@
-//! Percepts, decisions and claims of a body in a cycle, and what comes of them: the cycle is tried on a
-//! copy of the state, as far as this body's turn.
+//! Percepts, decisions and claims of a body in a cycle, and their outcome: the cycle is tried on a copy
+//! of the state, as far as this body's turn.
 
 mod outcome;
 mod senses;
@@ -18,11 +18,11 @@ use sidestep_kernel::space::BoxWord;
 use sidestep_kernel::view::{self, Inspection, MarkShape, Section, Table, Value, Who};
 use sidestep_kernel::{Cycle, EntityId, Phases, Slot};
 
-/// Members of a conflict group that are told, at most: those around the body.
+/// Largest number of members of a conflict group that are listed: those around the body.
 const MOST_MEMBERS: usize = 64;
 
 impl RobotsWorld {
-    /// Returns what is to tell of a body in cycle `now`; `None` for one that is not there.
+    /// Returns the inspection of a body in cycle `now`; `None` for one that is not there.
     pub(super) fn inspect(&self, state: &RobotsState, now: Cycle, who: Who) -> Option<Inspection> {
         let (_, id, _) = who;
         if id as usize >= self.bodies.len() || self.who(id) != who {
@@ -52,7 +52,7 @@ struct Looking<'a, T: BoxWord> {
 impl<'a, T: BoxWord> Looking<'a, T> {
     fn all(mut self) -> Inspection {
         let scratch = &mut self.scene.world.scratch();
-        // Who is decided from outside perceives within a cycle only for those who record it.
+        // Robots decided from outside perceive within a cycle only where readings are recorded.
         scratch.keep_readings = true;
         self.is_now();
         self.perceives(scratch);
@@ -74,7 +74,7 @@ impl<'a, T: BoxWord> Looking<'a, T> {
         self.told
     }
 
-    /// Tells what is known before the cycle.
+    /// Tells the facts known before the cycle.
     fn is_now(&mut self) {
         let (scene, cell) = (self.scene, self.scene.cell(self.slot));
         let body = &scene.world.bodies[self.id as usize];

@@ -1,4 +1,4 @@
-//! *Join*: groups of bodies whose claims meet, and the order in which a group's bodies act.
+//! *Join*: groups of bodies with claims that meet, and the order in which a group's bodies act.
 
 use super::Scratch;
 use super::decide::ask::{ASKED, ASKING, REACH_BOXES, request};
@@ -21,8 +21,8 @@ pub(super) struct Place {
 }
 
 impl<T: BoxWord> Scene<'_, T> {
-    /// Joins a body with all bodies whose claims meet its own: those named in a box that it may
-    /// come to cover, because they stand there or may come there too.
+    /// Joins a body with all bodies that have claims meeting its own: those named in a box that
+    /// it may come to cover, because they stand there or may come there too.
     #[inline]
     pub(super) fn join(&self, slot: Slot, groups: &Groups) {
         let cell = self.cell(slot);
@@ -64,7 +64,7 @@ impl<T: BoxWord> Scene<'_, T> {
         for k in 0..REACH_BOXES {
             let far = k * (step.delta.1 * self.world.stride as i32 + step.delta.0);
             let words = step.enter.iter().map(|&offset| self.floor.get(at(base, offset + far)));
-            // Whoever stands there is asked, and nobody behind it.
+            // The bodies that stand there are asked, and none behind them.
             let mut taken = words.filter(|word| !word.is_free()).peekable();
             let is_taken = taken.peek().is_some();
             for other in taken.filter(|&word| word != T::WALL).map(|word| self.cell(word.slot())) {

@@ -94,7 +94,7 @@ impl AnyCompiled for Compiled {
     fn seeds(&self) -> Seeds {
         match self.draws_always() {
             true => Seeds::Decide,
-            // Behaviors and conflicts may draw: runs tell.
+            // Behaviors and conflicts may draw: runs show it.
             false => Seeds::Perhaps,
         }
     }

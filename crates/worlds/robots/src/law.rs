@@ -5,8 +5,9 @@ use super::world::{RobotModel, RobotsWorld, Role};
 use sidestep_scenario::Remark;
 use std::collections::BTreeSet;
 
-/// Returns warnings of the effectors whose robots can never have a contact: where `renormalise`
-/// strikes out what is blocked, and each of their actions may also end in place, which never is.
+/// Returns warnings of the effectors with which robots can never have a contact: where
+/// `renormalise` strikes out blocked transitions, and each of their actions may also end in
+/// place, which is never blocked.
 pub(super) fn no_contacts(world: &RobotsWorld) -> Vec<Remark> {
     if world.obstacle_rule != ObstacleRule::Renormalise {
         return Vec::new();

@@ -1,5 +1,5 @@
 #![deny(clippy::disallowed_methods)]
-//! Stochastic situated agents on a grid: robots whose sensors lie and whose wheels slip.
+//! Stochastic situated agents on a grid: robots with sensors that lie and wheels that slip.
 //!
 //! See `README.md` beside this file for the model, and the paper "A parallel simulation of
 //! stochastic agent/environment interaction" (2001) for its source.

@@ -8,7 +8,7 @@ use std::f64::consts::FRAC_PI_2;
 
 /// The pose that the wheels of a robot claim, in the frame in which it was when they began to count: every
 /// action as it was intended, slips unnoticed. An action that an obstacle cuts short stalls the wheels, so that
-/// they claim what was made.
+/// they claim the motion that was made.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Claimed {
     /// Boxes along the axes of that frame.
@@ -64,7 +64,7 @@ mod tests {
     use sidestep_kernel::view::Look;
     use sidestep_scenario::Source;
 
-    /// A robot in a corridor whose wheels do nothing half of the time.
+    /// A robot in a corridor with wheels that do nothing half of the time.
     fn frames(cycles: u64) -> Vec<([f64; 2], [f64; 2])> {
         let text = format!(
             "format = 1\nworld = \"robots\"\nseed = 4\n[map]\nbox_size_m = 0.5\nascii = \"\"\"\n{}\n\"\"\"\n\

@@ -1,5 +1,5 @@
-//! Robots as a caller sees them: what they observe, and what may be ordered of those that are decided
-//! from outside.
+//! Robots as a caller sees them: their observations, and the orders for those that are decided from
+//! outside.
 
 use super::Scratch;
 use super::decide::External;
@@ -45,7 +45,7 @@ impl RobotsWorld {
         Teams::new(alike.into_iter().map(team).collect(), Self::AGENT)
     }
 
-    /// Returns the spaces of what a robot perceives, in the order in which [`Self::observe`] writes them.
+    /// Returns the spaces of a robot's percept, in the order in which [`Self::observe`] writes them.
     fn observed(&self, model: &RobotModel) -> Vec<Space> {
         let mut spaces = Vec::new();
         for (k, sensor) in model.body.sensors.iter().enumerate() {
@@ -69,7 +69,7 @@ impl RobotsWorld {
         spaces
     }
 
-    /// Returns the spaces of what robots perceive without sensors.
+    /// Returns the spaces that robots perceive without sensors.
     fn observed_by_all(&self) -> Vec<Space> {
         let none = || std::iter::once("none".to_string());
         let kinds = none().chain(self.kinds.iter().cloned()).collect();
@@ -102,7 +102,7 @@ impl RobotsWorld {
         self.robots.len().saturating_sub(1).min(MOST_HEARD)
     }
 
-    /// Returns the spaces of what may be ordered of a robot.
+    /// Returns the spaces of a robot's orders.
     fn ordered(&self, model: &RobotModel) -> Vec<Space> {
         let actions = Bounds::Choice(model.body.effector.actions.clone());
         let trip = Bounds::Choice(["none", "begun", "done"].map(String::from).into());
@@ -125,7 +125,7 @@ impl RobotsWorld {
         External::order(&state.body(order.agent).memory, &space.name, value as u64);
     }
 
-    /// Writes what a team perceives.
+    /// Writes the percepts of a team.
     pub(super) fn observe(
         &self,
         state: &RobotsState,
@@ -143,7 +143,7 @@ impl RobotsWorld {
 }
 
 impl<T: BoxWord> Scene<'_, T> {
-    /// Writes what a robot perceives into its row of each room.
+    /// Writes a robot's percept into its row of each room.
     fn observe(&self, id: EntityId, row: usize, scratch: &mut Scratch, room: &mut [CellsMut<'_>]) {
         let slot = self.state.slot_of_id[id as usize];
         let cell = self.cell(slot);

@@ -45,8 +45,8 @@ impl<T: BoxWord> Scene<'_, T> {
         if known { Intent::action(decision.action) } else { Intent::IDLE }
     }
 
-    /// Returns a robot's decision, and its memory after that; its readings and what it hears are in
-    /// the scratch.
+    /// Returns a robot's decision, and its memory after that; its readings and the words that it
+    /// hears are in the scratch.
     #[inline(always)]
     pub(super) fn decision(
         &self,
@@ -73,9 +73,9 @@ impl<T: BoxWord> Scene<'_, T> {
         (decision, memory)
     }
 
-    /// Fills the scratch with what a robot senses and hears, and returns the nearest class reported per
-    /// sector. Who is decided from outside was observed before the cycle: perceiving again would show
-    /// the same, and is left out unless readings are recorded.
+    /// Fills the scratch with the readings and the heard words of a robot, and returns the nearest
+    /// class reported per sector. A robot decided from outside was observed before the cycle:
+    /// perceiving again would show the same, and is left out unless readings are recorded.
     #[inline(always)]
     fn percept(&self, model: &RobotModel, slot: Slot, scratch: &mut Scratch) -> [u8; 4] {
         scratch.heard.clear();
@@ -138,7 +138,7 @@ impl<T: BoxWord> Scene<'_, T> {
         nearest
     }
 
-    /// Returns for each beam of a sensor what it meets first, and the distance to that in boxes.
+    /// Returns for each beam of a sensor the first thing that it meets, and the distance to that in boxes.
     pub(super) fn met(&self, sensor: &MountedSensor, cell: &BodyCell) -> Vec<Option<(T, f64)>> {
         let base = self.base(cell);
         let boxes = &*sensor.boxes[usize::from(cell.facing.get())];
@@ -166,7 +166,7 @@ impl<T: BoxWord> Scene<'_, T> {
     }
 
     /// Returns the intent of a door: it tries to toggle when its schedule says so. A closing that
-    /// somebody blocks waits.
+    /// a body blocks waits.
     fn door_wants(&self, door: &Door, cell: &BodyCell) -> Intent {
         let is_open = cell.facing.get() == 1;
         let draw = || self.world.streams.block(cell.id, self.now, purpose::DOOR, 0)[0];

@@ -22,7 +22,7 @@ pub struct Crossing {
 pub(crate) const EPSILON: f64 = 1e-9;
 
 /// Returns whether a distance reaches a limit, both in boxes. This is the one rule for all edges of
-/// distance classes and ranges: what is at an edge is beyond it, also where the edge in meters is a
+/// distance classes and ranges: a thing at an edge is beyond it, also where the edge in meters is a
 /// multiple of the side of a box that floating-point numbers cannot hold, like 0.9 m of 0.3 m.
 pub(crate) fn reaches(distance: f64, limit: f64) -> bool {
     distance >= limit - EPSILON

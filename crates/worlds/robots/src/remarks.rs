@@ -1,4 +1,4 @@
-//! Remarks on a valid scenario: what will surprise its author. `sidestep check` shows them.
+//! Remarks on a valid scenario: the things that will surprise its author. `sidestep check` shows them.
 
 use super::scenario::Compiled;
 use super::sensor::NOTHING;

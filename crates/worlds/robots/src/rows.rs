@@ -22,7 +22,7 @@ const FEW_POSES: usize = 1 << 18;
 const CYCLES_IN_A_ROW: usize = 16;
 /// but never more than this.
 const MAX_POSES: usize = 1 << 24;
-/// Number of bodies whose poses are collected together: a cache line of each cycle.
+/// Number of bodies for which poses are collected together: a cache line of each cycle.
 const TRANSPOSED: usize = 16;
 
 /// Names of the headings by number.
@@ -46,7 +46,7 @@ fn trajectories(world: &RobotsWorld) -> TableSchema {
     TableSchema { about: about_boxes(world), ..TableSchema::new("trajectories", columns) }
 }
 
-/// Returns what turns boxes into meters of the world, and ids into kinds of bodies.
+/// Returns the notes that turn boxes into meters of the world, and ids into kinds of bodies.
 fn about_boxes(world: &RobotsWorld) -> Vec<(String, String)> {
     let Plane { origin_m: [x, y], yaw_rad } = world.map.plane;
     let box_m = world.map.box_size_m;
@@ -157,7 +157,7 @@ impl Buffers for Rows {
 #[derive(Debug, Default)]
 pub struct Books {
     record: RecordSection,
-    /// First cycle whose poses are not recorded yet.
+    /// First cycle of which the poses are not recorded yet.
     recorded: Cycle,
     is_recording: bool,
     rows: Rows,
@@ -165,14 +165,14 @@ pub struct Books {
     gathered: Vec<Event>,
     /// and those that wait for the next frame.
     pub(super) log: Log<Event>,
-    /// The claims of each robot's wheels, by id, while somebody watches that.
+    /// The claims of each robot's wheels, by id, while odometry is watched.
     odometry: Option<Vec<Claimed>>,
     sensor_samples: Vec<SensorSample>,
     motion_samples: Vec<MotionSample>,
 }
 
 impl Books {
-    /// Returns the empty books of a run that records what `record` says once recording starts.
+    /// Returns the empty books of a run that records the tables named in `record` once recording starts.
     pub fn new(record: RecordSection) -> Self {
         Self { record, ..Self::default() }
     }
@@ -195,7 +195,7 @@ impl Books {
         (self.is_recording, self.recorded) = (true, now);
     }
 
-    /// Continues from cycle `now`, whose state was restored.
+    /// Continues from cycle `now`, after its state was restored.
     pub(super) fn go_on(&mut self, world: &RobotsWorld, state: &mut RobotsState, now: Cycle) {
         self.recorded = now;
         if self.is_recording {
@@ -203,18 +203,18 @@ impl Books {
         }
     }
 
-    /// Starts to keep the events that frames tell.
+    /// Starts to keep the events that frames report.
     pub(super) fn watch(&mut self) {
         self.log.is_kept = true;
     }
 
-    /// Starts to keep what wheels claim.
+    /// Starts to keep the claims of wheels.
     pub(super) fn watch_odometry(&mut self, world: &RobotsWorld) {
         // Robots have the first ids.
         self.odometry.get_or_insert_with(|| vec![Claimed::default(); world.robots.len()]);
     }
 
-    /// Returns what the wheels of each robot claim, by id; nothing unless somebody watches that.
+    /// Returns the claims of each robot's wheels, by id; nothing unless odometry is watched.
     pub(super) fn odometry(&self) -> &[Claimed] {
         self.odometry.as_deref().unwrap_or_default()
     }

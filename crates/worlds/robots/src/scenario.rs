@@ -92,7 +92,7 @@ pub(super) struct MapSection {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct KindSection {
-    /// Name of what sensors take it for; its own name by default.
+    /// Name of the thing that sensors take it for; its own name by default.
     pub(super) observation: Option<Spanned<String>>,
 }
 
@@ -125,7 +125,7 @@ pub(super) struct SensorSection {
 /// Rows of a matrix by name.
 pub(super) type Rows = BTreeMap<Spanned<String>, Spanned<Vec<f64>>>;
 
-/// Actions by name; `box_m` and `evidence` say on what data they rest.
+/// Actions by name; `box_m` and `evidence` name the data on which they rest.
 #[derive(Debug, Clone, Default)]
 pub(super) struct EffectorSection {
     pub(super) box_m: Option<Positive>,
@@ -229,7 +229,7 @@ pub(super) struct RobotSection {
 pub(super) struct BehaviourSection {
     /// Name of the behavior.
     pub(super) kind: Spanned<String>,
-    /// Mean number of actions between turns of one who wanders.
+    /// Mean number of actions between turns while wandering.
     pub(super) turn_every: Option<u32>,
     /// One end of a shuttle: [column, row, width, height].
     pub(super) a: Option<[u32; 4]>,
@@ -239,9 +239,9 @@ pub(super) struct BehaviourSection {
     pub(super) goals: Option<Vec<(u32, u32)>>,
     /// Actions to replay, by name.
     pub(super) actions: Option<Vec<String>>,
-    /// Whether goals or actions begin anew at their end.
+    /// Whether goals or actions start again at their end.
     pub(super) repeat: Option<bool>,
-    /// Way past what stands in the way.
+    /// Way past obstacles.
     pub(super) avoidance: Option<AvoidanceSection>,
     /// Weight of each action, by name.
     pub(super) weights: Option<BTreeMap<String, f64>>,
@@ -253,12 +253,12 @@ pub(super) struct BehaviourSection {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum AvoidanceSection {
-    /// Plans a way round what is sensed, and makes room for others.
+    /// Plans a way around the things that are sensed, and makes room for others.
     #[default]
     Plan,
     /// Sidesteps from near things.
     Avoid,
-    /// Sidesteps from what was reported twice.
+    /// Sidesteps from things that were reported twice.
     Filter,
     /// Turns after contacts.
     Touch,
@@ -267,7 +267,7 @@ pub(super) enum AvoidanceSection {
 impl BehaviourSection {
     /// Returns every key but `kind`, and whether it is given.
     fn given(&self) -> [(&'static str, bool); 9] {
-        // Without `..`, so that nobody adds a key and forgets it here.
+        // Without `..`, so that a new key cannot be forgotten here.
         let Self {
             kind: _,
             turn_every,

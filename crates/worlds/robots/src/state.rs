@@ -414,7 +414,7 @@ impl Snapshot {
             words.for_each(|&w| hasher.u32(w));
         }
         hasher.bytes(&self.visited);
-        // Whether 0 is a word or silence; nothing is added where nobody has spoken.
+        // Whether 0 is a word or silence; nothing is added where no robot has spoken.
         let spoke = (0u32..).zip(&self.bodies).filter(|(_, body)| body.voice.is_some());
         spoke.for_each(|(id, _)| hasher.u32(id));
         hasher.finish()

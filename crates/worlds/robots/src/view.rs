@@ -79,7 +79,7 @@ impl RobotsWorld {
         Eye::new(self).pose(self.type_of(id), cell, z_m)
     }
 
-    /// Returns the middle in the world of a body whose lower-left box is `at`.
+    /// Returns the middle in the world of a body that has its lower-left box at `at`.
     pub(super) fn middle_m(&self, id: EntityId, at: (u32, u32)) -> [f64; 2] {
         Eye::new(self).middle_m(self.type_of(id).size, at)
     }
@@ -127,8 +127,8 @@ impl RobotsWorld {
         model.body.sensors.iter().zip(truths).map(scan).collect()
     }
 
-    /// Returns the true distance in meters from the body's boundary to what each beam meets;
-    /// infinite where that reads as nothing.
+    /// Returns the true distance in meters from the body's boundary to the thing that each
+    /// beam meets; infinite where that reads as nothing.
     fn true_m<T: BoxWord>(
         &self,
         scene: &Scene<'_, T>,
@@ -238,8 +238,8 @@ fn side_in_words(side: Side) -> String {
     format!("{} side", side.name())
 }
 
-/// Returns a sensor's readings, and the true distances of what its beams meet, as ranges from the
-/// middle of its robot.
+/// Returns a sensor's readings, and the true distances of the things that its beams meet, as
+/// ranges from the middle of its robot.
 fn scan(
     sensor: &SensorModel,
     (readings, true_m): (&[Reading], &[f64]),

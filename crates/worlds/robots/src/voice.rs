@@ -1,4 +1,4 @@
-//! The words of the radio: what each robot has broadcast last.
+//! The words of the radio: the last broadcast of each robot.
 
 use sidestep_kernel::{Column, Cycle, EntityId};
 
@@ -7,7 +7,7 @@ use sidestep_kernel::{Column, Cycle, EntityId};
 /// A word that is broadcast in one cycle is heard in the next. Therefore there are two pages: one is
 /// read while the other is written, by parity of the cycle in which it is read. Every robot writes in
 /// every cycle, also where it does not act, so that the page being read holds the last word of all,
-/// whatever their periods, and the page being written holds nothing that anybody needs.
+/// whatever their periods, and the page being written holds nothing that is still needed.
 #[derive(Debug, Clone)]
 pub(crate) struct Voices([Page; 2]);
 
@@ -36,7 +36,7 @@ impl Voices {
         has_spoken.then(|| page.words.get(i))
     }
 
-    /// Notes what a robot says in cycle `now`: a new word, or the last one further on.
+    /// Notes the word of a robot in cycle `now`: a new one, or still the last one.
     pub(crate) fn say(&self, id: EntityId, now: Cycle, word: Option<u64>) {
         if let Some(word) = word.or_else(|| self.heard(id, now)) {
             self.page(now + 1).set(id, word);

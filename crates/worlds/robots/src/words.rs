@@ -21,7 +21,7 @@ pub(super) fn outcome(metrics: &Metrics) -> Lines {
         line("distance", distance(total.distance_m)),
         line("coverage", format!("{:.1} % of the free boxes", 100.0 * metrics.coverage)),
     ];
-    // Nothing to tell where no two bodies ever met.
+    // Nothing to report where no two bodies ever met.
     if metrics.largest_group > 0 {
         lines.push(line("conflict groups", groups(metrics)));
     }
@@ -218,7 +218,7 @@ fn sensors(world: &RobotsWorld) -> Vec<Value> {
     by_name.into_values().map(one).collect()
 }
 
-/// Returns the effectors in use, each once, with the chance that an action comes to what it means.
+/// Returns the effectors in use, each once, with the chance that an action ends as intended.
 fn effectors(world: &RobotsWorld) -> Vec<Value> {
     let robots = world.types.iter().filter_map(|ty| match &ty.role {
         Role::Robot(model) => Some(&model.body.effector),

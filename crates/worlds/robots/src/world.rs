@@ -22,7 +22,7 @@ pub(super) const BEAM_STEP: usize = 4;
 /// The order in which bodies are stored; no result depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StorageOrder {
-    /// Neighbors on the map are neighbors in memory; arranged anew now and then.
+    /// Neighbors on the map are neighbors in memory; rearranged now and then.
     #[default]
     Spatial,
     /// The order of entity ids.
@@ -191,7 +191,7 @@ pub struct RobotModel {
     pub body: Arc<RobotBody>,
     /// The behavior, which chooses its actions.
     pub behaviour: Arc<dyn Behaviour>,
-    /// Whether it is decided from outside; asked once, as the answer is needed in every cycle.
+    /// Whether it is decided from outside; asked once, because the answer is needed in every cycle.
     pub(super) is_external: bool,
 }
 
@@ -375,7 +375,7 @@ pub struct Radio {
 impl Radio {
     /// Returns a radio with this range in meters and this chance of losing a reception.
     pub fn new(range_m: f64, box_size_m: f64, loss: f64) -> Self {
-        // Who is exactly at the range hears, also where rounding makes the quotient smaller.
+        // A robot exactly at the range hears, even where rounding makes the quotient smaller.
         let reach = 2.0 * (range_m / box_size_m + EPSILON);
         Self { reach2_half_boxes: (reach * reach) as u64, loss: Chance::new(loss) }
     }

@@ -12,7 +12,7 @@ use sidestep::worlds::chain::kinematics::{
 /// The options that all targets share.
 #[derive(Debug, Args)]
 pub(super) struct GoalArgs {
-    /// Axes of the target's frame that do not count: x, y, z (position), rx, ry, rz (turn)
+    /// Free axes of the target's frame, which do not count: x, y, z (position), rx, ry, rz (rotation)
     #[arg(long, value_name = "AXES", value_delimiter = ',')]
     free: Vec<FreeAxis>,
 
@@ -20,11 +20,11 @@ pub(super) struct GoalArgs {
     #[arg(long, value_name = "ENGINE", default_value = "auto")]
     engine: EngineName,
 
-    /// Largest distance in m at which the target counts as reached
+    /// Position tolerance: largest distance in m at which the target counts as reached
     #[arg(long, value_name = "M", default_value_t = 1e-6)]
     tolerance_m: f64,
 
-    /// Largest angle in rad at which the orientation counts as reached
+    /// Orientation tolerance: largest angle in rad at which it counts as reached
     #[arg(long, value_name = "RAD", default_value_t = 1e-6)]
     tolerance_rad: f64,
 
@@ -32,15 +32,15 @@ pub(super) struct GoalArgs {
     #[arg(long, value_name = "N", default_value_t = 1)]
     solutions: usize,
 
-    /// Least difference of distinct postures, in rad of one joint
+    /// Smallest difference between distinct postures, in rad of one joint
     #[arg(long, value_name = "RAD", default_value_t = 0.1)]
     apart: f64,
 
-    /// Find the postures that are nearest to the one it starts from (--joints, --posture)
+    /// Find the postures nearest to the starting posture (--joints, --posture)
     #[arg(long)]
     nearest: bool,
 
-    /// Number of random postures to start from after the first
+    /// Number of random restarts: postures to start from after the first
     #[arg(long, value_name = "N", default_value_t = 100)]
     restarts: usize,
 
@@ -52,7 +52,7 @@ pub(super) struct GoalArgs {
     #[arg(long = "obstacle", value_name = "X,Y,Z,R", allow_hyphen_values = true)]
     obstacles: Vec<String>,
 
-    /// The arm that obstacles and itself count for
+    /// Shape of the arm in collisions with obstacles and itself
     #[arg(long, value_name = "BODY", default_value = "shapes")]
     body: BodyName,
 
@@ -78,8 +78,8 @@ enum BodyName {
     Rods,
     /// The links' collision shapes; rods where a link has none
     Shapes,
-    /// The same, and links must not touch each other, unless a joint connects them or the SRDF file
-    /// disables their collision
+    /// The same, without self-collision: links must not touch each other, unless a joint connects
+    /// them or the SRDF file disables their collision
     Own,
 }
 
@@ -129,7 +129,7 @@ impl GoalArgs {
     /// Returns the arm's body if it counts, and remarks on it.
     ///
     /// # Errors
-    /// When its own links shall not touch, and it has no shapes.
+    /// When its own links must not touch, and it has no shapes.
     pub(super) fn body(&self, arm: &Arm) -> Result<(Option<ArmBody>, Vec<String>), InputError> {
         let is_own = self.body == BodyName::Own;
         let counts = is_own || (self.body == BodyName::Shapes && !self.obstacles.is_empty());

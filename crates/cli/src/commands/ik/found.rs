@@ -11,12 +11,12 @@ pub(super) struct Found {
     pub(super) reached: bool,
     /// Distance of the tip from the target in m, along the axes that count.
     error_m: f64,
-    /// Angle in rad by which the tip is turned otherwise than asked; null if no orientation counts.
+    /// Angle in rad between the tip's orientation and the requested one; null if no orientation counts.
     error_rad: Option<f64>,
     /// The reason why the target is not reached; null if it is.
     reason: Option<String>,
     target: Vector,
-    /// The orientation asked, as a quaternion x, y, z, w; null if none counts.
+    /// The requested orientation, as a quaternion x, y, z, w; null if none counts.
     target_quaternion: Option<[f64; 4]>,
     engine: &'static str,
     /// Number of steps, over all starts.
@@ -28,7 +28,7 @@ pub(super) struct Found {
     solutions: Vec<Solution>,
     /// Meshes that stand as boxes, and shapes that could not be read.
     remarks: Vec<String>,
-    /// Number of postures asked for.
+    /// Number of requested postures.
     #[serde(skip)]
     wanted: usize,
     #[serde(flatten)]
@@ -97,7 +97,7 @@ impl Found {
         format!("{}{}{}{verdict}\n", self.placed.text(), aligned(&rows), self.list())
     }
 
-    /// Returns the postures as a list, if several were asked for.
+    /// Returns the postures as a list, if several were requested.
     fn list(&self) -> String {
         if self.wanted == 1 || !self.reached {
             return String::new();

@@ -25,7 +25,7 @@ struct Answers {
     reached: usize,
     /// Meshes that stand as boxes, and shapes that could not be read.
     remarks: Vec<String>,
-    /// Names of the joints whose values each answer has.
+    /// Names of the joints that the values of each answer belong to.
     joint_names: Vec<String>,
     /// CPU time of the search in us per target. It is no part of the results.
     cpu_us_per_target: f64,

@@ -21,7 +21,7 @@ pub(super) struct AgentflyArgs {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
-    /// Run everything once, in little time; its numbers are not precise
+    /// Quick run: everything once; the numbers are not precise
     #[arg(long)]
     quick: bool,
 
@@ -49,7 +49,7 @@ fn sockets(plan: &Plan, console: Console) -> Result<Sockets, Failure> {
     measured
 }
 
-/// Flies a scenario with a process for each airplane, and returns what was measured.
+/// Flies a scenario with a process for each airplane, and returns the measurements.
 fn flown(file: &Path) -> Result<Measured, Failure> {
     let mut measured = Measured::default();
     link::run(&Job::Fleet(job(file)), |told| {

@@ -23,7 +23,7 @@ pub(super) struct LoriaArgs {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
-    /// Run everything once, in little time; its numbers are not precise
+    /// Quick run: everything once; the numbers are not precise
     #[arg(long)]
     quick: bool,
 
@@ -31,7 +31,7 @@ pub(super) struct LoriaArgs {
     #[arg(long, value_name = "N")]
     seeds: Option<usize>,
 
-    /// Number of cycles of each run whose behavior is measured
+    /// Number of cycles of each run that measures behavior
     #[arg(long, value_name = "N")]
     cycles: Option<u64>,
 
@@ -68,7 +68,7 @@ pub(super) fn reproduce(args: &LoriaArgs, console: Console) -> Result<ExitCode, 
     deliver(&report, &Outcome { document, claims, quick }, args.out.as_deref(), console)
 }
 
-/// Returns a picture whose caption starts with a description of the scene.
+/// Returns a picture with a caption that starts with a description of the scene.
 fn described(scene: &Scene) -> Result<Picture, DrawError> {
     let what = describe(&scene.scenery, &scene.frame, &scene.trails);
     let picture = drawn(scene)?;

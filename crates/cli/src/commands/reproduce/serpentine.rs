@@ -17,7 +17,7 @@ pub(super) struct SerpentineArgs {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
-    /// Run everything once, in little time; its numbers are not precise
+    /// Quick run: everything once; the numbers are not precise
     #[arg(long)]
     quick: bool,
 

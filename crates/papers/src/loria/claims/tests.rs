@@ -14,7 +14,7 @@ use sidestep::worlds::robots::baseline::Strategy;
 use sidestep::worlds::robots::world::Regime;
 use sidestep_document::Estimate;
 
-/// Outcomes as the paper has them; where `is_right` is false, each order is the other way round.
+/// Outcomes as the paper has them; where `is_right` is false, each order is the other way around.
 fn outcome(variant: &Variant, seed: usize, is_right: bool) -> Outcome {
     // Errors of both kinds are worst, those of sensors worse than those of effectors.
     let rank = match variant.regime {

@@ -1,4 +1,4 @@
-//! A sweep from its plan to its table; and what leaves nothing.
+//! A sweep from its plan to its table; and failures that leave nothing.
 
 use super::super::shares::Share;
 use super::*;

@@ -37,7 +37,7 @@ pub struct Baseline {
 }
 
 impl Baseline {
-    /// Checks that it compares so many variants with each other, and with no others.
+    /// Checks that it compares this many variants with each other, and with no others.
     pub(super) fn check(&self, variants: usize) -> Result<(), String> {
         if self.of.len() != variants {
             return Err(format!("a baseline of {} variants, of {variants}", self.of.len()));
@@ -49,7 +49,7 @@ impl Baseline {
     }
 }
 
-/// The variants, and what is asked of the baseline.
+/// The variants, and the requested baseline.
 pub(super) struct Search<'a> {
     pub(super) wanted: &'a Wanted,
     pub(super) variants: &'a [Variant],
@@ -154,7 +154,7 @@ impl Search<'_> {
         self.parameters.contains(key) && value_of(variant, key, defaults).is_some_and(is_value)
     }
 
-    /// Returns the error that names what no variant has, and what there is instead.
+    /// Returns the error that names the setting that no variant has, and the existing ones instead.
     fn nothing(&self, defaults: &Defaults) -> InputError {
         let wrong = |cause: String, remedy: String| InputError::new(self.place, cause, remedy);
         let names: Vec<&str> = self.variants.iter().filter_map(|v| v.name.as_deref()).collect();

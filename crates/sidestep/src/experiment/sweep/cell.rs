@@ -101,7 +101,7 @@ impl Outcome {
         }
     }
 
-    /// Returns the outcome of a cell whose simulation broke one of its own rules.
+    /// Returns the outcome of a cell in which the simulation broke one of its own rules.
     pub fn failed(cell: Cell, why: impl Into<String>) -> Self {
         Self {
             cell: cell.id,

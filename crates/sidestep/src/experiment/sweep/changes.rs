@@ -15,7 +15,7 @@ pub struct Changes {
     pub factors: Vec<Factor>,
     /// The precision at which a variant has had enough runs; the metrics of the file's stay.
     pub until: Option<Until>,
-    /// Number of runs of each variant, whatever the file says about precision.
+    /// Number of runs of each variant, regardless of the file's precision.
     pub replicates: Option<u32>,
     /// Largest number of runs of each variant, where a precision ends them.
     pub max_runs: Option<u32>,

@@ -41,8 +41,7 @@ pub(super) fn figures(groups: &Groups<'_>, metric: &RunColumn) -> Vec<Figure> {
 }
 
 /// Returns whether variants are samples of a box of parameters: no two of them lie on a line, or there are many
-/// and some number is another in each of them, as in a Latin hypercube whose other sides are whole
-/// numbers.
+/// and some number is another in each of them, as in a Latin hypercube with other sides that are whole numbers.
 pub(super) fn is_scattered(groups: &Groups<'_>) -> bool {
     let numeric = numeric(groups);
     let variants = groups.variants.len();

@@ -199,7 +199,7 @@ impl Design {
         self.list.iter().flat_map(Variant::keys).chain(self.shared_keys())
     }
 
-    /// Returns the keys that every variant sets, whatever the entry of the list.
+    /// Returns the keys that every variant sets, regardless of its entry in the list.
     fn shared_keys(&self) -> impl Iterator<Item = &str> {
         let ranges = self.hypercube.iter().flat_map(|h| &h.ranges).map(|r| &r.key);
         ranges.chain(self.factors.iter().map(|f| &f.key)).map(String::as_str)

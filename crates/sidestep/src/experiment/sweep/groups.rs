@@ -118,7 +118,7 @@ impl<'a> Groups<'a> {
         Label::of_metric(&metric.name, self.meanings)
     }
 
-    /// Returns what a metric counts or measures; empty where its world does not say.
+    /// Returns the thing that a metric counts or measures; empty where its world does not say.
     pub(super) fn meaning(&self, metric: &RunColumn) -> &'static str {
         told(self.meanings, &metric.name).meaning
     }

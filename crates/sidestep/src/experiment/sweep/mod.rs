@@ -5,14 +5,14 @@
 //! changes.rs   changes that a command or a program makes to it
 //! variant.rs   a scenario and a variant of it: settings, and perhaps a name
 //! design.rs    the variants: a full grid, a list, a Latin hypercube, or products of them
-//! baseline.rs  what each variant is compared with, within the other factors
+//! baseline.rs  the variant that each is compared with, within the other factors
 //! plan.rs      variants x replicates -> cells, and shares of them
 //! cell.rs      one cell -> one outcome: a deterministic run, so a lost one is simply run again
 //! seeds.rs     variants in which seeds change nothing
 //! work.rs      cells -> results, many at once
 //! rounds.rs    the next cells, if a requested precision decides when to stop
 //! rows.rs      outcomes -> a table of runs, the same for any order of arrival
-//! shape.rs     the columns of that table, for who writes it block by block
+//! shape.rs     the columns of that table, for writing it block by block
 //!
 //! table.rs     a table of runs: one row per run, typed columns with a role
 //! label.rs     the label of a column on an axis, with its unit
@@ -27,8 +27,8 @@
 //!
 //! The unit of work is a *cell*: a variant and a seed. Replicate `k` of every variant has the same
 //! seed (common random numbers), so that differences between variants are compared pair by pair.
-//! Nothing here writes files or starts processes: a row is a function of its cell alone, whoever
-//! computes it, where and in what order.
+//! Nothing here writes files or starts processes: a row is a function of its cell alone,
+//! regardless of the process that computes it, the place and the order.
 
 pub mod baseline;
 pub mod cell;

@@ -17,7 +17,7 @@ use std::str::FromStr;
 /// variant. Cells are run replicate by replicate, so that the first results are a small complete
 /// experiment.
 ///
-/// A plan that is read back is checked ([`Plan::check`]): everybody else may believe it.
+/// A plan that is read back is checked ([`Plan::check`]): all other code may trust it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(remote = "Self")]
 pub struct Plan {
@@ -171,7 +171,7 @@ impl Plan {
         Err(InputError::new(place, format!("there are {runs} runs"), remedy))
     }
 
-    /// Returns what seeds change in the runs of a variant.
+    /// Returns the effect of seeds on the runs of a variant.
     pub(super) fn seeds(&self, variant: u32) -> Seeds {
         self.variants[variant as usize].seeds
     }

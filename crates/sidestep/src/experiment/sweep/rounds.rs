@@ -25,7 +25,7 @@ pub struct Rounds<'a> {
     done: Vec<BTreeSet<u32>>,
 }
 
-/// The reason why a variant is not run any more.
+/// The reason why a variant is no longer run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Stopped {
     /// Number of the variant.

@@ -282,7 +282,7 @@ mod tests {
         Plan::new(&sweep, variants, base).expect("valid")
     }
 
-    /// Outcomes whose fields differ in number and type from cell to cell.
+    /// Outcomes with fields that differ in number and type from cell to cell.
     fn outcome(cell: u64) -> Outcome {
         let mut metrics = serde_json::Map::new();
         metrics.insert("always".into(), json!(cell));

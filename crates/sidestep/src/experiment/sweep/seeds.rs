@@ -1,8 +1,8 @@
 //! Variants in which seeds change nothing: one run says all.
 //!
 //! Where a scenario draws no random number, its world says so, and there is one run. Where draws
-//! only guide a search, the first two runs tell: if they end in the same state to the bit, with the
-//! same cycles, seeds are taken to change nothing, and there are no more runs.
+//! only guide a search, the first two runs decide: if they end in the same state to the bit, with
+//! the same cycles, seeds are taken to change nothing, and there are no more runs.
 
 use super::cell::Outcome;
 use super::plan::{Cell, Plan};
@@ -11,10 +11,10 @@ use crate::scenario::Seeds;
 use crate::worlds::WORLDS;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Number of runs of a variant whose world cannot tell, before the others.
+/// Number of runs of a variant before the others, where its world cannot tell.
 const TRIALS: u32 = 2;
 
-/// The first runs of variants whose world cannot tell.
+/// The first runs of variants where their world cannot tell.
 #[derive(Debug)]
 pub struct Trials<'a> {
     plan: &'a Plan,
@@ -85,7 +85,7 @@ pub(super) fn seedless(plan: &Plan, runs: &RunTable) -> Vec<bool> {
     (0..plan.variants.len() as u32).map(is_same).collect()
 }
 
-/// Returns what a reader must know about the seeds of these runs.
+/// Returns the notes that a reader must know about the seeds of these runs.
 pub(super) fn notes(plan: &Plan, runs: &RunTable) -> Vec<String> {
     let trials = Trials::of(plan, runs);
     let all = plan.variants.len() as u32;
@@ -126,7 +126,7 @@ pub(super) fn notes(plan: &Plan, runs: &RunTable) -> Vec<String> {
     notes
 }
 
-/// Returns what to ask for in a scenario of a world so that its seeds change something.
+/// Returns the features to ask for in a scenario of a world so that its seeds change something.
 pub fn remedy(world: &str) -> Option<String> {
     let draws = WORLDS.named(world).map(|world| world.draws()).filter(|draws| !draws.is_empty())?;
     Some(format!("Seeds change what is drawn: {draws}."))

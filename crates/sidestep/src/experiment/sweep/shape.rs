@@ -1,7 +1,7 @@
 //! The columns of a table of runs, as all outcomes together make them.
 //!
-//! A table that is written block by block needs them before its first block: a metric may appear, or turn out to be no
-//! whole number, in the last run.
+//! A table that is written block by block needs them before its first block: a metric may appear, or turn out to be
+//! no whole number, in the last run.
 
 use super::cell::Outcome;
 use super::table::Role;
@@ -23,8 +23,8 @@ pub struct Shape(BTreeMap<(Role, String), Seen>);
 struct Seen {
     /// Its type, once it has a value.
     ty: Option<ColumnType>,
-    /// The first cell in which it has a value, and its place there: the order of columns, whoever ran what. Columns
-    /// without any value come last.
+    /// The first cell in which it has a value, and its place there: the order of columns, whichever process ran
+    /// which cell. Columns without any value come last.
     first: (u64, usize),
 }
 

@@ -213,7 +213,7 @@ fn uninformative(column: &RunColumn) -> Option<String> {
     let sample = Sample::of((0..runs).map(|run| column.values.number(run)));
     match sample.values.first() {
         None => Some(format!("no run has a value (n = {runs})")),
-        // One run says what it says, and nothing of what varies.
+        // One run tells its own values, and nothing of their variation.
         Some(first)
             if runs > 1 && sample.missing == 0 && sample.values.iter().all(|v| v == first) =>
         {
@@ -339,7 +339,7 @@ fn effects(groups: &Groups<'_>, column: &RunColumn) -> Vec<Effect> {
     balanced.filter(|p| groups.with_level(*p, 0).len() > 1).map(effect).collect()
 }
 
-/// Returns what a reader must know about what is compared.
+/// Returns the note that a reader must know about the comparisons.
 fn note_on_baseline(groups: &Groups<'_>, against: Option<&Against>) -> Option<String> {
     match against {
         Some(Against::Matched { name, alone: alone @ 1.., .. }) => Some(format!(

@@ -86,9 +86,9 @@ pub struct VariantMetric {
     pub variant: String,
     /// Number of runs with a value.
     pub n: usize,
-    /// Number of runs, among those without a value, whose value is infinite or not a number.
+    /// Number of runs, among those without a value, with a value that is infinite or not a number.
     pub missing: usize,
-    /// Number of those runs without a value whose value is infinite or not a number.
+    /// Number of those runs without a value that have an infinite one, or one that is not a number.
     pub not_finite: usize,
     /// Whether seeds change nothing in the variant.
     pub seedless: bool,
@@ -170,7 +170,7 @@ pub struct Summary {
     pub variants: Vec<Variant>,
     /// The parameters that differ between variants.
     pub parameters: Vec<Parameter>,
-    /// The name of what variants are compared with; each comparison has the variant itself.
+    /// The name of the baseline of the variants; each comparison has the variant itself.
     pub baseline: Option<String>,
     /// The metrics shown.
     pub metrics: Vec<MetricSummary>,

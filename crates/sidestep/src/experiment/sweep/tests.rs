@@ -1,4 +1,4 @@
-//! Guarantees of a summary, on tables whose answer is known.
+//! Guarantees of a summary, on tables with a known answer.
 
 use super::summary::Described;
 use super::*;
@@ -19,8 +19,8 @@ fn numbers(values: impl IntoIterator<Item = f64>) -> Values {
 }
 
 /// A full grid: 2 regimes, counts 10, 20 and 40, 20 replicates. The delay is
-/// `count / 10 + 3 (of "rush") + what the replicate has + noise`; robots arrive more seldom in a
-/// rush; the noise says nothing.
+/// `count / 10 + 3 (of "rush") + effect of the replicate + noise`; robots arrive less often in
+/// a rush; the noise says nothing.
 fn grid() -> RunTable {
     let mut rows = Vec::new();
     for regime in ["calm", "rush"] {

@@ -31,7 +31,7 @@ impl Summary {
         }
     }
 
-    /// Returns what all tables of metrics have in common, to be told once.
+    /// Returns the notes that all tables of metrics have in common, to be given once.
     pub fn footnotes(&self) -> Vec<&'static str> {
         footnotes(self)
     }
@@ -111,7 +111,7 @@ fn center(variant: &VariantMetric) -> String {
         Described::Share(share) => (share.share, share.interval),
     };
     match value {
-        // What no seed changes has no spread.
+        // A value that no seed changes has no spread.
         Some(value) if variant.seedless => number(value, Some(0.0)),
         value => with_interval(value, interval),
     }
@@ -150,7 +150,7 @@ fn against(metric: &MetricSummary, variant: &str) -> [String; 2] {
     [difference(found), p]
 }
 
-/// Returns the difference of a variant from what it is compared with; alone where seeds change nothing.
+/// Returns the difference of a variant from its baseline; alone where seeds change nothing.
 fn difference(comparison: &Comparison) -> String {
     match comparison.difference {
         Some(difference) if comparison.seedless => number(difference, Some(0.0)),
@@ -177,7 +177,7 @@ fn trends(summary: &Summary) -> Table {
     table
 }
 
-/// Returns what the tables of all metrics have in common.
+/// Returns the notes that the tables of all metrics have in common.
 fn footnotes(summary: &Summary) -> Vec<&'static str> {
     let mut notes = Vec::new();
     let has = |is_share: bool| summary.metrics.iter().any(|m| m.is_share == is_share);
@@ -365,7 +365,7 @@ fn left_out(summary: &Summary) -> Option<Table> {
     (!table.rows.is_empty()).then_some(table)
 }
 
-/// `12.3 [11.9, 12.7]`; `-` for what is absent.
+/// `12.3 [11.9, 12.7]`; `-` for an absent value.
 pub(super) fn with_interval(value: Option<f64>, interval: Option<Interval>) -> String {
     let Some(value) = value else { return "-".into() };
     match interval {

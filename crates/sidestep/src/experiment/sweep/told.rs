@@ -1,4 +1,4 @@
-//! The summary of a plan's runs: with its metrics and its baseline, and what its seeds change.
+//! The summary of a plan's runs: with its metrics, its baseline and the effect of its seeds.
 
 use super::baseline::Baseline;
 use super::options::{Against, SummaryOptions};

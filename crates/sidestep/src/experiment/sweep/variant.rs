@@ -9,7 +9,7 @@ use toml::Value;
 /// The value of a key that a variant does not set, as tables write it.
 pub(super) const DEFAULT: &str = "(default)";
 
-/// The scenario whose variants are run, before their settings.
+/// The scenario of which variants are run, before their settings.
 #[derive(Debug, Clone, Copy)]
 pub struct Base<'a> {
     /// Name of its world.

@@ -1,4 +1,4 @@
-//! Arms with a fixed base reach what they can reach, where nothing stands around them.
+//! Arms with a fixed base reach all targets within reach, where nothing stands around them.
 
 use super::*;
 use sidestep_kernel::stream::{Purpose, Streams};
@@ -117,7 +117,7 @@ fn a_script_leads_the_tool_of_a_chain_with_a_fixed_base_to_its_end() {
     assert!(hypot(x - 1.5, y - 1.0) <= 1e-7, "{x}, {y}");
 }
 
-/// Wanderers among each other and pillars, whose rods turn aside: no part is thrown about.
+/// Wanderers among each other and pillars, with rods that turn aside: no part is thrown about.
 #[test]
 fn no_part_is_thrown_about_where_a_rod_turns_aside() {
     let fastest_m_s = |text: &str| {

@@ -46,7 +46,7 @@ fn a_chain_that_follows_several_motions_at_once_has_the_same_bits_however_it_is_
 }
 
 /// With a limit of sub-steps, though it has no effect, every motion is made by itself; with a pebble
-/// far away every part is looked at. All that comes of it is the same.
+/// far away every part is looked at. All results are the same.
 #[test]
 fn what_is_put_off_or_proven_is_what_single_motions_do() {
     let single = OPEN.replace("[chain]", "[chain]\nstep_m = 1.0");
@@ -114,7 +114,7 @@ fn the_golden_digests_of_chains_are_what_every_machine_gets() {
     assert_eq!(found, include_str!("../golden/serpentine.txt"), "found:\n{found}");
 }
 
-/// Two arms of one model whose tools pass each other; a plan is followed when the run is resumed.
+/// Two arms of one model with tools that pass each other; a plan is followed when the run is resumed.
 #[test]
 fn arms_of_joints_have_the_same_bits_however_they_are_run() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/chain/arm.urdf");

@@ -1,6 +1,6 @@
 //! D1 for chains: the same build, scenario and seed give identical bits for 1, 2, 3 and 8
-//! workers, recorded or not, resumed or not (bits.rs); laws and metrics (recount.rs); what a run says of
-//! itself (told.rs); targets of arms (arms.rs); an agent per connector (team.rs).
+//! workers, recorded or not, resumed or not (bits.rs); laws and metrics (recount.rs); the report of a
+//! run (told.rs); targets of arms (arms.rs); an agent per connector (team.rs).
 
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Recorder, Values};
@@ -97,7 +97,7 @@ within_m = [[-3.0, -3.0], [3.0, 3.0]]
 patience_s = 1000.0
 ";
 
-/// Robots on wheels in a corridor with a bend, and somebody who walks to and fro in it.
+/// Robots on wheels in a corridor with a bend, and a person who walks to and fro in it.
 pub(crate) const SWARM: &str = "
 [ground]
 corridor = { width_m = 2.4, legs = [{ straight_m = 6 }, { radius_m = 2, turn_deg = 90 }, { straight_m = 4 }] }
@@ -262,7 +262,7 @@ within_m = [[-1.5, -1.5], [1.5, 1.5]]
 patience_s = 1000.0
 ";
 
-/// An arm whose tool is behind a wall of which it knows no way round but by a plan.
+/// An arm with its tool behind a wall around which it knows no way without a plan.
 pub(crate) const PLANNED: &str = "
 [chain]
 dt_s = 0.05
@@ -289,8 +289,8 @@ pub(crate) fn source(seed: u64, text: &str) -> Source {
     Source::new("s.toml", text, "")
 }
 
-/// A run whose state tests look into. It stays behind the face of all worlds, so that the chain is not
-/// compiled once more for its tests.
+/// A run with a state that tests look into. It stays behind the face of all worlds, so that the chain
+/// is not compiled once more for its tests.
 struct Running<const D: usize>(Box<dyn Simulation>);
 
 impl<const D: usize> Running<D> {

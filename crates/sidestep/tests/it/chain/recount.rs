@@ -71,7 +71,7 @@ pub(super) fn balls<const D: usize>(run: &Running<D>, cycle: u64) -> Vec<([f64; 
     all.map(|o| ball(&o.core, o.radius_m)).collect()
 }
 
-/// Steps a world cycle by cycle, and counts what its metrics count from its state alone.
+/// Steps a world cycle by cycle, and counts the same quantities as its metrics, from its state alone.
 fn assert_recount<const D: usize>(seed: u64, text: &str, cycles: u64) -> u64 {
     let mut run = run::<D>(&source(seed, text), 1);
     let n = run.state().len();

@@ -56,7 +56,7 @@ fn shipped<const D: usize>(name: &str, deployment: &str, more: &[&str], cycles: 
     format!("{} {}", run.digest(), outcome(&run).replace(char::is_whitespace, " "))
 }
 
-/// Counts of the network are no part of what is compared.
+/// Counts of the network are no part of the comparison.
 fn without_network(outcome: &str) -> String {
     let fields = outcome.split(", ");
     let kept = fields.filter(|f| !f.starts_with("messages: ") && !f.starts_with("bytes: "));

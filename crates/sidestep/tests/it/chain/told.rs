@@ -1,4 +1,4 @@
-//! Events that a run tells are those that its record shows.
+//! Events that a run reports are those that its record shows.
 
 use super::recount::balls;
 use super::*;
@@ -193,7 +193,8 @@ fn a_run_is_over_when_all_tasks_of_all_chains_are_done() {
     assert!(metrics.max_rod_violation_m <= 1e-9 && metrics.given_up.is_empty(), "{metrics:?}");
 }
 
-/// Progress is told of a time by time, of a script by motions, of targets by targets, without an end by the run.
+/// Progress is measured by time for a duration, by motions for a script, by targets for targets, and by the run
+/// without an end.
 #[test]
 fn progress_means_what_the_task_asks_for() {
     let progress = |task: &str, cycles: u64| {
@@ -204,7 +205,7 @@ fn progress_means_what_the_task_asks_for() {
     let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a}, not {b}");
     near(progress("kind = \"rest\"\nlasts_s = 4.0", 10), 0.25);
     near(progress("kind = \"wander\"\nlasts_s = 4.0", 10), 0.25);
-    // Without an end, by what can be done in the 2000 cycles of the run.
+    // Without an end, by the most that can be done in the 2000 cycles of the run.
     near(progress("kind = \"wander\"\nturn_deg = 1", 10), 0.005);
     near(progress("kind = \"rest\"", 10), 0.005);
     let script = "kind = \"script\"\nscript = \"forward 0.5 turn 10 wait 100 forward 1\"";

@@ -1,4 +1,4 @@
-//! Robots on wheels roll: they slide nowhere, turn no faster than their wheels, and go through nobody.
+//! Robots on wheels roll: they slide nowhere, turn no faster than their wheels, and go through no other robot.
 
 use super::*;
 use sidestep_kernel::math::{cos, sin, wrap_angle};
@@ -25,7 +25,7 @@ patience_s = 30.0
 navigator = { noise_m = 0.01 }
 ";
 
-/// Robots whose leader goes where a script says, with sharp turns.
+/// Robots with a leader that goes where a script says, with sharp turns.
 const SCRIPTED: &str = "
 [[chains]]
 connectors = 5
@@ -130,9 +130,9 @@ fn neighbors_fit_beside(room_m: f64, robot_m: f64) -> bool {
     })
 }
 
-/// A line that lies across the way of the disc is always on the same side of it. Where no two neighbors fit between the
-/// disc and the wall on that side, none of it may be across its way whenever the disc is there: every 10 s from wall to
-/// wall. A line in single file takes longer to pass, even at its shortest and as fast as wheels go.
+/// A line that lies across the way of the disc is always on the same side of it. Where no two neighbors fit between
+/// the disc and the wall on that side, none of it may be across its way whenever the disc is there: every 10 s from
+/// wall to wall. A line in single file takes longer to pass, even at its shortest and as fast as wheels go.
 #[test]
 fn no_line_gets_past_a_disc_that_leaves_too_little_room_beside_it() {
     // Robots keep 0.08 m around themselves; from wall to wall not even their bodies fit.

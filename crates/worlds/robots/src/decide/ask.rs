@@ -1,14 +1,14 @@
 //! Requests between robots that stand before each other: "let me pass".
 //!
-//! No radio is needed: as people do in a doorway, a robot is noticed by whoever stands before it. A
-//! behavior that takes part ([`Behaviour::asks`](super::Behaviour::asks)) keeps its request in one
-//! word of its memory. After all have decided, the world hands it to the robot that stands in the way
-//! of a step in the request's direction, at most [`REACH_BOXES`] away. Of several requests a robot
-//! hears the one of the highest rank.
+//! No radio is needed: as people do in a doorway, a robot is noticed by the one before it. A behavior
+//! that takes part ([`Behaviour::asks`](super::Behaviour::asks)) keeps its request in one word of its
+//! memory. After all have decided, the world hands it to the robot that stands in the way of a step
+//! in the request's direction, at most [`REACH_BOXES`] away. Of several requests a robot hears the
+//! one of the highest rank.
 
 use super::Memory;
 
-/// Index of the memory's word whose low bits hold the robot's own request.
+/// Index of the memory's word that holds the robot's own request in its low bits.
 pub(crate) const ASKING: usize = 2;
 /// Index of the memory's word that holds the request it has heard; 0 for none.
 pub(crate) const ASKED: usize = 3;

@@ -5,7 +5,7 @@ use crate::effector::{ActionId, STAY};
 use sidestep_kernel::column::Shared;
 use sidestep_kernel::stream::Draws;
 
-/// Does what the caller ordered before the cycle; stays when there is no order.
+/// Follows the order that the caller gave before the cycle; stays when there is none.
 ///
 /// Its memory holds the orders: they stand until the robot's next turn, and are gone after it. Word 0 has the
 /// action (plus 1) and the mark of the trip, and says whether there is a broadcast; words 1 and 2 are

@@ -1,4 +1,4 @@
-//! Going somewhere: along shortest ways on the static map, and past what is in the way.
+//! Going somewhere: along shortest ways on the static map, and past obstacles.
 
 use super::plan::{Planner, Way};
 use super::sidestep::{Trust, sidestep};
@@ -9,10 +9,10 @@ use sidestep_kernel::stream::Draws;
 use sidestep_map::planning::FlowField;
 use std::sync::Arc;
 
-/// The way in which a robot that goes somewhere deals with what is in its way.
+/// The way in which a robot that goes somewhere deals with obstacles.
 #[derive(Debug, Clone)]
 pub enum Avoidance {
-    /// Plans round what it senses, and makes room for others.
+    /// Plans around the things that it senses, and makes room for others.
     Plan(Arc<Planner>),
     /// Steps aside from near things that its sensors report.
     Sidestep(Trust),
@@ -84,7 +84,7 @@ impl Goto {
             memory.words[REACHED] += 1;
             if self.repeat && reached + 1 == n {
                 memory.words[REACHED] = 0;
-                // Stop here, because a list whose goals all are here would loop forever.
+                // Stop here, because a list with all of its goals here would loop forever.
                 return (None, trip);
             }
         }

@@ -166,7 +166,7 @@ mod tests {
         }
     }
 
-    /// Decides in a corridor of 9 x 3 boxes whose end in the west is the goal.
+    /// Decides in a corridor of 9 x 3 boxes with the goal at its end in the west.
     fn decide(trust: Trust, percept: &Percept<'_>, memory: &mut Memory) -> ActionId {
         let free = FreeSpace::new(9, 3, |_, _| true);
         let field = FlowField::toward(&free, 1, &[(0, 0), (0, 1), (0, 2)]);

@@ -120,7 +120,7 @@ fn last_poses(
     counts
 }
 
-/// Returns the seed of a run. It is drawn, because scenarios whose seeds are neighbors would share
+/// Returns the seed of a run. It is drawn, because scenarios with neighboring seeds would share
 /// runs if it were counted up from theirs.
 fn seed_of(seed: u64, run: u64) -> Seed {
     Seed(Streams::new(Seed(seed)).draws(0, run, purpose::RUN).next_u64())

@@ -31,8 +31,8 @@ pub struct PomdpOptions {
     pub goal: Option<(u32, u32)>,
     /// Whether the robot feels its contacts; they become part of the states.
     pub contacts: bool,
-    /// The beams whose readings are observed, at most [`MAX_BEAMS`]; `None` for the one that points
-    /// most nearly ahead.
+    /// The beams with observed readings, at most [`MAX_BEAMS`]; `None` for the one that points most
+    /// nearly ahead.
     pub beams: Option<Vec<Beam>>,
 }
 

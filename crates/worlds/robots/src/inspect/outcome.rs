@@ -17,7 +17,7 @@ struct Tried {
 }
 
 impl<T: BoxWord> Looking<'_, T> {
-    /// Lets the body act with its draw, and tells what comes of it.
+    /// Lets the body act with its draw, and reports the outcome.
     pub(super) fn acts(&mut self, word: u32, scratch: &mut Scratch) {
         let mut section = Section::new("Outcome");
         let start_m = self.place();

@@ -22,7 +22,7 @@ struct Beam<'a, T> {
 }
 
 impl<T: BoxWord> Looking<'_, T> {
-    /// Tells what a robot perceives and decides; nothing of others, which do neither.
+    /// Tells the percept and the decision of a robot; nothing of other bodies, which have neither.
     pub(super) fn perceives(&mut self, scratch: &mut Scratch) {
         let cell = self.scene.cell(self.slot);
         let Role::Robot(model) = &self.scene.type_of(cell).role else { return };
@@ -94,7 +94,7 @@ impl<T: BoxWord> Looking<'_, T> {
         ]
     }
 
-    /// Returns the distance from the body's boundary to what a beam meets, whether seen or not.
+    /// Returns the distance from the body's boundary to the thing that a beam meets, whether seen or not.
     fn true_m(&self, beam: &Beam<'_, T>) -> f64 {
         beam.met.map_or(f64::INFINITY, |(_, boxes)| boxes * self.scene.world.map.box_size_m)
     }

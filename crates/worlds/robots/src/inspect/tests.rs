@@ -66,7 +66,7 @@ fn nobody_is_told_of_who_is_not_there() {
     }
 }
 
-/// The transition that is told must be the one that the run then makes, of robots and people, under
+/// The reported transition must be the one that the run then makes, of robots and people, under
 /// every obstacle rule and conflict policy.
 #[test]
 fn what_is_told_of_an_action_is_what_comes_of_it() {
@@ -98,7 +98,7 @@ fn what_is_told_of_an_action_is_what_comes_of_it() {
                     let then = run.inspect(run.world().who(id)).expect("it is there");
                     for (now, next) in [("place", "next place"), ("heading", "next heading")] {
                         let (now, next) = (then.value("Now", now), told.value("Outcome", next));
-                        // Who goes straight is told so before it turns at its next decision.
+                        // A body that goes straight is reported so before it turns at its next decision.
                         assert_eq!(now, next, "{rule}, {policy}: {:?}", told.who);
                     }
                     moved += usize::from(told.value("Now", "place") != then.value("Now", "place"));

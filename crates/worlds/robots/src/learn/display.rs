@@ -123,7 +123,7 @@ pub(super) fn hold_out(f: &mut Formatter<'_>, fits: &[Fit]) -> Result {
 /// Largest probability, over all tables together, at which a difference is not taken for chance.
 const LEVEL: f64 = 0.05;
 
-/// Returns what the tests say: a line for each table whose parts differ, or one for all.
+/// Returns the verdicts of the tests: a line for each table with parts that differ, or one for all.
 fn verdicts(fits: &[Fit]) -> Vec<String> {
     let tested: Vec<&Fit> = fits.iter().filter(|fit| fit.degrees_of_freedom > 0).collect();
     let adjusted = holm(&tested.iter().map(|fit| Some(fit.p_value)).collect::<Vec<_>>());

@@ -93,10 +93,11 @@ fn between(start: &TruePose, end: &TruePose, fraction: f64) -> Pose {
     }
 }
 
-/// A step of a track is a gap when it is so many times the usual one, and longer than poses are told between.
+/// A step of a track is a gap when it is this many times the usual one, and longer than poses are interpolated
+/// across.
 const GAP_STEPS: f64 = 3.0;
 
-/// The gaps of a track: the times after which a pose follows too late to tell what was between.
+/// The gaps of a track: the times after which the next pose comes too late to interpolate between the two.
 pub(crate) struct Gaps(Vec<f64>);
 
 impl Gaps {

@@ -59,7 +59,7 @@ fn observed(run: &dyn Simulation, team: usize) -> BTreeMap<String, Vec<i64>> {
     observed.iter().map(|space| space.name.clone()).zip(rooms).collect()
 }
 
-/// A policy that depends on what it observes: ahead unless something is reported there.
+/// A policy that depends on its observations: ahead unless something is reported there.
 fn decide(run: &dyn Simulation, team: usize) -> Vec<f64> {
     let seen = observed(run, team);
     let n = run.teams()[team].agents.len();
@@ -239,7 +239,7 @@ fn words_are_heard_by_those_in_range_and_observed_in_the_order_of_senders() {
     assert!(of_first.iter().all(|((now, _), word)| **word == *now as i64 + 9), "{of_first:?}");
 }
 
-/// Refusals, and a part of the message that says what would be right.
+/// Refusals, and a part of the message that gives the remedy.
 #[test]
 fn what_cannot_be_obeyed_is_refused_and_nothing_of_it_noted() {
     let mut run = run(1);

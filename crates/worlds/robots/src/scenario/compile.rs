@@ -1,4 +1,4 @@
-//! Compilation of a scenario's text to an immutable world and everybody's start.
+//! Compilation of a scenario's text to an immutable world and the start of every body.
 
 mod bodies;
 pub(super) mod idle;
@@ -46,7 +46,7 @@ use std::sync::Arc;
 
 /// Largest number of bodies of a scenario.
 const MAX_BODIES: u64 = 10_000_000;
-/// Number of cycles of a run whose scenario does not give it.
+/// Number of cycles of a run where the scenario does not give it.
 const CYCLES: u64 = 10_000;
 const MAX_RANGE_BOXES: f64 = 4096.0;
 
@@ -82,11 +82,12 @@ impl Compiled {
         Compiler::new(source, own)?.compile(order)
     }
 
-    /// Returns the same scenario with another seed, without reading or tabulating anything again: what
-    /// compiling it with that seed would give, but for the remarks, which stay those of the first seed.
+    /// Returns the same scenario with another seed, without reading or tabulating anything again: the
+    /// result of compiling it with that seed, except for the remarks, which stay those of the first
+    /// seed.
     ///
     /// # Errors
-    /// When this seed finds no free place for somebody.
+    /// When this seed finds no free place for some body.
     pub fn reseeded(&self, seed: u64) -> Result<Self, InputError> {
         let streams = Streams::new(Seed(seed));
         let placed = self.placer.place(&streams)?;
@@ -140,7 +141,7 @@ impl<'a> Compiler<'a> {
         let source = Arc::new(source.clone());
         let (head, file) = source.parse_world::<RobotsFile>()?;
         let (sensors, effectors) = known_tables(&source, &file)?;
-        // Of a scenario whose map is wrong, too, this is told.
+        // Where the map is wrong as well, this is the error that is reported.
         check_names(&source, &file, &sensors, &effectors)?;
         let (map, office_doors) = load_map(&source, &file.map)?;
         idle::refuse(&source, &file, own, !office_doors.is_empty())?;
@@ -287,7 +288,7 @@ fn check_tables(kinds: &Kinds, sensors: &Sensors, effectors: &Effectors) -> Resu
 type Sensors = BTreeMap<String, Located<SensorSection>>;
 type Effectors = BTreeMap<String, Located<EffectorSection>>;
 
-/// Refuses robots with sensors or effectors that nobody knows.
+/// Refuses robots with unknown sensors or effectors.
 fn check_names(
     source: &Source,
     file: &RobotsFile,

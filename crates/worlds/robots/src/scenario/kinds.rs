@@ -1,4 +1,4 @@
-//! The kinds of a scenario: what each designates, and which of them a sensor can meet.
+//! The kinds of a scenario: the observation that each designates, and the kinds that a sensor can meet.
 
 use super::located::Located;
 use super::{RobotsFile, SensorSection};
@@ -21,7 +21,7 @@ pub(super) struct Kinds {
 struct Kind {
     name: String,
     observation: String,
-    /// Whether the scenario itself says what it designates, and where it speaks of the kind.
+    /// Whether the scenario itself says which observation it designates, and where it names the kind.
     is_mapped: bool,
     span: Option<Range<usize>>,
     is_met: bool,
@@ -151,7 +151,7 @@ impl Kinds {
         let cause =
             format!("sensor `{sensor}` has no observation `{observation}` for the kind `{name}`");
         let nearest = nearest(observation, &known);
-        // Presets and profiles serve many scenarios, so they are not what is to be changed.
+        // Presets and profiles serve many scenarios, so they are not the place to change.
         match (&kind.span, self.stand_in(at) && !kind.is_mapped) {
             (Some(span), false) => {
                 let remedy = format!(

@@ -13,7 +13,7 @@ const UNREACHED: u16 = u16::MAX;
 /// Prices of a search, in actions.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Prices {
-    /// Price of a place that is blocked now; what blocks it may go away.
+    /// Price of a place that is blocked now; the obstacle may go away.
     pub(super) blocked: u16,
     /// Extra price of a place beside a blocked one, where a slip ends in a contact.
     pub(super) beside: u16,
@@ -103,7 +103,7 @@ fn price(view: &View<'_>, prices: Prices, (col, row): (i32, i32)) -> u16 {
 }
 
 /// Returns whether a place is in the left lane of a passage: there is a wall to the left, and room
-/// to the right. Whoever comes the other way then finds its own right lane taken.
+/// to the right. A robot that comes the other way then finds its own right lane taken.
 fn is_left_lane(view: &View<'_>, (col, row): (i32, i32), direction: u8) -> bool {
     let at = view.offset(col, row);
     let is_wall = |side: u8| view.field.rise(at.0, at.1, (direction + side) % 4).is_none();
@@ -115,7 +115,8 @@ fn quarters(turn: u8) -> u16 {
 }
 
 /// Returns whether the static map's way may be followed from a place on: at a goal, and where it
-/// leads out of what is planned, or along its edge. Where it leads back in there is no way round.
+/// leads out of the planned square, or along its edge. Where it leads back in there is no way
+/// around.
 fn is_exit(view: &View<'_>, n: usize) -> bool {
     let (col, row) = place(n);
     let at = view.offset(col, row);

@@ -1,16 +1,16 @@
-//! Going somewhere among others: round what is sensed, and out of each other's way.
+//! Going somewhere among others: around the things that are sensed, and out of each other's way.
 //!
 //! Every robot decides alone, from its percept, its memory, the static map and the way to its goal:
 //!
 //! 1. *Sight*: readings that the static map does not explain block places around the robot; so does
 //!    the last contact, for a few decisions.
 //! 2. *Detour*: the cheapest way through the places around it. A blocked place costs some actions
-//!    that grow while the robot waits, because what blocks it may go away.
-//! 3. *Requests*: whoever waits before something asks it to make room ([`super::ask`]). A robot obeys
-//!    a rank above its own: it takes a free place that it was not asked for, or passes the request on
-//!    with the same rank (priority inheritance, as in PIBT: Okumura et al., "Priority inheritance
-//!    with backtracking for iterative multi-agent path finding", 2022). Ranks are drawn; a robot that
-//!    stands at its last goal has none and obeys everybody, then returns.
+//!    that grow while the robot waits, because the obstacle may go away.
+//! 3. *Requests*: a robot that waits before something asks it to make room ([`super::ask`]). A robot
+//!    obeys a rank above its own: it takes a free place that it was not asked for, or passes the
+//!    request on with the same rank (priority inheritance, as in PIBT: Okumura et al., "Priority
+//!    inheritance with backtracking for iterative multi-agent path finding", 2022). Ranks are drawn;
+//!    a robot that stands at its last goal has none and obeys every other, then returns.
 //! 4. *Deadlock*: after many actions without progress a robot draws a new rank and strays for some
 //!    actions. Without this, two robots in a dead end could wait for each other forever.
 
@@ -35,12 +35,12 @@ use std::sync::Arc;
 /// Actions without progress after which a robot strays, at least; its rank adds up to 31, so that
 /// not all stray at once.
 const STUCK: u8 = 64;
-/// Decisions for which a robot believes that what it has touched is still there.
+/// Decisions for which a robot believes that the thing it has touched is still there.
 const BUMP: u8 = 2;
 /// Decisions for which a robot keeps out of a place that it was asked to leave.
 const KEEP_AWAY: u8 = 1;
 
-/// Decisions to wait before something after which a robot whose sensors err tries to go on.
+/// Decisions to wait before something after which a robot with sensors that err tries to go on.
 const PATIENCE: u8 = 5;
 /// Highest rank of a robot that has been at its last goal and was asked to leave it. Its rank grows
 /// with the time that it is away.
@@ -72,7 +72,7 @@ struct View<'a> {
     vague: Places,
     /// See [`Planner::is_careful`].
     is_careful: bool,
-    /// Whether nobody else is noticed.
+    /// Whether no other body is noticed.
     is_alone: bool,
 }
 
@@ -140,7 +140,7 @@ impl Planner {
         let (at, heading) = (percept.at, percept.heading);
         let is_careful = self.is_careful;
         let view = View { field: way.field, at, heading, blocked, vague, is_alone, is_careful };
-        // What was ahead is believed to be there once more, because a sensor may miss it.
+        // An obstacle ahead is believed to be there once more, because a sensor may miss it.
         if !self.eyes.are_reliable && view.is_blocked(heading) && mood.bump_left == 0 {
             mood.bump = heading;
             mood.bump_left = BUMP;
@@ -292,7 +292,7 @@ fn stray(mood: &mut Mood, view: &View<'_>, draws: &mut Draws) -> ActionId {
     if draws.below(2) == 0 { LEFT } else { RIGHT }
 }
 
-/// Takes the next step toward the goal, or waits before what is in the way.
+/// Takes the next step toward the goal, or waits before an obstacle.
 fn travel(mood: &mut Mood, view: &View<'_>, draws: &mut Draws) -> ActionId {
     let direction = if view.is_alone {
         view.downhill()
@@ -323,7 +323,7 @@ fn travel(mood: &mut Mood, view: &View<'_>, draws: &mut Draws) -> ActionId {
     FORWARD
 }
 
-/// Returns whether to let somebody pass who may step into the same place: whoever comes from the
+/// Returns whether to let another robot pass that may step into the same place: one from the
 /// right goes first, and of two head on one by a fair draw.
 fn meets(view: &View<'_>, direction: u8, draws: &mut Draws) -> bool {
     let (east, north) = HEADINGS[usize::from(direction)];

@@ -9,7 +9,7 @@ const MOOD: usize = 1;
 /// Everything that a planning robot remembers between its actions, beside its progress on its list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Mood {
-    /// Its own rank among those who ask; 0 before it is drawn.
+    /// Its own rank among the robots that ask; 0 before it is drawn.
     pub(super) rank: u8,
     /// Actions without progress, less those with progress; up to 255.
     pub(super) stuck: u8,
@@ -29,7 +29,7 @@ pub(super) struct Mood {
     pub(super) yield_to: u8,
     /// Whether it still has to move for that.
     pub(super) yield_pending: bool,
-    /// Rank of the request that it follows, in steps of 8; what it asks for itself has that rank.
+    /// Rank of the request that it follows, in steps of 8; its own request has that rank.
     pub(super) yield_rank: u8,
     /// Decisions to stand still before something since the last move; up to 7.
     pub(super) waited: u8,
@@ -79,13 +79,13 @@ impl Mood {
         memory.words[ASKING] = two.word;
     }
 
-    /// Asks whoever stands in a direction to make room.
+    /// Asks the body that stands in a direction to make room.
     pub(super) fn ask(&mut self, rank: u8, toward: u8, then: Option<u8>) {
         self.request = Ask { rank: rank.max(1), toward, then }.word();
     }
 }
 
-/// A word whose low bits are read first.
+/// A word that is read from its low bits.
 struct Bits(u32);
 
 impl Bits {

@@ -1,4 +1,4 @@
-//! Boxes that beams tell of: the places around a robot where it cannot stand now.
+//! Boxes that beams report: the places around a robot where it cannot stand now.
 
 use super::super::Percept;
 use crate::ray::crossings;
@@ -115,8 +115,8 @@ impl Eyes {
         Self { walls, size: size as i32, are_reliable, beams: [0, 1, 2, 3].map(at) }
     }
 
-    /// Returns what the robot's readings report and the static map does not explain; none where there
-    /// is nothing of that kind, near or far.
+    /// Returns the things that the robot's readings report and the static map does not explain; none
+    /// where there are no such things, near or far.
     pub(super) fn look(&self, percept: &Percept<'_>) -> Option<Sight> {
         let beams = &self.beams[usize::from(percept.heading)];
         let mut sight = Sight::default();
@@ -177,7 +177,7 @@ impl Eyes {
     }
 
     /// Votes for the boxes that a beam has passed: all up to the wall if it reports nothing or that
-    /// wall, else those that are nearer than what it reports. One beam decides where beams are
+    /// wall, else those that are nearer than the thing it reports. One beam decides where beams are
     /// reliable, and most of them where they are not.
     fn vote_free(&self, beam: &Beam, reading: Reading, at: (u32, u32), votes: &mut Votes) {
         let to_wall = beam.crossed.iter().position(|c| self.is_wall(at, c));

@@ -39,7 +39,7 @@ pub(super) fn learn(
     Ok(model)
 }
 
-/// Returns the true pose at the end of each window, and what odometry claims in between.
+/// Returns the true pose at the end of each window, and the poses that odometry claims in between.
 fn windows(log: &BagLog, box_m: f64) -> CorrectedLog {
     let gaps = Gaps::of(&log.odometry);
     let mut scans: Vec<Scan> = Vec::new();
@@ -48,7 +48,7 @@ fn windows(log: &BagLog, box_m: f64) -> CorrectedLog {
         let Some(believed) = pose_at(&log.odometry, truth.t_secs) else { continue };
         let stretch = gaps.before(truth.t_secs);
         let Some(window) = open.as_mut().filter(|window| window.stretch == stretch) else {
-            // Between stretches nobody knows what odometry claims.
+            // Between stretches the claims of odometry are unknown.
             scans.extend(open.take().map(Window::abandoned));
             open = Some(Window::new(truth, believed, stretch));
             continue;
@@ -61,7 +61,7 @@ fn windows(log: &BagLog, box_m: f64) -> CorrectedLog {
     CorrectedLog { odometry_before: Vec::new(), scans }
 }
 
-/// The time since a true pose, and what odometry claims of it.
+/// The time since a true pose, and the claims of odometry about it.
 struct Window {
     /// Number of gaps of odometry before.
     stretch: usize,
@@ -77,7 +77,7 @@ impl Window {
         Self { stretch, start: believed, scan }
     }
 
-    /// Adds what odometry claims next; returns whether the window ends there.
+    /// Adds the next pose that odometry claims; returns whether the window ends there.
     fn extend(&mut self, believed: &Pose, box_m: f64) -> bool {
         let claimed = self.start.motion_to(believed);
         self.scan.odometry.push(Pose::from(self.scan.pose).after(&claimed).into());

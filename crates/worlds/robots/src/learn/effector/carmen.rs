@@ -1,6 +1,6 @@
 //! Odometry against corrected poses (rule L6).
 //!
-//! [`learn`] takes a CARMEN log; [`learn_by`] whatever gives pairs of poses, such as a bag.
+//! [`learn`] takes a CARMEN log; [`learn_by`] any source of pairs of poses, such as a bag.
 
 use super::EffectorModel;
 use super::events::{Events, Move, Turn};
@@ -83,7 +83,7 @@ pub(super) fn learn_by(
     Ok(EffectorModel { report, profile: events.profile(rule.words, options) })
 }
 
-/// Adds what the steps of odometry say of its slip, and the warning where it is too large.
+/// Adds the slip that the steps of odometry show, and the warning where it is too large.
 fn tell_slip(report: &mut EffectorReport, steps: &[Motion]) {
     report.lateral_slip = Moments::of(steps.iter().filter_map(slip_ratio));
     report.lateral_slip_sd = report.lateral_slip.map(|slip| slip.sd);

@@ -23,8 +23,8 @@ pub struct Outcome {
 /// A number this close to a whole one counts as whole, because text files round.
 const WHOLE_TOLERANCE: f64 = 1e-6;
 
-/// Displacements beyond this number of boxes count as this one: no map is as large, and a log whose poses jump
-/// like that must not make numbers overflow.
+/// Displacements beyond this number of boxes count as this one: no map is as large, and a log with poses that
+/// jump like that must not make numbers overflow.
 const FARTHEST: f64 = 1e9;
 
 /// Returns the two whole numbers around `x` and their probabilities; one alone where `x` is whole.

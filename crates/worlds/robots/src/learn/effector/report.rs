@@ -31,7 +31,7 @@ pub struct EffectorReport {
     /// Number of moves by the box to which they round, `"ahead,left"`.
     pub rounded_counts: BTreeMap<String, u64>,
     /// Displacements: `ahead_boxes`, `left_boxes`, `dtheta_minus_cmd_rad`, `duration_s` and
-    /// whatever else the source gives, by name with unit.
+    /// all other quantities that the source gives, by name with unit.
     pub moments: BTreeMap<String, Moments>,
     /// The turns.
     pub turns: Option<TurnReport>,

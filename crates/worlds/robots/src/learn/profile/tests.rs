@@ -35,7 +35,7 @@ fn both() -> String {
     with_effector("p.toml", &text, "wheels", &effector_model()).unwrap()
 }
 
-/// Loads a scenario whose one robot has the sensor and the effector named.
+/// Loads a scenario with one robot that has the named sensor and effector.
 fn loads(profile: &str, sensor: &str, effector: &str) -> Result<Compiled, InputError> {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("p.toml"), profile).unwrap();

@@ -1,4 +1,4 @@
-//! A laser scanner learned from the scans of a bag: the ranges that a map lets expect against those measured.
+//! A laser scanner learned from the scans of a bag: the ranges expected from a map against those measured.
 
 use std::collections::BTreeMap;
 
@@ -16,14 +16,14 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::math::{atan2, cos, hypot, sin};
 use sidestep_kernel::view;
 
-/// The observations of a scanner: nothing, and whatever stops a beam.
+/// The observations of a scanner: nothing, and anything that stops a beam.
 const OBSERVATIONS: [&str; 2] = [NOTHING, WALL];
 const WALL: &str = "wall";
 /// Most beams of a profile, unless others are asked for; a scan has hundreds, a simulated robot few.
 const BEAMS_MAX: usize = 16;
-/// The longest way in meters that odometry alone tells since the last true pose.
+/// The longest way in meters that odometry alone measures since the last true pose.
 const RECKONED_MAX_M: f64 = 1.0;
-/// A scanner on which this share of beams ends before the wall sees what is not on the map.
+/// A scanner with this share of its beams ending before the wall sees things that are not on the map.
 const IN_FRONT_MAX: f64 = 0.1;
 
 /// The rule by which counts become rows.
@@ -62,7 +62,7 @@ pub(super) fn learn(
     Ok(model)
 }
 
-/// A beam is stopped by whatever stands there, so all kinds look like a wall.
+/// Anything stops a beam, so all kinds look like a wall.
 fn seeing_all(profile: SensorProfile) -> SensorProfile {
     let designates = profile.designates.into_iter().map(|(kind, _)| (kind, WALL.to_string()));
     SensorProfile { designates: designates.collect(), ..profile }
@@ -113,7 +113,7 @@ struct Judged {
     skipped: BTreeMap<String, u64>,
 }
 
-/// Compares scans with what a map lets expect.
+/// Compares scans with the ranges expected from a map.
 struct Judge<'a> {
     log: &'a BagLog,
     map: &'a PixelMap,

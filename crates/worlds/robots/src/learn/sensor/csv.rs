@@ -1,4 +1,4 @@
-//! A sensor learned from readings whose true values are known.
+//! A sensor learned from readings with known true values.
 
 use std::collections::BTreeMap;
 
@@ -37,7 +37,7 @@ pub(super) struct ReadingLog<'a> {
 }
 
 impl ReadingLog<'_> {
-    /// Returns what the readings say of the sensor.
+    /// Returns the sensor that the readings describe.
     pub(super) fn model(&self, source: &str, options: &SensorOptions) -> SensorModel {
         SensorModel { report: self.report(source, options), profile: self.profile(options) }
     }

@@ -1,7 +1,7 @@
 //! The reports of a sensor compared with the truth.
 //!
 //! [`from_mrclam`] judges barcode readings by motion capture (rules L1 to L4 below); [`from_bag`] judges the
-//! ranges of a scanner by a map; [`from_csv`] takes readings whose true values are already known.
+//! ranges of a scanner by a map; [`from_csv`] takes readings with true values that are already known.
 //!
 //! - L1, pose at a time: linear between the motion-capture samples around it; refused
 //!   outside the track and in gaps wider than 0.5 s.
@@ -9,10 +9,10 @@
 //!   bearing is within 0.15 rad and its true range within max(0.5 m, 25 %). If the decoded
 //!   subject is consistent, it is the true one; if it is a robot without ground truth at that
 //!   time, the reading is skipped; otherwise the consistent subject with the least
-//!   `(db / 0.03)^2 + (dr / (0.1 r))^2`, or nobody. (The nearest subject is not always the true
+//!   `(db / 0.03)^2 + (dr / (0.1 r))^2`, or none. (The nearest subject is not always the true
 //!   one, because landmarks stand as little as 0.2 m apart.)
 //! - L3, distance: class of the true range against class of the measured range, over the
-//!   sightings whose subject was read correctly. The true range is center to center.
+//!   sightings with a correctly read subject. The true range is center to center.
 //! - L4, detection: per second, whether a subject in view was read; see [`Detection`].
 
 mod bag;
@@ -59,7 +59,7 @@ pub fn from_mrclam(folder: &Path, options: &SensorOptions) -> Result<SensorModel
 /// The scanner to learn from a bag.
 #[derive(Debug, Clone, Copy)]
 pub struct Scanner<'a> {
-    /// The file of the map in whose frame the true poses are: a ROS map, or an image of one.
+    /// The file of the map in the frame of which the true poses are: a ROS map, or an image of one.
     pub map: &'a Path,
     /// Range of the profile's sensor in meters; `None` for that of the scans.
     pub range_m: Option<f64>,
@@ -70,8 +70,8 @@ pub struct Scanner<'a> {
 /// Learns a scanner from the scans and true poses in a ROS 2 bag.
 ///
 /// A beam is expected to end at the first wall of the map, from the true pose at its time (L1; where true poses are
-/// farther apart, odometry tells the way since the last one, up to a meter). Beams that run into what is not
-/// mapped are skipped, and so are ranges below the least that the scanner measures.
+/// farther apart, odometry gives the way since the last one, up to a meter). Beams that run into unmapped places
+/// are skipped, and so are ranges below the least that the scanner measures.
 ///
 /// # Errors
 /// Those of [`bag::read`](sidestep_import::bag::read) and [`pixel_map`](sidestep_import::pixel_map); when scans

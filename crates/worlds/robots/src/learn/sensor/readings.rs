@@ -1,4 +1,4 @@
-//! Readings whose true values are known, from a CSV table.
+//! Readings with known true values, from a CSV table.
 
 use std::collections::BTreeSet;
 

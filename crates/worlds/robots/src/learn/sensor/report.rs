@@ -25,9 +25,9 @@ pub struct SensorReport {
     pub skipped: u64,
     /// The same by cause.
     pub skipped_by_cause: BTreeMap<String, u64>,
-    /// Number of sightings whose report was correct.
+    /// Number of sightings with a correct report.
     pub correct: u64,
-    /// Number of sightings whose report agrees with the subject that geometry alone would choose.
+    /// Number of sightings with a report that agrees with the subject that geometry alone would choose.
     pub nearest_agrees: Option<u64>,
     /// Barcodes that no subject has, and how often they were read.
     pub unknown_codes: BTreeMap<u32, u64>,
@@ -84,8 +84,8 @@ pub struct ErrorMoments {
     pub bearing_error_rad: Option<Moments>,
 }
 
-/// Numbers of beams by what they met against what the map has there. A range agrees with the map as that of a
-/// sighting with its subject: within half a meter, or a quarter of the range.
+/// Numbers of beams by the thing they met against the map at that place. A range agrees with the map as that
+/// of a sighting with its subject: within half a meter, or a quarter of the range.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct AgainstMap {
     /// The wall was met where it is, or nothing where nothing is.

@@ -23,7 +23,7 @@ pub(super) struct Sighting {
     /// Number of the observing robot.
     pub(super) observer: u32,
     pub(super) barcode: u32,
-    /// The subject that has the barcode; `None` when nobody has it.
+    /// The subject that has the barcode; `None` when no subject has it.
     pub(super) decoded: Option<u32>,
     /// The subject that was really there.
     pub(super) truth: Option<Candidate>,

@@ -9,7 +9,7 @@ use sidestep_import::mrclam::Dataset;
 pub(super) const ROBOT: usize = 0;
 /// Row of a table of kinds, and column: a landmark.
 pub(super) const LANDMARK: usize = 1;
-/// Row of a table of kinds: nobody. The column is a code that no subject has.
+/// Row of a table of kinds: no subject. The column is a code that no subject has.
 pub(super) const NOBODY: usize = 2;
 
 /// The names of a data set's subjects in tables.
@@ -32,7 +32,7 @@ impl Labels {
         Self { subjects, robots }
     }
 
-    /// Returns the position of a subject among rows and columns; nobody comes last.
+    /// Returns the position of a subject among rows and columns; `None` comes last.
     fn index(&self, subject: Option<u32>) -> usize {
         let known = subject.and_then(|subject| self.subjects.binary_search(&subject).ok());
         known.unwrap_or(self.subjects.len())
@@ -91,7 +91,7 @@ pub(super) fn distance<'a>(
     counts
 }
 
-/// Counts the class of the measured range where nobody was.
+/// Counts the class of the measured range where there was no subject.
 pub(super) fn beyond(sightings: &[Sighting], classes: &DistanceClasses) -> Counts {
     let mut counts = Counts::new(BEYOND, &[BEYOND.to_string()], &classes.names);
     for sighting in sightings.iter().filter(|sighting| sighting.truth.is_none()) {

@@ -18,8 +18,8 @@ pub(in crate::scenario) const BEHAVIOURS: [(&str, &[&str]); 7] = [
 /// A key that does nothing, with the reason.
 struct Rule(&'static str, bool, &'static str);
 
-/// Refuses what does nothing in a scenario; `own` are behaviors beside the built-in ones, and
-/// `has_doors` says whether its map brings doors.
+/// Refuses keys that do nothing in a scenario; `own` are behaviors beside the built-in ones,
+/// and `has_doors` says whether its map brings doors.
 ///
 /// # Errors
 /// At the first such key.
@@ -89,7 +89,7 @@ fn behaviour(
     let known = match BEHAVIOURS.iter().find(|(kind, _)| *kind == own_kind) {
         Some((_, keys)) => *keys,
         None if own.contains_key(own_kind) => &[],
-        // Its name is wrong, and that is what is to be told.
+        // Its name is wrong, and that error is the one to report.
         None => return Ok(()),
     };
     let error = |key: &str, cause: String, remedy: String| {

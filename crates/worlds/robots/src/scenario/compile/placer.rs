@@ -4,7 +4,7 @@ use super::bodies::{Group, TypeOf};
 use super::*;
 use crate::scenario::Placing;
 
-/// The part of a scenario on which the places at the start depend: another seed needs no more of it.
+/// The part of a scenario on which the places at the start depend: another seed needs nothing else of it.
 #[derive(Debug)]
 pub(crate) struct Placer {
     pub(super) source: Arc<Source>,
@@ -21,7 +21,7 @@ pub(super) struct Placed {
 }
 
 impl Placer {
-    /// Returns the first id of each group: robots, people, doors, whatever is placed first.
+    /// Returns the first id of each group: robots, people, doors, in whichever order they are placed.
     pub(super) fn first_ids(&self) -> Vec<EntityId> {
         let mut next = 0;
         let first = |group: &Group| {
@@ -32,7 +32,7 @@ impl Placer {
         self.groups.iter().map(first).collect()
     }
 
-    /// Places everybody, with the draws of `streams`.
+    /// Places all bodies, with the draws of `streams`.
     pub(super) fn place(&self, streams: &Streams) -> Result<Placed, InputError> {
         let n = self.groups.iter().map(|group| group.count as usize).sum();
         let mut round = Round {

@@ -4,7 +4,7 @@ use super::super::RobotsFile;
 use super::bodies::Group;
 use super::*;
 
-/// Returns warnings of effectors that move otherwise than their author may think.
+/// Returns warnings of effectors that move in a way that their author may not expect.
 pub(super) fn on_effectors(
     file: &RobotsFile,
     effectors: &BTreeMap<String, Located<EffectorSection>>,
@@ -22,7 +22,7 @@ pub(super) fn on_effectors(
 /// Behaviors that never say anything.
 const SILENT: [&str; 5] = ["wander", "shuttle", "goto", "replay", "random"];
 
-/// Returns a note on a radio over which nobody speaks.
+/// Returns a note on a radio over which no robot speaks.
 pub(super) fn on_radio(file: &RobotsFile) -> Option<Remark> {
     let speaks = |section: &Spanned<RobotSection>| {
         let behaviour = section.get_ref().behaviour.as_ref();
@@ -59,7 +59,7 @@ pub(super) fn refuse_other_boxes(
     Ok(())
 }
 
-/// Returns words for each action that mostly comes to something else than its first transition.
+/// Returns words for each action that mostly ends in a transition other than its first.
 fn not_as_meant(name: &str, at: &Located<EffectorSection>) -> Vec<String> {
     let Ok(model) = tables::effector(name, at) else { return Vec::new() };
     let actions = model.actions.iter().zip(&model.transitions);
@@ -123,7 +123,7 @@ impl Compiler<'_> {
         else {
             return 0;
         };
-        // Ways lead back as well, so whoever reaches a goal from its start reaches it from others.
+        // Ways lead back as well, so a robot that reaches a goal from its start reaches it from other goals.
         let (col, row) = placed.start[id as usize].0;
         model.behaviour.ways().iter().filter(|way| !way.reaches_goal(col, row)).count()
     }
