@@ -23,7 +23,7 @@ export interface Listener {
   lost(attempt: number, wait_ms: number): void;
 }
 
-/** A call that was refused, or whose connection went. */
+/** A call that was refused, or whose connection was lost. */
 export class Refused extends Error {
   readonly problem: Problem;
 
@@ -38,7 +38,7 @@ export function problemOf(place: string, cause: string, remedy: string): Problem
   return { place, line: null, column: null, end_line: null, end_column: null, key: null, cause, remedy, is_warning: false };
 }
 
-/** A socket on which the server has not said hello by then is given up: whatever is in between may hold it open. */
+/** A socket on which the server has not said hello by then is given up: a proxy in between may hold it open. */
 const GREETING_MS = 6000;
 
 interface Waiting {
@@ -46,7 +46,7 @@ interface Waiting {
   reject(reason: Refused): void;
 }
 
-/** The problem of calls whose connection went; the banner tells it for all of them. */
+/** The problem of calls whose connection was lost; the banner tells it for all of them. */
 export const LOST = problemOf("connection", "the connection to the server was lost", "the page connects again by itself");
 
 /** Clock and sockets, which tests replace. */

@@ -3,7 +3,7 @@
 /** Frames that may be under way at once. */
 export const MOST_UNDER_WAY = 2;
 
-/** Counts frames that were granted and have come; grants again what was drawn or passed over. */
+/** Counts frames that were granted and have come; grants again those that were drawn or passed over. */
 export class Credit {
   #granted = 0;
   readonly #grant: (frames: number) => void;

@@ -1,4 +1,5 @@
-/** After a loss the page says what it is, and everything goes on where it was, however often the server dies meanwhile. */
+/** After a loss the page names its cause, and everything goes on where it was, however often the server dies
+ * meanwhile. */
 
 import { beforeEach, expect, test, vi } from "vitest";
 import type { Socket } from "../../src/connection";
