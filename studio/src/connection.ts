@@ -17,9 +17,9 @@ export interface Socket {
 export interface Listener {
   notice(notice: Notice): void;
   frame(bytes: ArrayBuffer): void;
-  /** The server could not tell which call a problem answers. */
+  /** Takes a problem of which the server could not tell which call it answers. */
   problem(problem: Problem): void;
-  /** The socket is gone; the next attempt comes after this time. */
+  /** Notes that the socket is gone; the next attempt comes after this time. */
   lost(attempt: number, wait_ms: number): void;
 }
 
@@ -98,7 +98,7 @@ export class Connection {
     return answer;
   }
 
-  /** The other side has said hello: the next wait begins small again. */
+  /** Notes that the other side has said hello: the next wait begins small again. */
   #greeted(): void {
     this.#surroundings.cancel(this.#timer);
     this.#attempt = 0;

@@ -17,12 +17,13 @@ export class Credit {
     return this.#granted;
   }
 
-  /** A frame has come. */
+  /** Notes a frame that has come. */
   arrived(): void {
     this.#granted = Math.max(0, this.#granted - 1);
   }
 
-  /** The newest frame was drawn (or the session begins): fills up, so that none that was passed over is lost. */
+  /** Fills up once the newest frame is drawn (or the session begins), so that no credit of passed-over frames is
+   * lost. */
   drawn(): void {
     const frames = MOST_UNDER_WAY - this.#granted;
     if (frames <= 0) return;
@@ -30,7 +31,7 @@ export class Credit {
     this.#grant(frames);
   }
 
-  /** The session begins anew at the server, which knows of no credit. */
+  /** Begins anew with the session at the server, which knows of no credit. */
   reset(): void {
     this.#granted = 0;
   }

@@ -78,7 +78,7 @@ export class Editor {
       { key: "Mod-z", run: () => (hooks.undo(), true), preventDefault: true },
       { key: "Mod-Shift-z", run: () => (hooks.redo(), true), preventDefault: true },
       { key: "Mod-y", run: () => (hooks.redo(), true), preventDefault: true },
-      // Told to the page, which runs the text.
+      // Left to the page, which runs the text.
       { key: "Mod-Enter", run: () => true },
     ]);
     const state = EditorState.create({

@@ -13,7 +13,7 @@ export class Missed {
     return leftOut - this.#forgiven;
   }
 
-  /** The server counts anew. */
+  /** Begins anew, as the server counts anew. */
   reset(): void {
     this.#before = this.#forgiven = 0;
     this.#wasWatched = false;

@@ -95,7 +95,7 @@ export class Session {
     this.credit = new Credit((frames) => this.quietly({ do: "credit", frames }));
   }
 
-  /** The server has opened it (again). */
+  /** Notes that the server has opened it (again). */
   opened(answer: Extract<Answer, { is: "opened" }>): void {
     this.id = answer.session;
     if (this.starts === 0) this.speed = { times: firstSpeed(answer.scene.cycle_s) };
@@ -105,7 +105,8 @@ export class Session {
     this.#look();
   }
 
-  /** The connection was lost: numbers of sessions are the server's, and a new one begins to count again. */
+  /** Notes that the connection was lost: numbers of sessions are the server's, and a new one begins to
+   * count again. */
   cutOff(): void {
     this.id = 0;
     this.#rewind.stop();
@@ -115,7 +116,7 @@ export class Session {
     this.#kept ??= { cycle, isPlaying: this.isPlaying, seed: this.#ownSeed };
   }
 
-  /** Opened again: goes to where it was, and on if it played. Returns the cycle. */
+  /** Goes back to where it was, once opened again, and on if it played. Returns the cycle. */
   async resume(): Promise<number> {
     const { cycle, isPlaying, seed } = this.#kept ?? { cycle: 0, isPlaying: false, seed: null };
     const { id } = this;

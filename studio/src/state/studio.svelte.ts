@@ -203,7 +203,7 @@ export class Studio {
     return this.sessions.find((session) => session.id === id);
   }
 
-  /** Notices and frames of a session may come before the page knows its number. */
+  /** Notices and frames of sessions that came before the page knew their numbers. */
   readonly #early = new Map<number, (Notice | ArrayBuffer)[]>();
 
   #notice(notice: Notice): void {
@@ -215,7 +215,7 @@ export class Studio {
     else this.#ended(session, notice.problem);
   }
 
-  /** Nothing more comes of a session; where a fleet flew, another one may fly. */
+  /** Notes the end of a session; where a fleet flew, another one may fly. */
   #ended(session: Session, problem: Problem): void {
     session.takeEnd(problem);
     if (session.isFleet) this.#findAgain(session);
