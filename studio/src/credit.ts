@@ -22,8 +22,7 @@ export class Credit {
     this.#granted = Math.max(0, this.#granted - 1);
   }
 
-  /** Fills up once the newest frame is drawn (or the session begins), so that no credit of passed-over frames is
-   * lost. */
+  /** Fills up once the newest frame is drawn (or the session begins), so that no passed-over frame is lost. */
   drawn(): void {
     const frames = MOST_UNDER_WAY - this.#granted;
     if (frames <= 0) return;

@@ -1,5 +1,4 @@
-/** The text of a scenario in CodeMirror. It lives in a shadow root, because there its styles need no inline element.
- * */
+/** The text of a scenario in CodeMirror, in a shadow root, because there its styles need no inline element. */
 
 import { autocompletion, completionKeymap, type CompletionContext, type CompletionResult } from "@codemirror/autocomplete";
 import { defaultKeymap, indentWithTab } from "@codemirror/commands";

@@ -105,8 +105,7 @@ export class Session {
     this.#look();
   }
 
-  /** Notes that the connection was lost: numbers of sessions are the server's, and a new one begins to
-   * count again. */
+  /** Notes that the connection was lost; numbers of sessions are the server's, and a new one counts anew. */
   cutOff(): void {
     this.id = 0;
     this.#rewind.stop();
