@@ -96,7 +96,7 @@ def drive(random, duration_s):
 
 
 def arena(random):
-    """Writes a folder as of the MRCLAM data: motion capture, commands, and what a camera read."""
+    """Writes a folder as of the MRCLAM data: motion capture, commands, and readings of a camera."""
     truth, commands, sightings, last = [], [], [], None
     for step, (t, pose, v, w) in enumerate(drive(random, 600)):
         if step % 5 == 0:
@@ -134,7 +134,7 @@ def sight(random, t, pose):
 
 
 def corridor_log(random):
-    """Writes a corrected CARMEN log: what odometry said between two scans, and what happened."""
+    """Writes a corrected CARMEN log: odometry between two scans, and the true motion."""
     lines, last, odometry = ["# made by examples/make.py"], None, None
     for t, (x, y, heading), v, w in drive(random, 900):
         if last is None or math.hypot(x - last[0], y - last[1]) > 0.5 or abs(wrap(heading - last[2])) > 0.5:

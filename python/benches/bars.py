@@ -2,8 +2,8 @@
 
     python python/benches/bars.py
 
-Needs polars for the table, and gymnasium and pettingzoo for the environments, and Ray for its tasks; leaves out what is not
-there.
+Needs polars for the table, and gymnasium and pettingzoo for the environments, and Ray for its tasks; leaves out the
+parts without their package.
 """
 
 from __future__ import annotations
@@ -148,7 +148,7 @@ def worlds() -> None:
     rates, walls = [], []
     batches = [sidestep.Batch(robots(10, 12), 256, workers=workers) for workers in (1, 2)]
     outs = [batch.observe() for batch in batches]
-    # Threads that have nothing in common show what the machine's cores give at that time.
+    # Threads that have nothing in common show the speed of the machine's cores at that time.
     halves = [sidestep.Batch(robots(10, 12), 128) for _ in range(2)]
     half_outs = [batch.observe() for batch in halves]
 

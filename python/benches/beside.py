@@ -3,7 +3,8 @@
     python python/benches/beside.py
 
 One world with 10, 100 and 1,000 robots at one density; all of them observe and get a random action in every step. It counts agent-steps per
-CPU second of one thread, the best of several tries. What is not installed (``vmas``, ``pogema``) is left out, and said.
+CPU second of one thread, the best of several tries. Packages that are not installed (``vmas``, ``pogema``) are left
+out, and named.
 
 They are not the same task, so the figures tell the order of magnitude and no more:
 
@@ -128,7 +129,7 @@ def main() -> None:
         try:
             for what, agents, found in figures():
                 print(f"{what:<30} {agents:>6} agents {found:>14,.0f} agent-steps per CPU second", flush=True)
-        except Exception as error:  # Another version of it, or of what it needs: that is said, and the others go on.
+        except Exception as error:  # Another version of it, or of its needs: that is said, and the others go on.
             print(f"left out: {name}, which does not run here: {type(error).__name__}: {error}")
 
 

@@ -3,8 +3,9 @@
     python python/examples/train_wander.py              trains, then judges over 100 fresh seeds
     python python/examples/train_wander.py --steps 5    a quick look
 
-The policy is linear: a score for going on and one for turning, from what a robot's eight sonars say now and before, from
-contacts, and from what it did last. A turn to the right is a turn to the left in a mirror, so both share their weights.
+The policy is linear: a score for going on and one for turning, from the reports of a robot's eight sonars now and
+before, from contacts, and from its last action. A turn to the right is a turn to the left in a mirror, so both share
+their weights.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ def scenario(kind: str, cycles: int = 300) -> sidestep.Scenario:
 
 
 def features(observed: dict[str, NDArray[Any]], state: dict[str, Any]) -> list[NDArray[Any]]:
-    """Returns what a policy sees, of the shape (robots, features): as it is, and in a mirror."""
+    """Returns the features that a policy sees, of the shape (robots, features): as they are, and in a mirror."""
     n = len(observed["contact"])
     nearness = np.eye(4)[observed["sonar-8_class"]]
     # Bodies that move by themselves, near and at a medium distance.
@@ -108,7 +109,7 @@ def run(weights: NDArray[Any], seed: int, cycles: int) -> tuple[float, float]:
 
 
 def fitness(task: tuple[NDArray[Any], int, int]) -> float:
-    """Returns the way in m, less what contacts cost: what the strategy makes larger."""
+    """Returns the way in m, less the cost of contacts: the quantity that the strategy raises."""
     contacts, distance_m = run(*task)
     return distance_m - CONTACT_M * contacts
 

@@ -1,6 +1,6 @@
 """Simulation of many agents that must not collide: robots on a grid, chains, airplanes.
 
-The same scenario and seed give the same bits: whatever the number of workers, and whether the command, the Rust library or
+The same scenario and seed give the same bits for any number of workers, and whether the command, the Rust library or
 Python runs it.
 
 >>> import sidestep

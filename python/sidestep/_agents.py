@@ -18,7 +18,7 @@ class Agent(Protocol):
     def decide(self, observed: dict[str, Any]) -> Any:
         """Returns the orders of the agent: a dict by name, or the only or first one.
 
-        ``observed`` has what it observes by name: its row of what its team does.
+        ``observed`` has its observations by name: its row of those of its team.
         """
         ...
 
@@ -37,7 +37,7 @@ class Each:
         return self._teams[team.name]
 
     def __call__(self, observed: dict[str, NDArray[Any]], state: Any) -> Any:
-        """Refuses: without a team nobody knows whose observations these are."""
+        """Refuses: without a team it is unknown which agents these observations belong to."""
         raise wrong("decide", "it was called without a team", "hand it to `Simulation.run`, or call `of_team` first")
 
 
@@ -61,8 +61,9 @@ class _Members:
 def each(make: Callable[[int], Agent]) -> Each:
     """Returns a function for ``decide=`` that asks an object per agent; ``make`` returns that of an agent by its id.
 
-    It is for teaching and for trying things out: an agent takes some two microseconds more than in arrays. All agents of a team
-    return the same sort of thing: a number each, or dicts with the same names. The objects keep what they know from run to run.
+    It is for teaching and for trying things out: an agent takes about two microseconds more than in arrays. All
+    agents of a team return the same sort of thing: a number each, or dicts with the same names. The objects keep
+    their state from run to run.
 
     >>> import sidestep
     >>> class Turner:

@@ -1,9 +1,9 @@
-"""Others who run the cells of a sweep: any executor, or Ray.
+"""Engines outside of this process for the cells of a sweep: any executor, or Ray.
 
 The process that calls :func:`sidestep.sweep` keeps plan, journal and stopping rule. A task is some cells with their
-scenarios, about a second of work by what the tasks before it took; it returns outcomes, so no common file system is needed.
-Tasks that are still running when nothing is left to start are sent a second time: whichever comes first counts, for both are
-equal to the bit.
+scenarios, about a second of work by the times of earlier tasks; it returns outcomes, so no common file system is
+needed. Tasks that are still running when nothing is left to start are sent a second time: whichever comes first
+counts, because both are equal to the bit.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Crew:
         self._attempts = 0
 
     def close(self) -> None:
-        """Shuts an executor down that was made here."""
+        """Shuts down an executor that was made here."""
         if self._make is not None:
             self._executor.shutdown(wait=False, cancel_futures=True)
 
@@ -109,7 +109,7 @@ class Crew:
                     copy.cancel()
 
     def _cut(self, waiting: deque[Cell]) -> _Task:
-        """Takes the cells of the next task: one as long as nobody knows how long they take."""
+        """Takes the cells of the next task: a single one until their duration is known."""
         count = 1 if self._cell_s is None else int(TASK_S / max(self._cell_s, 1e-6))
         # At the end the rest is shared out, so that no worker has much when others have nothing.
         fair = -(-len(waiting) // (2 * self.at_once))
@@ -156,7 +156,7 @@ class Crew:
             try:
                 outcomes = copy.result()
             except SidestepError as error:
-                # Ray wraps what a task raises into its own traceback.
+                # Ray wraps an exception of a task into its own traceback.
                 cause = getattr(error, "cause", None)
                 raise (cause if isinstance(cause, SidestepError) else error) from None
             except (Exception, BrokenExecutor) as error:

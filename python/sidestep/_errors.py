@@ -1,4 +1,4 @@
-"""The exceptions: each says what was wrong, where, and what would be right."""
+"""The exceptions: each names the mistake, its place, and its remedy."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ class CheckpointError(SidestepError, ValueError):
 
 
 class ReplayError(SidestepError, RuntimeError):
-    """A run that stopped, or did not come out as recorded; the text says what replays it."""
+    """A run that stopped, or did not come out as recorded; the text says how to replay it."""
 
 
 class EngineError(SidestepError, RuntimeError):
-    """An executor that cannot run the tasks of a sweep; what is finished is kept, and the same call goes on."""
+    """An executor that cannot run the tasks of a sweep; finished runs are kept, and the same call goes on."""
 
 
 class ClosedError(SidestepError, RuntimeError):

@@ -248,7 +248,7 @@ def rebuild(
 ) -> Simulation: ...
 def unpack_scenario(text: str, files: list[tuple[str, bytes]]) -> Scenario: ...
 
-# Sweeps: what `_sweep.py` and `_engines.py` stand on.
+# Sweeps: the base of `_sweep.py` and `_engines.py`.
 
 def run_sweep(
     sweep: Scenario | str | PathLike[str] | Mapping[str, Any],
@@ -270,7 +270,7 @@ def compare_methods(
     workers: int,
 ) -> dict[str, Any]: ...
 
-# Analysis: what `_arm.py`, `stats.py`, `learn.py` and `collectives.py` stand on.
+# Analysis: the base of `_arm.py`, `stats.py`, `learn.py` and `collectives.py`.
 
 _Ends = tuple[float, float] | None
 _Reals = NDArray[np.float64]

@@ -48,7 +48,7 @@ def _picture(png: bytes | None) -> str:
 
 
 def scenario(it: Scenario) -> str:
-    """Returns the start of a scenario and what it has."""
+    """Returns the start of a scenario and its contents."""
     from ._native import Simulation
 
     facts: list[tuple[str, Any]] = [("bodies", it.agents), ("seed", it.seed), ("cycles", it.cycles)]
@@ -83,7 +83,7 @@ def tables(them: Tables) -> str:
 
 
 def status(it: SweepStatus) -> str:
-    """Returns the shares of a sweep, and what is left."""
+    """Returns the shares of a sweep, and the work left."""
     of = "of at most" if it.until_precise and not it.is_complete else "of"
     caption = f"{it.runs} {of} {it.of} runs, {it.failed} failed"
     if it.left_s is not None and not it.is_complete:

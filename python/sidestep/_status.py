@@ -1,4 +1,4 @@
-"""Progress of a sweep that others work on."""
+"""Progress of a sweep that other processes work on."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ class SweepStatus:
     failed: int
     #: The first of them: dicts of ``cell``, ``variant``, ``seed`` and ``why``.
     failures: list[dict[str, Any]]
-    #: Whether somebody works on it: by the locks of its journals, or by how long ago the last runs came in.
+    #: Whether a process works on it: by the locks of its journals, or by how long ago the last runs came in.
     is_worked_on: bool
-    #: The shares that somebody has begun: dicts of ``share``, ``runs``, ``of``, ``is_done`` and ``idle_s``.
+    #: The shares that were begun: dicts of ``share``, ``runs``, ``of``, ``is_done`` and ``idle_s``.
     shares: list[dict[str, Any]]
     #: Finished runs per second of late; None before the second run, and once the sweep is complete.
     runs_per_s: float | None
     #: Seconds since the last run came in; None where no share is in progress.
     idle_s: float | None
-    #: Seconds until the last run comes in, if all goes on as of late; None where nobody seems to work on it.
+    #: Seconds until the last run comes in, if all goes on as of late; None where no process seems to work on it.
     left_s: float | None
 
     def _repr_html_(self) -> str:
@@ -41,9 +41,10 @@ class SweepStatus:
 
 
 def sweep_status(folder: str | os.PathLike[str]) -> SweepStatus:
-    """Returns how far the sweep in a folder is, whoever works on it: what ``sidestep sweep status --json`` prints.
+    """Returns the progress of the sweep in a folder, as ``sidestep sweep status --json`` prints it.
 
-    It reads the journals and changes nothing. The rate is that of the last ten minutes before the last run came in.
+    It reads the journals and changes nothing, whichever process works on the sweep. The rate is that of
+    the last ten minutes before the last run came in.
 
     Raises InputError when the folder holds no sweep, or a file is damaged.
 

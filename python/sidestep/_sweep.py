@@ -87,7 +87,7 @@ def sweep(
     out: str | os.PathLike[str] | None = None,
     engine: Engine = "local",
 ) -> Sweep:
-    """Runs many variants of a scenario, each with many seeds: what ``sidestep sweep`` does, with the same bits.
+    """Runs many variants of a scenario, each with many seeds, as ``sidestep sweep`` does, with the same bits.
 
     ``sweep`` is a sweep file, a dict of the keys of one, or a scenario of any sort. ``vary`` has a list of values for each
     key, and every combination is a variant; ``set`` holds for all variants, and so does ``cycles``. Each is run ``replicate``
@@ -100,8 +100,8 @@ def sweep(
 
     ``engine`` runs the cells: ``"local"``, on ``workers`` threads; ``"ray"``; or a ``concurrent.futures.Executor``, such as
     ``ProcessPoolExecutor()``, Dask's ``client.get_executor()`` or one of mpi4py, or a function that makes one, which is then
-    called again when workers were killed. ``workers`` is then the number of tasks at once. The table is the same whoever
-    runs.
+    called again when workers were killed. ``workers`` is then the number of tasks at once. The table is the same for
+    every engine.
 
     Raises InputError when anything asked for is wrong, before any run starts; RecordError when the folder cannot be written;
     EngineError when an executor is beyond help.
@@ -157,7 +157,7 @@ def compare(
     seed: int | None = None,
     workers: int | None = None,
 ) -> Compared:
-    """Compares methods of collision avoidance on the same air traffic: what ``sidestep compare --json`` prints.
+    """Compares methods of collision avoidance on the same air traffic, as ``sidestep compare --json`` prints them.
 
     ``methods`` are among ``"pc"`` (probability collectives), ``"orca"``, ``"mvp"`` and ``"none"``. Each flies ``runs``
     times, with consecutive seeds from ``seed`` on (the scenario's). The answer has a dict of each method under ``"methods"``:

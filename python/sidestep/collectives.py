@@ -1,4 +1,4 @@
-"""Probability collectives: players who learn distributions over their strategies until their common cost is low.
+"""Probability collectives: players that learn distributions over their strategies until their common cost is low.
 
 >>> import numpy as np
 >>> from sidestep import collectives
@@ -72,7 +72,7 @@ def minimize(
     a round, until no probability moves by more than ``threshold`` in ``calm_rounds`` rounds, or after ``max_rounds``. Costs should be
     of the order of 1. The same arguments and ``seed`` give the same answer, to the bit.
 
-    Raises InputError when shapes do not fit, or a setting is out of range; what the objective raises.
+    Raises InputError when shapes do not fit, or a setting is out of range; and any exception of the objective.
 
     >>> from sidestep import collectives
     >>> collectives.minimize(objective=lambda joint: abs(joint.sum() - 4), strategies=[3, 3, 3], seed=1).cost

@@ -1,6 +1,6 @@
-"""Error models of real sensors and wheels, learned from tables: arrays, data frames, or what a run has recorded.
+"""Error models of real sensors and wheels, learned from tables: arrays, data frames, or the recording of a run.
 
-Every probability says on how many counts it rests, and has Wilson's 95 % interval. Other logs (MRCLAM, CARMEN, ROS 2 bags) are
+Every probability has its number of counts, and Wilson's 95 % interval. Other logs (MRCLAM, CARMEN, ROS 2 bags) are
 learned from by ``sidestep learn``.
 
 >>> from sidestep import learn
@@ -38,7 +38,7 @@ READINGS = (
 
 
 def effector(moves: Columns, *, alpha: float = 0.5, hold_out: int = 2) -> Learned:
-    """Learns what an effector's actions come to.
+    """Learns the outcomes of an effector's actions.
 
     ``moves`` has a row per move, as a dict of columns or a data frame (pandas, polars, :class:`sidestep.Table`): ``action``
     (``"forward"``, ``"left"``, ``"right"``, ``"stay"``), ``ahead_boxes`` and ``left_boxes``, displacements in boxes in the frame
@@ -72,7 +72,7 @@ def sensor(
     alpha: float = 0.5,
     hold_out: int = 2,
 ) -> Learned:
-    """Learns what a sensor reports.
+    """Learns the reports of a sensor.
 
     ``readings`` has a row per reading, as a dict of columns or a data frame: ``true`` and ``reported``, one word each
     (``"nothing"`` for no observation), and ``true_distance_m`` and ``reported_distance_m``, or ``true_class`` and

@@ -1,7 +1,7 @@
 """Figures of runs, with Matplotlib: tracks, separation, groups. Needs the extra ``plot``: ``pip install 'sidestep[plot]'``.
 
-Each function draws into ``ax``, or into a new figure, and returns the axes. What is drawn comes from the rows that a run has
-recorded: its folder, or what ``Simulation.tables()`` or :func:`sidestep.read` returns.
+Each function draws into ``ax``, or into a new figure, and returns the axes. The figures are drawn from the rows that
+a run has recorded: its folder, or the tables of ``Simulation.tables()`` or :func:`sidestep.read`.
 
 >>> import sidestep
 >>> from sidestep import plot

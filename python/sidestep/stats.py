@@ -130,7 +130,7 @@ class Correlation(NamedTuple):
 class Next(NamedTuple):
     """The answer of a stopping rule."""
 
-    #: Number of runs to have in all; of those there are, if they are enough, the first so many are the result.
+    #: Number of runs to have in all; if there are enough, the first so many are the result.
     runs: int
     #: Reason why they are enough; None if they are not.
     reason: str | None
@@ -240,7 +240,7 @@ class StoppingRule:
     """The rule that ends a sweep at a precision: when Student's interval of the mean is narrow enough.
 
     ``half_width`` is in the unit of the values or, if ``relative``, a share of the mean. The first look is after ``min_runs``.
-    The answer is a function of the values alone, whoever made how many of them at once.
+    The answer is a function of the values alone, not of how many were made at once, or by which process.
 
     >>> from sidestep import stats
     >>> rule = stats.StoppingRule(0.05)

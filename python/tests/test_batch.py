@@ -1,4 +1,4 @@
-"""Many worlds at once: the bits of simulations alone, whatever the workers."""
+"""Many worlds at once: the bits of simulations alone, for any number of workers."""
 
 import os
 import select
@@ -180,7 +180,7 @@ def test_a_forked_process_has_workers_of_its_own(make):
             batch.step(10)
             os.write(writer, "".join(batch.digests).encode())
         finally:
-            # Whatever happens, the child is no second run of the tests.
+            # In any case, the child is no second run of the tests.
             os._exit(0)
     os.close(writer)
     ready, _, _ = select.select([reader], [], [], 120)

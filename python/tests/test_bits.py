@@ -1,4 +1,4 @@
-"""Promises D1 and D2: one digest, whoever runs it."""
+"""Promises D1 and D2: one digest, from Python and from the command."""
 
 import copy
 import json
@@ -112,7 +112,7 @@ def test_a_folder_of_python_is_that_of_the_command(root, command, tmp_path):
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_a_seed_beside_the_scenario_and_one_within_it_are_the_same_run(scenario, root):
-    """Their checkpoints fit each other, and so do their texts when somebody asks for them."""
+    """Their checkpoints fit each other, and so do their texts when a caller asks for them."""
     made = sidestep.Scenario(root / scenario)
     beside, within = sidestep.Simulation(made, seed=11), sidestep.Simulation(made.set(seed=11))
     beside.step(5)

@@ -28,7 +28,7 @@ def crowd():
 
 
 def ticks_amid(work):
-    """Returns how often another thread of Python did something amid work: not in its first and last tenth."""
+    """Returns how often another thread of Python did something during work: not in its first and last tenth."""
     ticks, is_over = [], threading.Event()
 
     def tick():
@@ -109,7 +109,7 @@ def test_ctrl_c_ends_the_compiling_of_a_scenario():
 
 
 def told_under_signals(run, most):
-    """Returns what a program prints until it ends, while it gets SIGINT again and again, but at most `most` times."""
+    """Returns the output of a program that gets SIGINT again and again until it ends, at most `most` times."""
     for _ in range(most):
         run.send_signal(signal.SIGINT)
         try:

@@ -33,7 +33,7 @@ class Balanced(HTMLParser):
 
 
 def elements(thing):
-    """The elements of what a cell shows of a thing, which must be whole HTML without scripts."""
+    """The elements that a cell shows of a thing, which must be whole HTML without scripts."""
     reader = Balanced()
     reader.feed(thing._repr_html_())
     reader.close()
@@ -83,7 +83,7 @@ def test_sweeps_and_comparisons_show_themselves(tmp_path):
 
 
 def shown(value):
-    """Returns what a front end shows of the last value of a cell."""
+    """Returns the output that a front end shows of the last value of a cell."""
     for name in ("_repr_html_", "_repr_png_", "__repr__"):
         if hasattr(value, name):
             return getattr(value, name)()

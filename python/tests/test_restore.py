@@ -1,4 +1,4 @@
-"""Going back to a checkpoint: what was recorded is of one past."""
+"""Going back to a checkpoint: a recording has one past."""
 
 import pytest
 

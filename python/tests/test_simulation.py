@@ -165,7 +165,7 @@ def test_ctrl_c_stops_between_two_cycles_with_the_state_whole():
 
 
 def told_of(program):
-    """Returns what a program prints; one that waits forever fails the test, and does not hold the others up."""
+    """Returns the output of a program; one that waits forever fails the test, and does not hold the others up."""
     program = [sys.executable, "-c", textwrap.dedent(program)]
     return subprocess.run(program, capture_output=True, text=True, check=True, timeout=300).stdout
 

@@ -1,4 +1,4 @@
-"""Sweeps: the same plan, journal, folder and table as the command makes, whoever runs the cells."""
+"""Sweeps: the same plan, journal, folder and table as the command makes, for every engine."""
 
 import concurrent.futures
 import json
@@ -196,7 +196,7 @@ MANY = {"vary": VARY, "replicate": 6, "seed": 3}
 
 
 def goes_on(floor, out):
-    """The same call makes what is missing, and comes to what one without a stop comes to."""
+    """The same call makes the missing runs, and has the result of one without a stop."""
     finished = len(sidestep.read(out)["results"])
     assert 0 < finished < 24
     swept = sidestep.sweep(floor, **MANY, out=out, workers=2)
@@ -460,7 +460,7 @@ def test_a_ray_cluster_that_loses_a_node_gives_the_same_table(floor, tmp_path, m
 
 
 def test_the_status_of_a_sweep_is_that_of_the_command(floor, command, tmp_path):
-    """A share that is done, one that was stopped in the middle, and one that nobody has begun."""
+    """A share that is done, one that was stopped in the middle, and one that was never begun."""
     out = tmp_path / "s"
     with pytest.raises(sidestep.InputError, match="this is no sweep"):
         sidestep.sweep_status(out)

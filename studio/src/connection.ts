@@ -17,13 +17,13 @@ export interface Socket {
 export interface Listener {
   notice(notice: Notice): void;
   frame(bytes: ArrayBuffer): void;
-  /** The server could not tell which call a problem answers. */
+  /** Takes a problem of which the server could not tell which call it answers. */
   problem(problem: Problem): void;
-  /** The socket is gone; the next attempt comes after this time. */
+  /** Notes that the socket is gone; the next attempt comes after this time. */
   lost(attempt: number, wait_ms: number): void;
 }
 
-/** A call that was refused, or whose connection went. */
+/** A call that was refused, or whose connection was lost. */
 export class Refused extends Error {
   readonly problem: Problem;
 
@@ -38,7 +38,7 @@ export function problemOf(place: string, cause: string, remedy: string): Problem
   return { place, line: null, column: null, end_line: null, end_column: null, key: null, cause, remedy, is_warning: false };
 }
 
-/** A socket on which the server has not said hello by then is given up: whatever is in between may hold it open. */
+/** A socket on which the server has not said hello by then is given up: a proxy in between may hold it open. */
 const GREETING_MS = 6000;
 
 interface Waiting {
@@ -46,7 +46,7 @@ interface Waiting {
   reject(reason: Refused): void;
 }
 
-/** The problem of calls whose connection went; the banner tells it for all of them. */
+/** The problem of calls whose connection was lost; the banner tells it for all of them. */
 export const LOST = problemOf("connection", "the connection to the server was lost", "the page connects again by itself");
 
 /** Clock and sockets, which tests replace. */
@@ -98,7 +98,7 @@ export class Connection {
     return answer;
   }
 
-  /** The other side has said hello: the next wait begins small again. */
+  /** Notes that the other side has said hello: the next wait begins small again. */
   #greeted(): void {
     this.#surroundings.cancel(this.#timer);
     this.#attempt = 0;

@@ -3,7 +3,7 @@
 /** Frames that may be under way at once. */
 export const MOST_UNDER_WAY = 2;
 
-/** Counts frames that were granted and have come; grants again what was drawn or passed over. */
+/** Counts frames that were granted and have come; grants again those that were drawn or passed over. */
 export class Credit {
   #granted = 0;
   readonly #grant: (frames: number) => void;
@@ -17,12 +17,12 @@ export class Credit {
     return this.#granted;
   }
 
-  /** A frame has come. */
+  /** Notes a frame that has come. */
   arrived(): void {
     this.#granted = Math.max(0, this.#granted - 1);
   }
 
-  /** The newest frame was drawn (or the session begins): fills up, so that none that was passed over is lost. */
+  /** Fills up once the newest frame is drawn (or the session begins), so that no passed-over frame is lost. */
   drawn(): void {
     const frames = MOST_UNDER_WAY - this.#granted;
     if (frames <= 0) return;
@@ -30,7 +30,7 @@ export class Credit {
     this.#grant(frames);
   }
 
-  /** The session begins anew at the server, which knows of no credit. */
+  /** Begins anew with the session at the server, which knows of no credit. */
   reset(): void {
     this.#granted = 0;
   }

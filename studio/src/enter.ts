@@ -15,7 +15,7 @@ export async function enter(): Promise<void> {
   }
 }
 
-/** The page's standing with the server: it is let in, or why not, or nobody answers. */
+/** The page's standing with the server: let in, refused for a reason, or without an answer. */
 export type Standing = "in" | "token" | "name" | "full" | "silent";
 
 const STANDINGS: Record<number, Standing> = { 204: "in", 401: "token", 403: "name", 421: "name", 503: "full" };
@@ -37,7 +37,7 @@ export async function standing(): Promise<Standing> {
   }
 }
 
-/** Words for each standing: what has happened, and what to do. */
+/** Words for each standing: the cause, and the remedy. */
 export const STANDING_WORDS: Record<Standing, string> = {
   in: "The connection was lost, but the server answers.",
   token: "The server does not know this page any more: it was started anew, or the browser has forgotten its token. Open the whole address that it has printed.",

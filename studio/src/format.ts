@@ -82,7 +82,7 @@ export function whoKey(who: Who): string {
   return `${who.kind}/${who.number}/${who.part ?? ""}`;
 }
 
-/** A value of an inspection, but for bodies, which become links. */
+/** A value of an inspection, except bodies, which become links. */
 export function valueWords(value: Value, dimensions: number): string {
   if (value === "none") return "–";
   if ("number" in value) return withUnit(value.number.value, value.number.unit);

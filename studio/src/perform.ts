@@ -10,7 +10,7 @@ const PAN_PX = 60;
 const ZOOM = 1.25;
 const TRAILS: readonly TrailChoice[] = ["none", "selected", "all"];
 
-/** Performs an action. Returns whether there was something to do it to. */
+/** Performs an action. Returns whether there was something to perform it on. */
 export function perform(action: Action, key: string, studio: Studio): boolean {
   if (action === "help") page.showsHelp = true;
   else if (!studio.active) return false;

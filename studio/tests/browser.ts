@@ -22,7 +22,7 @@ export interface Look {
   isDark?: boolean;
 }
 
-/** Opens the page; what it complains about is gathered in `complaints`. */
+/** Opens the page; its complaints are gathered in `complaints`. */
 export async function openPage(browser: Browser, url: string, look: Look = {}): Promise<{ page: Page; complaints: string[] }> {
   const context = await browser.newContext({
     viewport: { width: look.width ?? 1280, height: look.height ?? 800 },

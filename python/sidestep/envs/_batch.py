@@ -37,15 +37,15 @@ class Batch:
         scenario: a ``Scenario``, a path or a dict.
         worlds: number of worlds.
         team: name or number of the team that acts; by default the only one that takes orders.
-        rewards: weights of named terms (``sidestep.envs.TERMS``), or a function of what the agents observed before and
-            after a step. It gets all agents of all worlds at once, one world after the other, and returns a
+        rewards: weights of named terms (``sidestep.envs.TERMS``), or a function of the agents' observations before
+            and after a step. It gets all agents of all worlds at once, one world after the other, and returns a
             number for each.
         orders: names of the orders that an action gives. One of them makes the action that order alone; several make
             it a dict.
         max_cycles: cycles of an episode; the scenario's own by default.
         autoreset_mode: when a world whose episode has ended starts anew: in the next step, in the same step, or
             not at all (``AutoresetMode`` of Gymnasium, or its value); then ``reset`` does with a mask.
-        copy: whether what is returned is the caller's. Without it the arrays are written anew two steps later.
+        copy: whether returned arrays are the caller's. Without it the arrays are written anew two steps later.
         workers: workers; each world is stepped by one of them.
 
     Every world draws the seeds of its episodes from a generator of its own: with ``reset(seed=s)``, world ``k`` has the
@@ -110,9 +110,9 @@ class Batch:
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, dict[str, Any]]:
-        """Starts an episode in every world, and returns what is observed.
+        """Starts an episode in every world, and returns the observations.
 
-        ``seed`` is one for each world, or that of world 0, whose followers have those that follow. With
+        ``seed`` is one for each world, or that of world 0; the following worlds have the following seeds. With
         ``options={"reset_mask": mask}`` only the worlds for which the mask is true start anew.
         """
         mask = self._mask(options)
@@ -136,10 +136,11 @@ class Batch:
     ) -> tuple[Observations, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Orders an action of each agent in each world, and simulates one cycle.
 
-        Returns what is observed, rewards (worlds, agents), whether each world is over, and whether it was cut at its
+        Returns the observations, rewards (worlds, agents), whether each world is over, and whether it was cut at its
         last cycle (worlds,), and infos. A world whose episode has ended starts anew as ``autoreset_mode`` says: in
         the next step its action counts for nothing and its rewards are 0; in the same step
-        ``infos["final_obs"]`` has what was observed at the end, of those worlds for which ``infos["_final_obs"]`` is true.
+        ``infos["final_obs"]`` has the observations at the end, of those worlds for which ``infos["_final_obs"]`` is
+        true.
         """
         if not self._rngs:
             raise wrong("step", "no episode goes on", "call reset first")
@@ -236,7 +237,7 @@ class Batch:
             for name, values in actions.items():
                 self.worlds.order(name, np.asarray(values), team=self._number)
         except Exception:
-            # An action counts as a whole: what is noted of it is dropped.
+            # An action counts as a whole: any noted part of it is dropped.
             n = self.num_worlds
             self.worlds.reset(np.zeros(n, np.uint64), mask=np.zeros(n, bool))
             raise
@@ -253,7 +254,7 @@ class Batch:
 class VectorEnv(GymnasiumVectorEnv[Any, Any, Any]):
     """Gymnasium's vector environment of a scenario with one agent that takes orders.
 
-    It takes what :class:`Batch` takes, ``num_envs`` in place of ``worlds``; arrays have the shape (num_envs, ...).
+    It takes the arguments of :class:`Batch`, with ``num_envs`` for ``worlds``; arrays have the shape (num_envs, ...).
     """
 
     def __init__(

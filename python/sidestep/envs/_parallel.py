@@ -55,7 +55,7 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
     Args:
         scenario: a ``Scenario``, a path or a dict. All agents that take orders act here; the others decide for
             themselves.
-        rewards: weights of named terms (``sidestep.envs.TERMS``), or a function of what a team observed before and
+        rewards: weights of named terms (``sidestep.envs.TERMS``), or a function of a team's observations before and
             after a step, which returns a number for each agent.
         orders: names of the orders that an action gives. One of them makes the action that order alone; several make
             it a dict. By default the action of a robot, the place toward which a chain goes, the turn rate of an
@@ -136,7 +136,7 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         self._before: list[dict[str, NDArray[Any]]] = []
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
-        """Returns the space of an agent's observations: a dict of what its team observes."""
+        """Returns the space of an agent's observations: a dict by the names of its team's observations."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Space[Any]:
@@ -146,7 +146,7 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-        """Starts an episode, and returns what everybody observes; it has no options, and takes any."""
+        """Starts an episode, and returns the observations of all agents; it has no options, and takes any."""
         if seed is not None:
             self._rng = np.random.default_rng(seed)
         # From the generator also with a seed, so that the next episode differs from this one.

@@ -1,4 +1,4 @@
-"""Rewards: named terms with weights, of what a team observed before and after a step."""
+"""Rewards: named terms with weights, of a team's observations before and after a step."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _delay(before: Arrays, after: Arrays) -> NDArray[Any]:
 
 
 def _flies(before: Arrays, after: Arrays) -> NDArray[Any]:
-    """Returns whose observations are no padding, before and after: not those of airplanes that come later or have landed."""
+    """Returns where observations are no padding, before and after: not those of airplanes to come or landed."""
     return (before["due"] > 0) & (after["due"] > 0)
 
 
@@ -106,7 +106,7 @@ DEFAULTS: dict[str, dict[str, float]] = {
 
 
 def rewards(terms: Mapping[str, float] | Reward, observed: set[str]) -> Reward:
-    """Returns the sum of terms as one function; ``observed`` names what there is to observe."""
+    """Returns the sum of terms as one function; ``observed`` has the names of the observations."""
     if callable(terms):
         return terms
     chosen: list[tuple[Reward, float]] = []
@@ -139,7 +139,7 @@ def rewards(terms: Mapping[str, float] | Reward, observed: set[str]) -> Reward:
 def earned(
     reward: Reward, before: Arrays, after: Arrays, agents: int
 ) -> NDArray[np.float64]:
-    """Returns what each agent of a team earned; a function of one's own may return the wrong thing."""
+    """Returns the reward of each agent of a team; a function of one's own may return the wrong thing."""
     values = np.array(reward(before, after), dtype=float)
     if values.shape != (agents,):
         cause = f"the function returned an array of the shape {values.shape}"

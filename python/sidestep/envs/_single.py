@@ -18,8 +18,8 @@ from ._parallel import parallel_env
 class Env(gymnasium.Env[dict[str, Any], Any]):
     """The one agent of a scenario that takes orders, as a Gymnasium environment.
 
-    It takes what :class:`ParallelEnv` takes; an episode is that of a ``parallel_env`` that was reset with the same seed. Other
-    agents of the scenario decide for themselves.
+    It takes the arguments of :class:`ParallelEnv`; an episode is that of a ``parallel_env`` that was reset with the
+    same seed. Other agents of the scenario decide for themselves.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
@@ -40,7 +40,7 @@ class Env(gymnasium.Env[dict[str, Any], Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Starts an episode, and returns what the agent observes."""
+        """Starts an episode, and returns the agent's observation."""
         super().reset(seed=seed)
         observed, infos = self.parallel.reset(seed=seed, options=options)
         return observed[self._agent], infos[self._agent]

@@ -16,5 +16,5 @@ __all__ = ["env", "parallel_env"]
 
 
 def env(*args: Any, **options: Any) -> AECEnv[str, Any, Any]:
-    """Returns it with one agent after the other (AEC); it takes what ``parallel_env`` takes."""
+    """Returns it with one agent after the other (AEC); it takes the arguments of ``parallel_env``."""
     return parallel_to_aec(parallel_env(*args, **options))

@@ -13,9 +13,9 @@ export interface PlotColors {
 }
 
 export interface PlotHooks {
-  /** The pointer is at a cycle, or left. */
+  /** Takes the cycle under the pointer; null once it has left. */
   hover(cycle: number | null): void;
-  /** A cycle was clicked. */
+  /** Takes a clicked cycle. */
   click(cycle: number): void;
 }
 

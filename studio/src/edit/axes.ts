@@ -1,4 +1,4 @@
-/** Handles along the axes of space, at the thing that is chosen: a drag in the picture alone cannot tell how far away it ends. */
+/** Handles along the axes of space, at the chosen thing: a drag in the picture alone cannot tell its depth. */
 
 import type { Place } from "../protocol";
 import type { Eye } from "../scene/camera";

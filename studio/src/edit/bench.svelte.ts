@@ -1,4 +1,4 @@
-/** The tool in hand over the canvas of a draft, and what it does to the text. */
+/** The tool in hand over the canvas of a draft, and its edits of the text. */
 
 import type { Edit, Place } from "../protocol";
 import { boxesOf } from "../scene/floor";
@@ -97,7 +97,7 @@ export class Bench {
     return rectangleCells([column, row], [column + side - 1, row + side - 1], true);
   }
 
-  /** Does what the tool does with a stroke that is over. */
+  /** Applies the tool to a finished stroke. */
   apply(stroke: Stroke): Promise<boolean> {
     return this.draft.edit(() => this.#edits(stroke));
   }
@@ -140,7 +140,7 @@ export class Bench {
 
   choose(item: Item | null): void {
     this.draft.chosen = item?.path ?? null;
-    // What is chosen here is open in the forms.
+    // The item chosen here is open in the forms.
     if (item) this.draft.open = item.path;
   }
 
@@ -244,7 +244,7 @@ export function benchOf(draft: Draft): Bench {
   const known = benches.get(draft);
   if (known) return known;
   let made!: Bench;
-  // What it derives must outlive the component that asks first.
+  // Its derived values must outlive the component that asks first.
   $effect.root(() => void (made = new Bench(draft)));
   benches.set(draft, made);
   return made;

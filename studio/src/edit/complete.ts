@@ -6,7 +6,7 @@ import { wordsOf, defaultOf, type World } from "./schema";
 export interface Option {
   label: string;
   words: string;
-  /** The kind of completion, which decides what is written after it. */
+  /** The kind of completion, which decides the text written after it. */
   kind: "key" | "value" | "section";
 }
 
@@ -28,14 +28,14 @@ function sectionAt(text: string, until: number): { path: string[]; isInText: boo
   return { path, isInText: fence !== null };
 }
 
-/** A place within a line: the keys that lead to it, and what is typed of a key or of a value. */
+/** A place within a line: the keys that lead to it, and the typed part of a key or of a value. */
 interface Within {
   path: string[];
   rest: string;
   isValue: boolean;
 }
 
-/** The keys of inline tables that are open before the cursor, and what is left of the line. */
+/** The keys of inline tables that are open before the cursor, and the rest of the line. */
 function opened(line: string): Within {
   const path: string[] = [];
   const key = /^\s*((?:[\w-]+|"[^"]*")(?:\s*\.\s*(?:[\w-]+|"[^"]*"))*)\s*=\s*/.exec(line);

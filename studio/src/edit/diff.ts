@@ -5,7 +5,7 @@ export interface DiffLine {
   words: string;
 }
 
-/** Beyond so many pairs of lines that may match, the middle is told as replaced in whole. */
+/** Beyond so many pairs of lines that may match, the middle is reported as replaced in whole. */
 const MOST_PAIRS = 4_000_000;
 
 /** Returns the lines that both texts have, those of only the first, and those of only the second. */
@@ -49,7 +49,7 @@ function common(a: string[], b: string[]): Uint32Array[] {
   return table;
 }
 
-/** Only what differs, with so many lines around it; null stands for what was left out. */
+/** Only the lines that differ, with so many lines around them; null stands for omitted lines. */
 export function condensed(lines: readonly DiffLine[], around = 2): (DiffLine | null)[] {
   const isNear = (at: number): boolean =>
     lines.slice(Math.max(0, at - around), at + around + 1).some(({ kind }) => kind !== "same");

@@ -30,7 +30,7 @@ export class Draft {
   canRedo = $state(false);
   /** The item chosen on the canvas and shown in the forms. */
   chosen = $state.raw<Path | null>(null);
-  /** The text of the file, where it was changed by somebody else. */
+  /** The text of the file, if another program changed it. */
   theirs = $state<string | null>(null);
   /** The section that the forms show. */
   open = $state.raw<Path>([]);
@@ -46,7 +46,7 @@ export class Draft {
   #queue: Promise<unknown> = Promise.resolve();
   /** The file that it was saved to, if not the one that it came from. */
   #file: string | null = null;
-  /** The file that it was to be saved to when that was found to be another's. */
+  /** The file of the last refused attempt to save: it holds another text. */
   #wanted: string | null = null;
   /** The text that runs now. */
   #running = "";
@@ -69,10 +69,10 @@ export class Draft {
     return this.text !== this.#running;
   }
 
-  /** Resolves when the text is here, with what is known of its keys. */
+  /** Resolves when the text is here, with the known facts about its keys. */
   loaded: Promise<void> = Promise.resolve();
 
-  /** Fetches the text and what is known of its keys. */
+  /** Fetches the text and the known facts about its keys. */
   load(): void {
     this.loaded = this.#load();
   }
@@ -111,19 +111,19 @@ export class Draft {
 
   // Changes: each is one step of the history.
 
-  /** The text as somebody types it. */
+  /** Takes the text as it is typed. */
   type(text: string): void {
     this.#push(text, "typing", CHECK_AFTER_MS);
   }
 
-  /** Another text in whole. */
+  /** Takes another text in whole. */
   replace(text: string): void {
     this.#push(text, null, 0);
   }
 
   /**
-   * Has the program change keys of the text; one after the other, all or nothing. What is to be changed may depend on
-   * what the changes before have made of the text. Returns whether it was done.
+   * Has the program change keys of the text; one after the other, all or nothing. The changes may depend on the text
+   * as earlier changes left it. Returns whether it was done.
    */
   edit(edits: readonly Edit[] | (() => readonly Edit[])): Promise<boolean> {
     const done = this.#queue.then(() => this.#edit(edits));
@@ -139,7 +139,7 @@ export class Draft {
     try {
       const answer = await this.session.ask({ do: "edit", session: this.session.id, text: before, edits: [...wanted] });
       if (answer.is !== "edited") return false;
-      // What was typed meanwhile stays; the edit is then asked for again over it.
+      // Text typed meanwhile stays; the edit is then asked for again over it.
       if (this.text !== before) return await this.#edit(edits);
       this.#push(answer.text, null, 0);
       await this.settled;
@@ -151,7 +151,7 @@ export class Draft {
     }
   }
 
-  /** Waits until the tables are those of the text, also of what was typed just now. */
+  /** Waits until the tables are those of the text, just-typed text included. */
   async #upToDate(): Promise<void> {
     if (this.#timer !== undefined) {
       clearTimeout(this.#timer);
@@ -193,7 +193,7 @@ export class Draft {
     this.settled = this.#settle();
   }
 
-  /** Resolves when what was asked of the newest text is known. */
+  /** Resolves when the answers about the newest text are known. */
   settled: Promise<void> = Promise.resolve();
 
   /** Checks the text, reads its tables, and shows it. */
@@ -224,7 +224,7 @@ export class Draft {
     this.#checked = text;
   }
 
-  /** Checks again what may have failed for want of a connection. */
+  /** Repeats the check if it may have failed for want of a connection. */
   recheck(): void {
     if (this.phase !== "failed") return;
     if (this.place === "") this.load();
@@ -236,7 +236,7 @@ export class Draft {
     const { text } = this;
     const isValid = this.#checked === text && this.phase === "checked" && this.errors.length === 0;
     if (!isValid || text === this.#running) return;
-    // Told before it is done, so that nobody asks for the same twice.
+    // Set before it is done, so that no caller asks for the same twice.
     const before = this.#running;
     this.#running = text;
     if (!(await this.session.restart(null, text))) this.#running = before;
@@ -274,7 +274,7 @@ export class Draft {
     return true;
   }
 
-  /** Writes the text over that of somebody else. */
+  /** Writes the text over that of another program. */
   keepMine(): Promise<boolean> {
     return this.save(this.#wanted, true);
   }

@@ -26,7 +26,7 @@ export class History {
     return this.#future.length > 0;
   }
 
-  /** Adds a step. What follows quickly in the same group, as typing does, belongs to the step before. */
+  /** Adds a step. Texts that follow quickly in the same group, as in typing, belong to the step before. */
   push(text: string, group: string | null, now_ms: number): void {
     if (text === this.#now) return;
     const continues = group !== null && group === this.#group && now_ms - this.#at_ms < GROUP_MS;

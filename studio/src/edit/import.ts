@@ -1,10 +1,10 @@
-/** Files of others that a scenario names: maps, and sensors and effectors that were learned from logs. */
+/** Foreign files that a scenario names: maps, and sensors and effectors that were learned from logs. */
 
 import type { Edit, FileEntry } from "../protocol";
 import { valueAt, type Table } from "./keypath";
 import { insert, remove, set } from "./tools/item";
 
-/** Side of an image's pixels where nobody has said it. */
+/** Default side of an image's pixels. */
 const PIXEL_M = 0.05;
 
 /** A path as a scenario in a folder names it. */

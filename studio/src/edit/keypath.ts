@@ -11,7 +11,7 @@ export function keyOf(path: Path): string {
   return path.map((part) => (typeof part === "number" || BARE.test(part) ? String(part) : JSON.stringify(part))).join(".");
 }
 
-/** The parts of a path; what looks like a number stays text. */
+/** The parts of a path; parts that look like numbers stay text. */
 export function partsOf(key: string): string[] {
   const parts: string[] = [];
   const part = /"((?:[^"\\]|\\.)*)"|'([^']*)'|([^.]+)/g;

@@ -1,4 +1,4 @@
-/** Draws what is worked on over the picture: boxes, outlines, handles and the cursor. */
+/** Draws the edited things over the picture: boxes, outlines, handles and the cursor. */
 
 import type { Place } from "../protocol";
 import type { Eye } from "../scene/camera";
@@ -21,7 +21,7 @@ export interface Sketch {
   chosen: Item | null;
   /** Items with problems. */
   wrong: ReadonlySet<Item>;
-  /** Boxes that a stroke would draw, and with what. */
+  /** Boxes that a stroke would draw, and their mark. */
   cells: readonly Cell[];
   mark: Mark | null;
   /** The stroke from press to release, where it is more than boxes. */
@@ -222,14 +222,14 @@ export class Sketcher {
   }
 }
 
-/** Boxes that differ from what the picture shows: codes of a floor of the same size, if it shows one. */
+/** Boxes that differ from those in the picture: codes of a floor of the same size, if it shows one. */
 export function changedCells(board: Board, shown: Uint8Array | null): Cell[] {
   const cells: Cell[] = [];
   for (let row = 0; row < board.height; row++) {
     for (let column = 0; column < board.width; column++) {
       const mark = board.markAt([column, row]);
       const now = shown?.[row * board.width + column];
-      // What unknown boxes come to is the scenario's choice.
+      // The scenario chooses the meaning of unknown boxes.
       const isShown = now !== undefined && (mark === "?" || (now === 1) === (mark === "#"));
       if (!isShown) cells.push([column, row]);
     }
@@ -237,7 +237,7 @@ export function changedCells(board: Board, shown: Uint8Array | null): Cell[] {
   return cells;
 }
 
-/** The item at a point of the canvas: handles first, then what lies under it. */
+/** The item at a point of the canvas: handles first, then the items under them. */
 export function itemAt(items: readonly Item[], eye: Eye, x_px: number, y_px: number): Item | null {
   const px = (at: Place): [number, number] => {
     const [x, y] = eye.project(...at);

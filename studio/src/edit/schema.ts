@@ -66,7 +66,7 @@ export class World {
     return found.length > 0 ? found.map((one) => this.resolved(one)) : [schema];
   }
 
-  /** The schema at a path; of alternatives, what the first that knows the way says. */
+  /** The schema at a path; of alternatives, that of the first that knows the path. */
   at(path: Path): Schema | null {
     let here: Schema[] = [this.resolved(this.root)];
     for (const part of path) {
@@ -124,7 +124,7 @@ export class World {
     return this.#plain(schema);
   }
 
-  /** One table or a list of them: what `[robots]` and `[[robots]]` are. */
+  /** One table or a list of them: `[robots]` and `[[robots]]`. */
   #sections(schema: Schema): Schema | null {
     for (const one of this.#alternatives(schema)) {
       if (one["type"] !== "array" || !isTable(one["items"])) continue;

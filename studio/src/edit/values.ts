@@ -4,7 +4,7 @@ import type { Edit } from "../protocol";
 import { isTable, keyOf, valueAt, type Json, type Path, type Table } from "./keypath";
 import type { Schema, Shape, World } from "./schema";
 
-/** A value that was read from a field: nothing for an empty one, or why it cannot be read. */
+/** A value that was read from a field: nothing for an empty one, or the reason why it cannot be read. */
 export type Read = { value: Json | undefined } | { wrong: string };
 
 /** Reads a number; an empty field means that the key is not given. */
@@ -129,7 +129,7 @@ export interface Entry {
   words: string;
 }
 
-/** All sections of a text, as a list of what can be opened. */
+/** All sections of a text, as a list of entries that can be opened. */
 export function entriesOf(model: Table, world: World): Entry[] {
   const entries: Entry[] = [{ path: [], words: "Scenario" }];
   for (const [key, value] of Object.entries(model)) {

@@ -1,4 +1,4 @@
-/** The text of a scenario in CodeMirror. It lives in a shadow root, since there its styles need no inline element. */
+/** The text of a scenario in CodeMirror, in a shadow root, because there its styles need no inline element. */
 
 import { autocompletion, completionKeymap, type CompletionContext, type CompletionResult } from "@codemirror/autocomplete";
 import { defaultKeymap, indentWithTab } from "@codemirror/commands";
@@ -77,7 +77,7 @@ export class Editor {
       { key: "Mod-z", run: () => (hooks.undo(), true), preventDefault: true },
       { key: "Mod-Shift-z", run: () => (hooks.redo(), true), preventDefault: true },
       { key: "Mod-y", run: () => (hooks.redo(), true), preventDefault: true },
-      // Told to the page, which runs the text.
+      // Left to the page, which runs the text.
       { key: "Mod-Enter", run: () => true },
     ]);
     const state = EditorState.create({
@@ -107,7 +107,7 @@ export class Editor {
     return this.#view.state.doc.toString();
   }
 
-  /** Takes a text from elsewhere; only what differs is replaced, and shown if it is not the first. */
+  /** Takes a text from elsewhere; only the lines that differ are replaced, and shown if it is not the first. */
   setText(text: string, isLocked: boolean): void {
     const before = this.text;
     const effects = [this.#locked.reconfigure(isLocked ? [EditorState.readOnly.of(true)] : [])];

@@ -33,7 +33,7 @@ export function linksOf(fleet: Fleet, selected: number | null): Link[] {
 /** People's words for the state of a node: it is there, late, or not. */
 export type Health = "well" | "late" | "away";
 
-/** Seconds without a sign of a node after which it is told as late. */
+/** Seconds without a sign of a node after which it is reported as late. */
 const LATE_S = 2;
 
 export function healthOf(node: Node): Health {

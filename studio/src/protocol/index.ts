@@ -1,4 +1,4 @@
-/** Everything that the page knows of the protocol: the server's types, and a name for what has none there. */
+/** Everything that the page knows of the protocol: the server's types, and names for types without one there. */
 export * from "./types";
 
 /** x, y and z in meters. */

@@ -14,7 +14,7 @@ export interface Eye {
   resize(width_px: number, height_px: number): void;
   fit(extent: Extent): void;
   pan(dx_px: number, dy_px: number): void;
-  /** Brings nearer by a factor, keeping what is at this point of the canvas. */
+  /** Brings nearer by a factor, and keeps the place at this point of the canvas. */
   zoom(factor: number, x_px: number, y_px: number): void;
   rotate(dx_px: number, dy_px: number): void;
   /** Moves so that a place is in the middle. */

@@ -60,7 +60,7 @@ float dart(vec2 p) {
   return max(dot(q - tip, a), dot(q - notch, b));
 }
 void main() {
-  // What is a few pixels large needs no form: a crowd is drawn as squares, whose corners the rasterizer cuts.
+  // A body of a few pixels needs no form: a crowd is drawn as squares, whose corners the rasterizer cuts.
   if (max(extent.x, extent.y) < 2.0) {
     color = ink;
     return;
@@ -83,7 +83,7 @@ void main() {
     float light = dot(ink.rgb, vec3(0.2126, 0.7152, 0.0722));
     body = mix(body, light > 0.55 ? vec3(0.0) : vec3(1.0), tick * 0.9);
   }
-  // What is nearly transparent keeps a visible border.
+  // A nearly transparent body keeps a visible border.
   float alpha = max(ink.a, ink.a < 0.5 ? clamp(d + 1.5, 0.0, 1.0) * 0.55 : 0.0);
   color = vec4(body, inside * alpha);
 }`;

@@ -35,7 +35,7 @@ export function spaceGrid({ lo, hi }: Extent): { xs: number[]; ys: number[]; ste
   return { xs: multiples(...out(0), step), ys: multiples(...out(1), step), step, z: lo[2] };
 }
 
-/** Draws the grid of what is seen. */
+/** Draws the grid of the visible part. */
 export function drawGrid(strokes: Strokes, eye: Eye, extent: Extent, size_px: [number, number], palette: Palette): void {
   const tint = word(palette.faint, palette.isDark ? 0.22 : 0.25);
   strokes.begin();

@@ -35,7 +35,7 @@ export class Instances {
     this.reserve(16);
   }
 
-  /** Makes room; what was written stays. */
+  /** Makes room; written entries stay. */
   reserve(count: number): void {
     if (count <= this.#capacity) return;
     this.#capacity = Math.max(count, 2 * this.#capacity);

@@ -1,4 +1,4 @@
-/** Shaders in short: what all materials of the canvas have in common. */
+/** Shaders in short: the common parts of all materials of the canvas. */
 
 import { GLSL3, RawShaderMaterial, type IUniform } from "three";
 
@@ -13,7 +13,7 @@ export interface Shader {
   uniforms: Record<string, IUniform>;
   /** Whether nearer things cover farther ones. */
   depth: boolean;
-  /** Whether what is behind shines through. */
+  /** Whether things behind shine through. */
   transparent: boolean;
 }
 

@@ -37,7 +37,7 @@ export class Overlay {
     this.#pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   }
 
-  /** Draws what has changed since the last time: a canvas that stays costs the browser nothing. */
+  /** Draws the changes since the last time: a canvas that stays costs the browser nothing. */
   draw(eye: Eye, extent: Extent, labels: readonly Label[], palette: Palette): void {
     const state = JSON.stringify([eye.project(0, 0, 0), eye.project(1, 2, 3), eye.mPerPx, extent, labels, palette.isDark]);
     if (state === this.#drawn) return;

@@ -55,7 +55,7 @@ function lightness([r, g, b]: Rgb): number {
   return (0.2126 * r + 0.7152 * g + 0.0722 * b) / 255;
 }
 
-/** The color of a look: what would drown in a dark floor is lifted. */
+/** The color of a look: colors that would drown in a dark floor are lifted. */
 export function visible(color: Rgb, palette: Palette): Rgb {
   if (!palette.isDark || lightness(color) > 0.3) return color;
   return mixed(color, [255, 255, 255], 0.42);

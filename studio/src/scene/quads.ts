@@ -31,7 +31,7 @@ export class Quads {
     this.commit(0);
   }
 
-  /** Makes room; what was written stays. */
+  /** Makes room; written entries stay. */
   reserve(count: number): void {
     if (count <= this.#capacity) return;
     this.#capacity = Math.max(count, 2 * this.#capacity);

@@ -135,7 +135,7 @@ export class Solids {
   }
 
   end(): void {
-    // Hundreds of glass bodies behind each other would be a wall that hides what moves among them.
+    // Hundreds of glass bodies behind each other would be a wall that hides the moving bodies among them.
     this.#uniforms.veil.value = Math.max(0.2, Math.min(1, Math.sqrt(300 / Math.max(1, this.#count))));
     this.instances.commit(this.#count);
   }

@@ -29,7 +29,7 @@ export interface Painter {
   dispose(): void;
 }
 
-/** Choices of the page: what it shows. */
+/** Choices of the page: the things that it shows. */
 export interface Choices {
   selected: Who | null;
   inspection: Inspection | null;
@@ -42,7 +42,7 @@ export interface Choices {
 /** Bodies with names of their own are labeled if there are not more. */
 const MOST_NAMES = 40;
 
-/** A renderer with no more than it needs: what is opaque and flat is cheap to put on the screen. */
+/** A renderer with no more than it needs: an opaque, flat canvas is cheap to put on the screen. */
 function rendererOf(canvas: HTMLCanvasElement, isSpace: boolean): WebGLRenderer {
   const wanted = { alpha: false, antialias: isSpace, depth: isSpace, stencil: false, powerPreference: "high-performance" } as const;
   const context = canvas.getContext("webgl2", wanted) as WebGL2RenderingContext | null;
@@ -66,7 +66,7 @@ export class Stage {
   readonly eye: Eye;
   /** Called after each picture, with the roles of marks that it shows. */
   onDrawn: (roles: ReadonlySet<Role>) => void = () => undefined;
-  /** Told after each picture too: what is drawn over it follows the camera. */
+  /** Called after each picture too: drawings over it follow the camera. */
   readonly followers = new Set<() => void>();
   /** Pictures drawn so far. */
   pictures = 0;
@@ -89,7 +89,7 @@ export class Stage {
   #extent: Extent;
   #size: [number, number] = [1, 1];
   #isFitted = false;
-  /** Whether everything is in sight since nobody has moved the camera: then it stays so in another size. */
+  /** Whether everything is in sight because the camera was not moved: then it stays so in another size. */
   #isWhole = false;
   #request = 0;
   #bodiesChanged = true;
@@ -124,7 +124,7 @@ export class Stage {
     this.changed();
   }
 
-  /** Shows another scene of as many dimensions, as after an edit; what was drawn stays until its first frame. */
+  /** Shows another scene of as many dimensions, as after an edit; the old picture stays until its first frame. */
   restage(scene: Scene): void {
     if (scene === this.#scene) return;
     if (!isAlike(scene, this.#scene)) this.#isFitted = false;
@@ -207,18 +207,18 @@ export class Stage {
     if (!isSeen) this.center(index);
   }
 
-  /** Somebody has moved the camera. */
+  /** Notes that the user has moved the camera. */
   moved(): void {
     this.#isWhole = false;
     this.changed();
   }
 
-  /** Returns whether the camera stands where somebody has put it. */
+  /** Returns whether the camera stands where the user has put it. */
   get isMoved(): boolean {
     return this.#isFitted && !this.#isWhole;
   }
 
-  /** Something that is seen has changed. */
+  /** Notes that something in sight has changed. */
   changed(): void {
     this.#viewChanged = true;
     if (this.#request === 0) this.#request = requestAnimationFrame(() => this.#draw());
@@ -237,7 +237,7 @@ export class Stage {
 
   /** The picture as it is seen, with its words. */
   snapshot(): Promise<Blob | null> {
-    // What was drawn before is gone once the browser has shown it.
+    // The drawing buffer is gone once the browser has shown it.
     cancelAnimationFrame(this.#request);
     this.#draw();
     const { domElement: picture } = this.#renderer;
@@ -300,7 +300,7 @@ export class Stage {
     this.#roles = roles;
   }
 
-  /** Thin where all links are drawn, as there are many then. */
+  /** Thin where all links are drawn, because there are many then. */
   #drawLinks(): void {
     const { links, selected } = this.#choices;
     for (const { from, to, isMutual } of links) {

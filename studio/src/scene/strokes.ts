@@ -1,4 +1,4 @@
-/** Lines whose width is told in pixels or in meters: trails, beams and marks, in the plane and in space. */
+/** Lines whose width is given in pixels or in meters: trails, beams and marks, in the plane and in space. */
 
 import { material } from "./material";
 import { CORNER, Quads } from "./quads";

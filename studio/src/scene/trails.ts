@@ -18,7 +18,7 @@ export class Trails {
   readonly #begins: Int32Array;
   readonly #counts: Int32Array;
   #last = -Infinity;
-  /** The distance of frames, in cycles; shorter ones let it shrink slowly, as a run that is paused ends on one. */
+  /** The distance of frames, in cycles; shrinks slowly, because a run that is paused ends on a shorter one. */
   #stride = 0;
 
   constructor(bodies: number, dimensions: 2 | 3) {

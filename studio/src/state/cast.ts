@@ -37,7 +37,7 @@ export class Bodies {
     };
   }
 
-  /** The body's own name, or what and which it is. Parts share the name of the whole. */
+  /** The body's own name, or its kind and number. Parts share the name of the whole. */
   name(index: number): string {
     const name = this.#names.get(index);
     const part = this.cast.part[index]!;

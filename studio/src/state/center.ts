@@ -4,7 +4,7 @@ import type { Session } from "./session.svelte";
 
 export type Center = "view" | "forms" | "text" | "report";
 
-/** The panels of a session: a fleet has no text here, and only what was recorded to a folder has a report. */
+/** The panels of a session: a fleet has no text here, and only a recording in a folder has a report. */
 export function centersOf({ isFleet, folder }: Pick<Session, "isFleet" | "folder">): readonly Center[] {
   if (isFleet) return ["view"];
   return folder === null ? ["view", "forms", "text"] : ["view", "forms", "text", "report"];

@@ -7,7 +7,7 @@ import type { Session } from "./session.svelte";
 /** Bodies that are named. */
 const MOST_NAMED = 5;
 
-/** Ends a search that nobody wants any more, or that cannot go on. */
+/** Ends a search that is no longer wanted, or that cannot go on. */
 class GivenUp extends Error {
   constructor(words = "The comparison was given up.") {
     super(words);
@@ -20,7 +20,7 @@ function noDigest({ scene, status }: Session): GivenUp {
 }
 
 export class Comparison {
-  /** Words on what it does or has found; empty before. */
+  /** Words on its progress or its finding; empty before. */
   words = $state("");
   isRunning = $state(false);
   #round = 0;

@@ -37,7 +37,7 @@ export interface Differing {
   words: string;
 }
 
-/** The bodies that differ in what frames tell; those that only one has come last. */
+/** The bodies whose data in the frames differ; those that only one run has come last. */
 export function differing(a: Shown, b: Shown, lengthWords: (meters: number) => string): Differing[] {
   const found: Differing[] = [];
   const lonely: Differing[] = [];

@@ -1,4 +1,4 @@
-/** Events of a session: fetched as the run goes on, kept when it goes back, since a run repeats itself. */
+/** Events of a session: fetched as the run goes on, kept when it goes back, because a run repeats itself. */
 
 import type { Answer, Event } from "../protocol";
 import { whoKey } from "../format";
@@ -37,7 +37,7 @@ export class Events {
     this.#isAsking = false;
   }
 
-  /** Fetches what has happened before this cycle; one question at a time. */
+  /** Fetches the events before this cycle; one question at a time. */
   async fetch(until: number, ask: Ask): Promise<void> {
     if (this.#isAsking || until <= this.#asked) return;
     const age = this.#age;
@@ -51,7 +51,8 @@ export class Events {
 
   /** The server answers with the oldest: goes on from the last of them until none is left. */
   async #fetchAll(age: number, until: number, ask: Ask): Promise<void> {
-    // Those of the first cycle that earlier answers had no more room for: together, as equal ones are told apart by number.
+    // Those of the first cycle that earlier answers had no more room for: together, because equal ones are told apart
+    // by number.
     let begun: Event[] = [];
     while (true) {
       const from = this.#asked;
@@ -61,7 +62,7 @@ export class Events {
       const last = told.at(-1);
       if (!last || answer.entries.length < MOST_ASKED || answer.left_out === 0) {
         this.add(told);
-        // What is left out now is not at the server either: it was never kept.
+        // Events left out now are not at the server either: it never kept them.
         this.leftOut += answer.left_out;
         this.#asked = Math.max(from, Math.min(until, answer.known_until));
         return;

@@ -19,7 +19,7 @@ export class Folders {
     this.#studio = studio;
   }
 
-  /** Begins anew, with what was named at start. */
+  /** Begins anew, with the folders that were named at start. */
   begin(): Promise<void> {
     this.#trail = [null];
     return this.#list(null);

@@ -45,7 +45,7 @@ export class Metrics {
     }
   }
 
-  /** Numbers of samples begin anew: the next question is for all of them. */
+  /** Begins anew with the numbers of samples: the next question is for all of them. */
   #begin(thinned: number): void {
     this.#thinned = thinned;
     this.cycles = [];

@@ -1,11 +1,11 @@
-/** Frames that were left out while somebody looked. What was not seen anyway is no loss. */
+/** Frames that were left out while the session was watched. Frames out of sight are no loss. */
 
 export class Missed {
   #before = 0;
   #forgiven = 0;
   #wasWatched = false;
 
-  /** A frame says how many the server has left out so far; returns how many of them would have been seen. */
+  /** Takes the number that the server has left out so far; returns how many of them would have been seen. */
   count(leftOut: number, isWatched: boolean): number {
     if (!isWatched || !this.#wasWatched) this.#forgiven += Math.max(0, leftOut - this.#before);
     this.#wasWatched = isWatched;
@@ -13,7 +13,7 @@ export class Missed {
     return leftOut - this.#forgiven;
   }
 
-  /** The server counts anew. */
+  /** Begins anew, as the server counts anew. */
   reset(): void {
     this.#before = this.#forgiven = 0;
     this.#wasWatched = false;

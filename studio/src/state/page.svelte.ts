@@ -41,7 +41,7 @@ class Page {
   /** Whether the picture is drawn upon. */
   edits = $state(false);
   showsNew = $state(false);
-  /** Asked for by keys; the panels listen. */
+  /** Requests by keys, counted; the panels listen. */
   wantsFilter = $state(0);
   #systemIsDark = $state(matchMedia("(prefers-color-scheme: dark)").matches);
 

@@ -1,4 +1,4 @@
-/** Addresses at which the server makes results of recordings and sweeps: reports, and what can be exported. */
+/** Addresses at which the server makes results of recordings and sweeps: reports and exports. */
 
 import { problemOf } from "../connection";
 import type { Problem, SweepRun } from "../protocol";
@@ -51,7 +51,7 @@ export function exportAddress(path: string, { form, table, cycle }: Export): str
   return address("export", { path, as: form, table, cycle });
 }
 
-/** Keeps what was made here as a file. */
+/** Keeps data made here as a file. */
 export function keepFile(blob: Blob, name: string): void {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(blob);

@@ -5,7 +5,7 @@ const STEP_MS = 33;
 /** A run that plays as fast as it goes has gone back to its start after this time. */
 const FASTEST_S = 15;
 
-/** Cycles per second backwards: those of the speed; of the fastest, what is left in some seconds. */
+/** Cycles per second backwards: those of the speed; at the fastest, enough to reach the start in some seconds. */
 export function cyclesBack_per_s(times: number | "fastest", cycle_s: number, from: number): number {
   return times === "fastest" ? Math.max(100 / cycle_s, from / FASTEST_S) : times / cycle_s;
 }

@@ -25,12 +25,12 @@ export class Seeker {
     return this.#way;
   }
 
-  /** The server starts anew: what it shows next follows from nothing that was seen. */
+  /** Notes that the server starts anew: its next frame follows from none before. */
   jumped(): void {
     this.#isSought = true;
   }
 
-  /** A frame has come; returns whether it was sought, and does not just follow the one before. */
+  /** Notes a frame that has come; returns whether it was sought, and does not just follow the one before. */
   arrived(): boolean {
     const isSought = this.#isSought;
     // The one that comes after the answer is the last of a way.

@@ -1,4 +1,4 @@
-/** One open run: what the server says of it, and what the page chose in it. */
+/** One open run: the server's data of it, and the page's choices in it. */
 
 import { Credit } from "../credit";
 import { decodeFrame, FrameError, type Frame } from "../decode";
@@ -48,7 +48,7 @@ export class Session {
   bodies = $state.raw<Bodies | null>(null);
   /** Its speed when it plays. */
   speed = $state.raw<Speed>({ times: 1 });
-  /** Cycle, time and count of left-out frames of what is shown. */
+  /** Cycle, time and count of left-out frames of the shown picture. */
   shown = $state.raw({ cycle: 0, time_s: 0, leftOut: 0 });
   selected = $state.raw<Who | null>(null);
   inspection = $state.raw<Inspection | null>(null);
@@ -81,7 +81,7 @@ export class Session {
   /** The last step that is under way. */
   #stepping: { goal: number } | null = null;
   readonly #missed = new Missed();
-  /** Counts what the page asked of the run: a way that was given up for something newer is no problem. */
+  /** Counts the page's orders to the run: a way that was given up for a newer order is no problem. */
   #orders = 0;
   /** Promises that wait for a state or a frame. */
   readonly #waiting = new Waiting();
@@ -95,7 +95,7 @@ export class Session {
     this.credit = new Credit((frames) => this.quietly({ do: "credit", frames }));
   }
 
-  /** The server has opened it (again). */
+  /** Notes that the server has opened it (again). */
   opened(answer: Extract<Answer, { is: "opened" }>): void {
     this.id = answer.session;
     if (this.starts === 0) this.speed = { times: firstSpeed(answer.scene.cycle_s) };
@@ -105,7 +105,7 @@ export class Session {
     this.#look();
   }
 
-  /** The connection was lost: numbers of sessions are the server's, and a new one begins to count again. */
+  /** Notes that the connection was lost; numbers of sessions are the server's, and a new one counts anew. */
   cutOff(): void {
     this.id = 0;
     this.#rewind.stop();
@@ -115,7 +115,7 @@ export class Session {
     this.#kept ??= { cycle, isPlaying: this.isPlaying, seed: this.#ownSeed };
   }
 
-  /** Opened again: goes to where it was, and on if it played. Returns the cycle. */
+  /** Goes back to where it was, once opened again, and on if it played. Returns the cycle. */
   async resume(): Promise<number> {
     const { cycle, isPlaying, seed } = this.#kept ?? { cycle: 0, isPlaying: false, seed: null };
     const { id } = this;
@@ -185,7 +185,7 @@ export class Session {
     if (!fleet || !bodies) return [];
     const bodyOf = new Map(fleet.nodes.map((node) => [node.agent, bodies.find(node.who)]));
     const index = (agent: number): number | undefined => bodyOf.get(agent);
-    // A body that is no agent's, such as an obstacle, hears nobody: all links stay.
+    // A body that is no agent, such as an obstacle, hears no other: all links stay.
     const chosen = selected ? nodeOf(fleet, selected) : undefined;
     return linksOf(fleet, chosen?.agent ?? null).flatMap(({ from, to, isMutual }) => {
       const [a, b] = [index(from), index(to)];
@@ -198,7 +198,7 @@ export class Session {
     return () => this.#onFrame.delete(onFrame);
   }
 
-  /** Called regularly: what nobody looks at needs few frames, so that it is there when somebody does. */
+  /** Called regularly: a session out of sight needs few frames, so that it is ready when it is looked at. */
   grantUnseen(): void {
     if (!this.#isWatched && this.id !== 0 && !this.ended) this.credit.drawn();
   }
@@ -293,7 +293,7 @@ export class Session {
     if (withMetrics && !this.isFleet) this.metrics.fetch((from) => this.#ask({ do: "metrics", from })).catch(quiet);
   }
 
-  // What the page can do with it.
+  // The page's orders to the run.
 
   play(): void {
     this.#order();
@@ -333,7 +333,7 @@ export class Session {
     }
   }
 
-  /** The page has closed it: what is under way is nobody's concern any more. */
+  /** Notes that the page has closed it: pending calls no longer matter. */
   dispose(): void {
     this.quietly({ do: "close" });
     this.#order();
@@ -342,7 +342,7 @@ export class Session {
     for (const timer of [this.#inspectTimer, this.#regrantTimer]) if (timer !== null) clearTimeout(timer);
   }
 
-  /** Whatever it does by itself ends with what is asked for now. */
+  /** Notes a new order, which ends everything that it does by itself. */
   #order(): void {
     this.#orders++;
     this.#rewind.stop();
@@ -467,7 +467,7 @@ export class Session {
     if (error.problem !== LOST && error.problem !== NO_SESSION) this.#line.problem(error.problem);
   }
 
-  /** Sends a call whose failure nobody needs to hear of. */
+  /** Sends a call whose failure is ignored. */
   quietly(call: OwnCall): void {
     this.#ask(call).catch(() => undefined);
   }

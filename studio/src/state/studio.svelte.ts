@@ -1,4 +1,4 @@
-/** All open sessions, the connection that they share, and what the page as a whole shows. */
+/** All open sessions, the connection that they share, and the choices of the page as a whole. */
 
 import { Connection, LOST, Refused, problemOf, type Listener, type Surroundings } from "../connection";
 import { STANDING_WORDS, type Standing } from "../enter";
@@ -49,7 +49,7 @@ export class Studio {
   readonly comparison = new Comparison();
   readonly #connection: Connection;
   readonly #around: Around;
-  /** Counts greetings and losses: what was begun before one of them is of no more use. */
+  /** Counts greetings and losses: work begun before one of them is of no more use. */
   #generation = 0;
   #problemKeys = 0;
 
@@ -131,7 +131,7 @@ export class Studio {
     return true;
   }
 
-  /** Opens what a session is of; a refusal is told unless that is `quiet`. Returns whether it is open. */
+  /** Opens the subject of a session; a refusal is told unless `quiet`. Returns whether it is open. */
   async #openAt(session: Session, seed: number | null, quiet = false): Promise<boolean> {
     try {
       const answer = await this.ask({ do: "open", what: session.subject, seed });
@@ -140,7 +140,7 @@ export class Studio {
       return true;
     } catch (error) {
       if (!(error instanceof Refused)) throw error;
-      // The banner tells what is the same for all.
+      // The banner tells of a lost connection, for all sessions at once.
       if (error.problem !== LOST && !quiet) this.problem(error.problem);
       return false;
     }
@@ -152,13 +152,13 @@ export class Studio {
     for (const session of this.led) session.play();
   }
 
-  /** Lets what moves stand still, and goes on else. */
+  /** Pauses if the active session moves, and plays otherwise. */
   toggle(): void {
     if (this.active?.isMoving) this.pause();
     else this.play();
   }
 
-  /** Plays backwards, or lets stand still what does. */
+  /** Plays backwards, or pauses if the active session already does. */
   toggleBack(): void {
     if (this.active?.isRewinding) return this.pause();
     for (const session of this.led) session.rewind();
@@ -203,7 +203,7 @@ export class Studio {
     return this.sessions.find((session) => session.id === id);
   }
 
-  /** Notices and frames of a session may come before the page knows its number. */
+  /** Notices and frames of sessions that came before the page knew their numbers. */
   readonly #early = new Map<number, (Notice | ArrayBuffer)[]>();
 
   #notice(notice: Notice): void {
@@ -215,7 +215,7 @@ export class Studio {
     else this.#ended(session, notice.problem);
   }
 
-  /** Nothing more comes of a session; where a fleet flew, another one may fly. */
+  /** Notes the end of a session; where a fleet flew, another one may fly. */
   #ended(session: Session, problem: Problem): void {
     session.takeEnd(problem);
     if (session.isFleet) this.#findAgain(session);
@@ -249,7 +249,7 @@ export class Studio {
     this.#early.set(id, [...kept.slice(-8), what]);
   }
 
-  /** Hands over what came before the page knew the session. */
+  /** Hands over the messages that came before the page knew the session. */
   #deliver(session: Session): void {
     const kept = this.#early.get(session.id) ?? [];
     this.#early.delete(session.id);
@@ -274,7 +274,7 @@ export class Studio {
     else if (isFirst) for (const named of hello.open) await this.#openNamed(named);
   }
 
-  /** Opens what the command line named. */
+  /** Opens the subjects that the command line named. */
   async #openNamed({ kind, path }: Named): Promise<void> {
     if (kind === "sweep") this.openSweep(path, path.split("/").at(-1) ?? path);
     else await this.open({ kind, path } as Subject);
@@ -289,7 +289,7 @@ export class Studio {
     const say = (standing: Standing): void => {
       this.banner = { words: `${STANDING_WORDS[standing]} Attempt ${attempt} to connect again comes ${wait}.`, isBad: true };
     };
-    // What is known already stays until the server has said what it is.
+    // The last known standing stays until the server has given the new one.
     say(this.#standing);
     void this.#around.standing().then((standing) => {
       if (generation !== this.#generation) return;

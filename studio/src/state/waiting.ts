@@ -1,15 +1,15 @@
-/** Promises that wait for something to be so: told whenever it may be, and let go when it cannot come any more. */
+/** Promises that wait for a condition: checked at every change, and let go when it can no longer come true. */
 
 export class Waiting {
-  /** Each says whether it has what it waits for. */
+  /** Each returns whether its wait is over. */
   readonly #open = new Set<(isOver: boolean) => boolean>();
 
-  /** Something has changed. */
+  /** Checks all waits after a change. */
   changed(): void {
     this.#tell(false);
   }
 
-  /** Nothing will come any more. */
+  /** Ends all waits: nothing more will come. */
   over(): void {
     this.#tell(true);
   }

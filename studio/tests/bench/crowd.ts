@@ -1,4 +1,4 @@
-/** Ten thousand robots on a page: what benchmarks look at. */
+/** Ten thousand robots on a page, for the benchmarks. */
 
 import { readFileSync } from "node:fs";
 import type { Page } from "playwright-core";

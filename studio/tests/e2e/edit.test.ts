@@ -137,7 +137,7 @@ describe("the canvas", () => {
     expect(await edited(3)).toEqual({ op: "remove", key: "robots.0" });
   });
 
-  /** Returns the points of the chosen thing and of the tips of its axes, once they are not what they were before. */
+  /** Returns the points of the chosen thing and of the tips of its axes, once they differ from those before. */
   async function axes(before = ""): Promise<[number, number][]> {
     const layer = page.locator("canvas.layer");
     await page.waitForFunction((before) => {
@@ -170,12 +170,12 @@ describe("the canvas", () => {
     const lifted = (await edited(1)) as { key: string; value: number[] };
     expect([lifted.key, lifted.value[0], lifted.value[1]]).toEqual(["obstacles.0.at_m", 1, 2]);
     expect(lifted.value[2]).toBeGreaterThan(0.6);
-    // It is pulled on from where it has come to, which the program tells.
+    // It is dragged on from its present place, which the program tells.
     const [middle] = await axes(before!);
     await pull(middle!, 70, 0);
     const aside = (await edited(2)) as { key: string; value: number[] };
     expect(aside.key).toBe("obstacles.0.at_m");
-    // The view is level: what goes sideways in it stays at its height.
+    // The view is level: a thing moved sideways in it stays at its height.
     expect(aside.value[2]).toBeCloseTo(lifted.value[2]!, 1);
     expect(Math.hypot(aside.value[0]! - 1, aside.value[1]! - 2)).toBeGreaterThan(0.2);
     await page.locator("canvas.layer").focus();

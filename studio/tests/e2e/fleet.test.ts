@@ -1,4 +1,4 @@
-/** A fleet that is watched, in a real browser, against a made-up server; and pictures of it for people to look at. */
+/** A watched fleet, in a real browser, against a made-up server; and pictures of it for people to look at. */
 
 import { mkdirSync } from "node:fs";
 import type { Browser, Page } from "playwright-core";

@@ -73,7 +73,7 @@ describe("transport", () => {
       return data.some((value, i) => i % 4 === 3 && value > 0);
     });
     expect(colored).toBe(true);
-    // The list shows where the run is, and what is there when it is scrolled.
+    // The list shows the place of the run, and the rows there when it is scrolled.
     await page.locator(".events .row.now").waitFor();
     await page.locator(".events .list").evaluate((list) => (list.scrollTop = 0));
     await page.locator(".events .row:not(.later)").first().waitFor();
@@ -410,7 +410,7 @@ describe("results", () => {
     await page.getByRole("button", { name: /sweep · sweep/ }).click();
     await report.getByRole("button", { name: "count = 4" }).click();
     await drawn(page);
-    // The frame itself tries what it may not.
+    // The frame itself tries forbidden actions.
     expect(complaints.filter((words) => !words.includes("/enter") && !words.includes("Fetch API"))).toEqual([]);
   });
 });

@@ -7,7 +7,7 @@ import { expect, test } from "vitest";
 
 /** Greatest size of all that is fetched before anything is seen. */
 const MOST_FIRST = 300_000;
-/** Greatest size of what the editor adds, with the text view. */
+/** Greatest size of the files that the editor adds, with the text view. */
 const MOST_LATER = 220_000;
 
 const html = readFileSync("dist/index.html", "utf8");
@@ -17,7 +17,7 @@ const files = new Map(
     .map((entry) => [entry.name, readFileSync(join(entry.parentPath, entry.name))]),
 );
 
-/** The files that the first load needs: what the page names, and what these import without being asked. */
+/** The files that the first load needs: those that the page names, and their static imports. */
 function first(): Set<string> {
   const found = new Set(["index.html"]);
   const open = [...html.matchAll(/(?:src|href)="\/([^"]+)"/g)].map(([, path]) => basename(path!));

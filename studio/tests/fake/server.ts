@@ -26,7 +26,7 @@ function problemOf(cause: string, remedy: string, line: number | null = null, co
 /** The cycle from which on runs of the seed 2 are others. */
 export const PARTING = 137;
 
-/** Eight nodes: all hear all but the last, whom nobody hears, and who is late; the third is lost. */
+/** Eight nodes: all hear all but the last, which none hears and which is late; the third is lost. */
 function fleetAt(cycle: number): Fleet {
   const node = (agent: number): Fleet["nodes"][number] => {
     const isLost = agent === 2;
@@ -130,7 +130,7 @@ export class FakeServer {
   port = 0;
   /** Subjects that the command line would have asked to open. */
   open: Subject[] = [];
-  /** The text that a file would have by now, if somebody else had changed it. */
+  /** The text that a file would have by now, if another program had changed it. */
   theirs: string | null = null;
   /** The answer of the way in; anything but 204 refuses sockets, too. */
   entrance = 204;
@@ -268,7 +268,7 @@ export class FakeServer {
 function result(url: string, response: ServerResponse): void {
   const fields = new URL(url, "http://x").searchParams;
   const part = fields.get("as");
-  // What is refused may be shown in no frame.
+  // A refusal may be shown in no frame.
   if (fields.get("path") === "broken.run") {
     return void response.writeHead(422, { "content-type": "text/plain", "x-frame-options": "DENY" }).end("broken.run/run.json: it is cut off\nhelp: record it again\n");
   }

@@ -1,4 +1,4 @@
-/** The program runs and writes what is drawn, filled in and typed. SIDESTEP_BINARY names the program. */
+/** The program runs and writes every drawn, filled-in and typed change. SIDESTEP_BINARY names the program. */
 
 import { copyFileSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";

@@ -1,4 +1,4 @@
-/** The center shows what there is of the session that is active, whatever another one showed. */
+/** The center shows an existing panel of the active session, regardless of the panel of another one. */
 
 import { expect, test } from "vitest";
 import { centerOf, centersOf } from "../../src/state/center";

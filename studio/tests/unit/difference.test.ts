@@ -7,7 +7,7 @@ import { decodeFrame, type Frame } from "../../src/decode";
 import type { Cast } from "../../src/protocol";
 import { encodeFrame } from "../fake/encode";
 
-/** Asks for the first difference of runs that part at a cycle; returns what was asked, too. */
+/** Asks for the first difference of runs that part at a cycle; returns the questions, too. */
 async function searched(last: number, parting: number): Promise<{ found: number | null; asked: number[] }> {
   const asked: number[] = [];
   const found = await firstDifference(last, (cycle) => (asked.push(cycle), Promise.resolve(cycle >= parting)));

@@ -1,4 +1,4 @@
-/** Files of others are named as the scenario's own folder sees them, in place of what was there. */
+/** Foreign files are named as the scenario's own folder sees them, in place of those before. */
 
 import { expect, test } from "vitest";
 import { folderOf, importEdits, isNameable, relativePath } from "../../src/edit/import";

@@ -1,4 +1,4 @@
-/** Frames are lost on who looks; what nobody looks at loses nothing. */
+/** A watched session loses frames; one out of sight loses nothing. */
 
 import { expect, test } from "vitest";
 import { Missed } from "../../src/state/missed";

@@ -1,4 +1,4 @@
-/** Addresses and names of results hold whatever folders and scenarios are called. */
+/** Addresses and names of results hold for all names of folders and scenarios. */
 
 import { expect, test } from "vitest";
 import { exportAddress, failureOf, foundRun, plainName, reportAddress, wantedRun } from "../../src/state/results";

@@ -1,4 +1,4 @@
-/** After a loss the page says what it is, and everything goes on where it was, however often the server dies meanwhile. */
+/** After a loss the page names its cause, and all goes on where it was, however often the server dies. */
 
 import { beforeEach, expect, test, vi } from "vitest";
 import type { Socket } from "../../src/connection";

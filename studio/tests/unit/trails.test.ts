@@ -1,4 +1,4 @@
-/** Trails hold what was seen: in order, bounded, and true after going back. */
+/** Trails hold the places seen: in order, bounded, and true after going back. */
 
 import { expect, test } from "vitest";
 import { Trails } from "../../src/scene/trails";

@@ -34,7 +34,7 @@ export function remove(path: Path): Edit {
   return { op: "remove", key: keyOf(path) };
 }
 
-/** Numbers of a place as people write them: to a centimeter near by, to a meter over kilometers. */
+/** The numbers of a place as people write them: to a centimeter near by, to a meter over kilometers. */
 export function rounded(value: number, m_per_px: number): number {
   const digits = Math.min(6, Math.max(0, Math.ceil(-Math.log10(Math.max(m_per_px, 1e-6)))));
   const cut = Number(value.toFixed(digits));

@@ -42,7 +42,7 @@ const CHAIN: readonly Tool[] = [
   tool("polygon", "△", "Polygon", "Drag one side of a triangle; a click adds a corner to the polygon that is chosen"),
   tool("patrol", "⇄", "Patrol", "Click adds a way-point to the chosen ball or box, which then goes to and fro"),
 ];
-/** Tools in space, where nothing can be placed anew: what is there is moved. */
+/** Tools in space, where nothing can be placed anew: existing things are moved. */
 const CHAIN_IN_SPACE: readonly Tool[] = [
   tool("select", "↖", "Select", "Drag moves in the plane of the view, an arrow of the chosen thing along its axis; Delete takes away"),
 ];
