@@ -1,4 +1,4 @@
-//! Chains whose connectors are nodes: they come out as in one process, and stand while one of them is missing.
+//! Chains of connectors that are nodes: they come out as in one process, and stand while one of them is missing.
 
 use crate::input::refused;
 use crate::processes::{Program, folder, job, signal};
@@ -109,7 +109,7 @@ fn events(out: &Path, kind: &str) -> Vec<(u64, u64)> {
     rows.map(|row| (number("cycle", row), number("connector", row))).collect()
 }
 
-/// Ends a fleet that would fly on, and lets its run go on to the end in one process; it is replayed then.
+/// Ends a fleet that would fly on, and lets its run go on to the end in one process; then replays it.
 fn resumed(mut program: Program, out: &Path) {
     drop(program.stdin.take());
     assert_eq!(program.end().0, Some(130));
@@ -127,7 +127,7 @@ fn waits_and_goes_on(program: &Program, again: impl FnOnce()) {
     again();
     let back = program.fleet("it is back", |now| now.waits_for.is_empty());
     assert_eq!(back.nodes[2].lives, 2, "{back:?}");
-    // The cycle under way was made without it, and no other one.
+    // The cycle under way was made without it, and no other cycle.
     assert!(back.cycle >= waits.cycle, "{waits:?} {back:?}");
     program.fleet("it flies again", |now| now.nodes[2].flown > back.nodes[2].flown + 1);
 }
