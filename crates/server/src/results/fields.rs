@@ -20,17 +20,17 @@ impl Fields {
         self.0.get(name).map(String::as_str)
     }
 
-    /// Returns a field that must be there.
+    /// Returns a required field.
     ///
     /// # Errors
-    /// When it is not.
+    /// When it is missing.
     pub(super) fn need(&self, name: &str) -> Result<&str, Failed> {
         let missing = || Problem::new("address", format!("it has no `{name}`"), "name one");
         self.get(name).ok_or_else(|| missing().into())
     }
 }
 
-/// Returns a text without percent signs; `None` if it is none.
+/// Returns a text with its percent signs decoded; `None` if they are malformed.
 fn decoded(text: &str) -> Option<String> {
     let mut bytes = Vec::with_capacity(text.len());
     let mut parts = text.split('%');
