@@ -83,7 +83,7 @@ impl World {
                 BatchError::Broken { world: index, seed, cycle, cause }
             }
         };
-        // Of one that is broken the older reason is what restarting it did not mend.
+        // For a broken world this replaces the older reason, which the restart did not fix.
         self.error = Some(refused);
     }
 
@@ -98,7 +98,7 @@ impl World {
         (self.room, self.has_observed) = (room, true);
     }
 
-    /// Copies what it has observed into its part of the caller's room.
+    /// Copies its observations into its part of the caller's room.
     pub(super) fn hand_over(&mut self, parts: &mut [CellsMut<'_>]) {
         if !std::mem::take(&mut self.has_observed) {
             return;
