@@ -35,7 +35,7 @@ pub(crate) fn trails(
     Ok(trails)
 }
 
-/// Returns the table `name` of the run in `folder`, which records it with `record.calibration =
+/// Returns the table `name` of the run in `folder`; runs record it with `record.calibration =
 /// true`.
 ///
 /// # Errors
