@@ -69,7 +69,7 @@ fn built(studio: &Path, page: &Path) -> Result<PathBuf, String> {
     Ok(page.to_path_buf())
 }
 
-/// Installs the tools that build the page, unless they are there.
+/// Installs the tools that build the page, unless they are installed already.
 fn install(studio: &Path) -> Result<(), String> {
     let wanted = studio.join("package-lock.json");
     let changed = |path: &Path| path.metadata().and_then(|about| about.modified());

@@ -193,7 +193,7 @@ impl Batch {
         self.workers
     }
 
-    /// The teams of each world: agents that observe, and are ordered, alike.
+    /// The teams of each world: agents with the same observations and orders.
     #[getter]
     fn teams<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         list(py, self.teams.iter().cloned().map(Team))
@@ -259,7 +259,7 @@ impl Batch {
     }
 
     /// Advances all worlds by `cycles` cycles (one by default), or those for which `mask` (bool, one for each
-    /// world) is true; orders to the others are dropped. A world that is over stays as it is.
+    /// world) is true; orders to the others are dropped. A world that is over stays the same.
     ///
     /// Raises ReplayError when a world breaks off; the others have advanced then.
     ///
@@ -286,7 +286,7 @@ impl Batch {
     }
 
     /// Returns the observations of a team's agents (by number or name) in all worlds before the next cycle: arrays by
-    /// name, of the shape (worlds, agents, ...). With `out`, arrays of an earlier call are written anew and returned.
+    /// name, of the shape (worlds, agents, ...). With `out`, arrays of an earlier call are overwritten and returned.
     ///
     /// Raises OrderError when there is no such team, InputError when `out` has other arrays.
     ///
@@ -312,8 +312,8 @@ impl Batch {
         Ok(out)
     }
 
-    /// Starts worlds anew with these seeds, one for each world; with `mask` (bool, one for each world) only those for which
-    /// it is true. Waiting orders are dropped.
+    /// Restarts worlds with these seeds, one for each world; with `mask` (bool, one for each world) only those for
+    /// which it is true. Waiting orders are dropped.
     ///
     /// Raises InputError when a world cannot start with its seed; it then stays as it was.
     ///

@@ -121,7 +121,7 @@ impl Made {
         Ok(self.resolved()?.text.clone())
     }
 
-    /// Returns the same scenario with another seed, compiled anew only where its world needs that.
+    /// Returns the same scenario with another seed, recompiled only if its world needs that.
     pub(crate) fn reseeded(self: &Arc<Self>, py: Python<'_>, seed: u64) -> PyResult<Self> {
         if i64::try_from(seed).is_err() {
             let remedy = "give at most 2^63 - 1: scenario files have no larger numbers";

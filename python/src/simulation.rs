@@ -395,7 +395,7 @@ impl Simulation {
         to_python(py, &self.ask(py, |run| run.agent_metrics())?)
     }
 
-    /// The teams: agents that observe, and are ordered, alike.
+    /// The teams: agents with the same observations and orders.
     #[getter]
     fn teams<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         crate::json::list(py, self.teams.iter().cloned().map(Team))

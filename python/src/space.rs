@@ -90,7 +90,7 @@ impl Space {
     }
 }
 
-/// Agents that observe, and are ordered, alike.
+/// Agents with the same observations and orders.
 ///
 /// >>> import sidestep
 /// >>> floor = {"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2, "behaviour": {"kind": "external"}}]}

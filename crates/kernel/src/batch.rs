@@ -126,7 +126,7 @@ impl Batch {
     }
 
     /// Gives the waiting orders, and runs `cycles` cycles, in the worlds for which `mask` is true (all, without
-    /// one); orders to others are dropped. A world in which nothing can happen anymore stays as it is.
+    /// one); orders to others are dropped. A world in which nothing can happen anymore stays the same.
     ///
     /// # Errors
     /// When a world had broken off before: nothing is done then. When it does so now, or cannot obey: all others have

@@ -38,7 +38,7 @@ pub trait Simulation: Any + Send {
     /// complete before its planned number of cycles.
     fn is_over(&self) -> bool;
 
-    /// Runs up to `cycles` cycles and returns how many were done: fewer when a buffer for recording
+    /// Runs up to `cycles` cycles and returns the number done: fewer when a buffer for recording
     /// is full or the run is over, and 0 only if `cycles` is 0.
     fn advance(&mut self, cycles: u64) -> u64;
 
@@ -88,7 +88,7 @@ pub trait Simulation: Any + Send {
     /// not exist or has nothing to show. No result depends on it.
     fn inspect(&self, who: Who) -> Option<Inspection>;
 
-    /// The teams of agents that observe, and may be ordered, alike.
+    /// The teams of agents with the same observations and orders.
     fn teams(&self) -> &[Team] {
         &[]
     }

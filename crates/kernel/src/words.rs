@@ -63,7 +63,7 @@ pub fn aligned(rows: &[(String, String)]) -> String {
 }
 
 /// Returns text in lines of at most `cols` columns, broken at spaces; a longer word is a line. Text
-/// that fits, and each line feed in it, stays as it is.
+/// that fits, and each line feed in it, stays unchanged.
 pub fn wrapped(text: &str, cols: usize) -> Vec<String> {
     text.split('\n').flat_map(|line| wrapped_line(line, cols)).collect()
 }

@@ -207,7 +207,7 @@ pub trait World: Phases<State: Send> + Send + 'static {
         None
     }
 
-    /// Returns the teams of agents that observe, and may be ordered, alike.
+    /// Returns the teams of agents with the same observations and orders.
     fn teams(&self) -> Arc<Teams> {
         Arc::default()
     }

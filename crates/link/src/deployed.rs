@@ -22,7 +22,7 @@ pub trait Deployed: Send + Sync {
     fn has_faults(&self) -> bool;
 
     /// Returns the change of the scenario, as `key=value`, that keeps agents from waiting forever for one that is
-    /// gone where time passes so many times as fast; none where they never do.
+    /// gone where time passes `speed` times as fast; none where they never do.
     fn patience(&self, speed: f64) -> Option<String>;
 
     /// Returns whether a fleet in lockstep waits for a node that is gone. Otherwise it ends.
@@ -33,8 +33,8 @@ pub trait Deployed: Send + Sync {
     /// Returns the percepts of the agents that decide next in the cycle to come, by rising id.
     fn sights(&self, run: &dyn Simulation) -> Vec<Sight>;
 
-    /// Returns the largest number of rounds of this cycle that may follow one of so many groups; none where all decide
-    /// at once.
+    /// Returns the largest number of rounds of this cycle that may follow one with this number of groups; 0 where all
+    /// decide at once.
     fn further_rounds(&self, _: &dyn Simulation, _: usize) -> usize {
         0
     }

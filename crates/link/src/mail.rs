@@ -103,7 +103,7 @@ impl Mail {
         self.others.remove(&other);
     }
 
-    /// Returns how long another party that was met has been silent.
+    /// Returns the time for which another party that was met has been silent.
     pub fn silent_for(&self, other: Party) -> Option<Duration> {
         let heard = self.others.get(&other)?.heard;
         Some(self.now().saturating_sub(heard))
@@ -118,7 +118,7 @@ impl Mail {
             && self.wire.is_deaf_to(member, within)
     }
 
-    /// Closes the direct links to all other nodes, and opens them anew.
+    /// Closes the direct links to all other nodes, and opens them again.
     ///
     /// # Errors
     /// When an endpoint cannot be taken again: everything goes by the server then, and it can be tried once more.

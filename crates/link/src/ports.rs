@@ -13,7 +13,7 @@ pub struct Sight {
     pub agent: EntityId,
     /// The agents that decide together in this cycle, this one among them, rising.
     pub group: Vec<EntityId>,
-    /// The percept, as it is sent.
+    /// The percept, as sent.
     pub begin: Begin,
 }
 

@@ -36,7 +36,7 @@ pub(crate) struct Post {
     wait: Duration,
     /// Number of the next letter of the other.
     next: u64,
-    /// Time at which the other is told which of its letters have come.
+    /// Time at which the receipt of the other's letters is acknowledged.
     acknowledge_at: Option<Duration>,
 }
 

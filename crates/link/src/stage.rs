@@ -66,7 +66,7 @@ impl Stage {
         self.world.sights(self.run())
     }
 
-    /// Returns the largest number of rounds of this cycle that may follow one of so many groups.
+    /// Returns the largest number of rounds of this cycle that may follow one with this number of groups.
     pub fn further_rounds(&self, groups: usize) -> usize {
         self.world.further_rounds(self.run(), groups)
     }

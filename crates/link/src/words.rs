@@ -40,7 +40,7 @@ pub struct Address {
     pub life: Option<Life>,
     /// All letters of the receiver below this number have come.
     pub received: u64,
-    /// Number of the word among the letters to the receiver, which are repeated until they have come; none of a
+    /// Number of the word among the letters to the receiver, which are repeated until they have come; none for a
     /// note, which may be lost.
     pub number: Option<u64>,
 }
@@ -124,7 +124,7 @@ pub struct Refusal {
     pub remedy: String,
 }
 
-/// A node of a fleet, as others know it.
+/// A node of a fleet, as known to others.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Member {
     /// Its agent.
@@ -169,7 +169,7 @@ pub struct Ticked {
     pub sent: Vec<(EntityId, u64)>,
     /// The tick of its next timer.
     pub timer: Option<u64>,
-    /// Whether its control is there.
+    /// Whether its control is ready.
     pub is_done: bool,
 }
 
@@ -189,7 +189,7 @@ pub struct Packet {
     pub payload: Vec<u8>,
 }
 
-/// A packet to one receiver, as it is recorded.
+/// A packet to one receiver, as recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Logged {
     /// The cycle of the talk.
@@ -217,7 +217,7 @@ pub struct Control {
     pub control: Vec<u8>,
 }
 
-/// The state of a node, told twice a second.
+/// The state of a node, reported twice a second.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Status {
     /// The cycle that it is in.
@@ -276,7 +276,7 @@ impl Frame {
 }
 
 impl Unreadable {
-    /// Returns the reason in a word, as metrics name it.
+    /// Returns the reason in a word, its name in metrics.
     pub fn word(self) -> &'static str {
         match self {
             Self::Foreign => "foreign",

@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// The folder of the files, relative to the scenario.
 const FOLDER: &str = "inputs";
-/// Size in bytes of the largest file that is copied as it is, after unpacking.
+/// Size in bytes of the largest file that is copied unchanged, after unpacking.
 const MAX_BYTES: u64 = 64 << 20;
 
 /// A scenario that needs no file from elsewhere, together with the files that it contains instead.

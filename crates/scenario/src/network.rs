@@ -209,7 +209,7 @@ fn check_times<N: Names>(n: &Network, dt_s: f64) -> Result<(), Wrong> {
     Err(Wrong::new(cause, remedy))
 }
 
-/// Returns a while.
+/// Returns a while from its two times.
 ///
 /// # Errors
 /// When its times are invalid.

@@ -210,7 +210,7 @@ fn watching() {
     }
 }
 
-/// Shipped scenarios of each world, with a kind of body to inspect and how many of them there are.
+/// Shipped scenarios of each world, with a kind of body to inspect and the number of these.
 const INSPECTED: [(&str, &str, u32); 3] = [
     ("robots/office", "robot", 24),
     ("chain/serpentine", "connector", 1),

@@ -14,8 +14,8 @@ const MOST_ENTRIES: usize = 3000;
 const MOST_DEPTH: usize = 3;
 
 impl Files {
-    /// Returns the files below a scenario's folder, and those elsewhere among some names, as the scenario would name
-    /// them; only those that may be read.
+    /// Returns the files below a scenario's folder, and those elsewhere among some names, in the scenario's own
+    /// notation; only those that may be read.
     pub(crate) fn beside(&self, source: &Source, names: &[String]) -> Vec<String> {
         let folder = match source.folder.as_os_str().is_empty() {
             true => Path::new("."),
@@ -65,7 +65,7 @@ fn entries(folder: &Path, most: usize) -> Vec<PathBuf> {
     names
 }
 
-/// Returns a path with slashes, as scenarios have them on every system.
+/// Returns a path with slashes, as in scenarios on every system.
 fn name(path: &Path) -> Option<String> {
     let part = |part: Component<'_>| part.as_os_str().to_str().map(String::from);
     path.components().map(part).collect::<Option<Vec<_>>>().map(|parts| parts.join("/"))

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 /// The largest number of events kept; further ones are counted.
 const MOST_EVENTS: usize = 100_000;
-/// Events that are not kept are counted for so many cycles together.
+/// The number of cycles for which events that are not kept are counted together.
 const LOST_TOGETHER: Cycle = 1024;
 /// The largest number of events in a frame, the last ones.
 const MOST_IN_FRAME: usize = 100;

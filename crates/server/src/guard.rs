@@ -139,7 +139,7 @@ impl Guard {
     }
 }
 
-/// Returns a header that is there once, as text.
+/// Returns a header that occurs exactly once, as text.
 fn only<'a>(headers: &'a HeaderMap, name: &axum::http::HeaderName) -> Option<&'a str> {
     let mut values = headers.get_all(name).iter();
     let value = values.next()?.to_str().ok()?;

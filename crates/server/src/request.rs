@@ -7,7 +7,7 @@ use serde::Deserialize;
 /// it replaces, both as JSON.
 pub const MOST_REQUEST_BYTES: usize = 40 << 20;
 
-/// A request of which nothing but its number can be read.
+/// A request of which only the number can be read.
 #[derive(Deserialize)]
 struct Numbered {
     id: u32,

@@ -7,7 +7,7 @@ use sidestep_session::fleet::{FleetNow, NodeNow, Seen, Staged};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// A fleet as it is heard.
+/// A fleet as heard from its server.
 #[derive(Debug)]
 pub struct Screen {
     /// The endpoint by which it is named.

@@ -303,7 +303,7 @@ mod tests {
         let mut told = String::new();
         let mut inside: Vec<std::net::TcpStream> = Vec::new();
         while !told.starts_with("HTTP/1.1 503") {
-            // They keep their places for a while, and are ended then.
+            // They keep their places for a while, and are then ended.
             inside.clear();
             inside.extend((0..128).map(|_| connect(address)));
             told = ask(connect(address));

@@ -24,7 +24,7 @@ const MOST_BACKLOG: usize = 64;
 const LONG_BYTES: usize = 1 << 20;
 /// The bytes of unanswered long requests beyond which others wait in the network.
 const MOST_LONG_BYTES: usize = 64 << 20;
-/// Requests per second, over a while.
+/// Sustained number of requests per second.
 const REQUESTS_PER_S: f64 = 300.0;
 /// The number of requests that may come at once.
 const REQUESTS_AT_ONCE: f64 = 600.0;

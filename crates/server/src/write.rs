@@ -60,7 +60,7 @@ impl Files {
     }
 }
 
-/// Returns the path without links of a file that is there, or that can be made.
+/// Returns the path without links of a file that exists, or that can be created.
 fn real(path: &Path) -> Option<PathBuf> {
     // A link to nowhere could be made to lead anywhere.
     if path.is_symlink() || path.exists() {

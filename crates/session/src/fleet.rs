@@ -190,11 +190,11 @@ pub struct Tls {
 pub enum Told {
     /// It listens at these endpoints.
     Listens(Vec<String>),
-    /// The fleet as it is now.
+    /// The present state of the fleet.
     Fleet(FleetNow),
     /// The scenery for watchers: everything that stays the same.
     Scene(Box<Staged>),
-    /// The world and the fleet as they are now, for watchers.
+    /// The present state of the world and of the fleet, for watchers.
     Seen(Box<Seen>),
     /// The fleet has come to its end, or was stopped.
     Ended {
@@ -202,7 +202,7 @@ pub enum Told {
         summary: serde_json::Value,
         /// The world's own results as text.
         outcome: Lines,
-        /// The fleet as it was at the end.
+        /// The state of the fleet at the end.
         fleet: FleetNow,
     },
     /// It could not do its job.

@@ -275,7 +275,7 @@ impl Journey {
     }
 
     /// Drives the run to cycle `until`, or until the watcher asks to stop; [`Self::finish`] stores the rest.
-    /// Frames for viewers start anew with every call.
+    /// Frames for viewers start again with every call.
     ///
     /// # Errors
     /// When something cannot be stored; a bug of the simulation.
@@ -390,7 +390,7 @@ fn store(
     Ok(())
 }
 
-/// Drives the run; the error of a bug describes how to replay it.
+/// Drives the run; the error of a bug contains the facts to replay it.
 fn drive_guarded(
     run: &mut dyn Simulation,
     until: Cycle,
@@ -409,7 +409,7 @@ fn broken_by(error: Error, run: &dyn Simulation, recording: Option<&Recording>) 
     }
 }
 
-/// Returns words for replaying a run up to the cycle at which it failed.
+/// Returns the facts for replaying a run up to the cycle at which it failed.
 fn whereabouts(run: &dyn Simulation) -> String {
     let plan = run.plan();
     let (cycle, version) = (run.cycle(), VERSION);

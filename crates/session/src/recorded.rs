@@ -74,7 +74,7 @@ pub(crate) fn has_rows(folder: &Path, table: &str) -> bool {
     })
 }
 
-/// Returns the content of `summary.json`, which a run writes at its end, if it is there.
+/// Returns the content of `summary.json`, which a run writes at its end, if it exists.
 ///
 /// # Errors
 /// Text that is not JSON.

@@ -11,7 +11,7 @@ pub(super) struct World {
     pub(super) seed: u64,
     /// `None` for one that broke off, or never started.
     pub(super) run: Option<Box<dyn Simulation>>,
-    /// Its error, until the caller is told.
+    /// Its error, until it is returned to the caller.
     pub(super) error: Option<BatchError>,
     /// Observations of its agents, for the caller to take.
     room: Vec<Cells>,
@@ -59,7 +59,7 @@ impl World {
         }
     }
 
-    /// Starts the world anew; it stays as it is where that fails.
+    /// Starts the world again; it stays the same if that fails.
     pub(super) fn restart(
         &mut self,
         index: usize,

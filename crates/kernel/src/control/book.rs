@@ -8,7 +8,7 @@ use std::ops::Range;
 /// Name of the table of orders.
 pub(super) const ORDERS: &str = "orders";
 
-/// One value of an order, as it is recorded.
+/// One value of an order, as recorded.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OrderRow {
     pub(crate) cycle: Cycle,

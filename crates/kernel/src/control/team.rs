@@ -5,7 +5,7 @@ use super::space::{CellsMut, Space};
 use crate::units::EntityId;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Agents that observe, and are ordered, alike.
+/// Agents with the same observations and orders.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Team {
     /// Name, by which a caller knows it: the kind of its agents, and a number where there are several.

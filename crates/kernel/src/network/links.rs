@@ -101,7 +101,7 @@ impl Bursts {
     /// Returns whether a link is in a burst at a time.
     ///
     /// In each step of the chain its state is drawn anew with a certain probability, and otherwise
-    /// stays as it is. That is the chain with the given mean times, and its state at any time
+    /// stays the same. That is the chain with the given mean times, and its state at any time
     /// follows from the draws of a few steps before it.
     pub(super) fn is_on(&self, draws: &FaultStreams, link: [EntityId; 2], at_s: f64) -> bool {
         let step_s = self.lasts_s.min(self.every_s) / STEPS_PER_MEAN;

@@ -91,7 +91,7 @@ pub struct Mark {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
-    /// The truth that is there to be perceived.
+    /// The truth to be perceived.
     True,
     /// The percept.
     Reported,
@@ -239,7 +239,7 @@ impl Value {
         Self::Number { value, unit }
     }
 
-    /// Creates a number of meters; infinity is none.
+    /// Creates a number of meters; infinity becomes [`Value::None`].
     pub fn meters(value: f64) -> Self {
         if value.is_finite() { Self::number(value, "m") } else { Self::None }
     }

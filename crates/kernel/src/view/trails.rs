@@ -203,7 +203,7 @@ mod tests {
         }
     }
 
-    /// A robot of two boxes that slips north while it goes east, until a cycle.
+    /// The trails of a robot of two boxes that slips north while it goes east, until a cycle.
     fn trails(until: Cycle) -> Option<Vec<Trail>> {
         let size_m = [1.0, 1.0, 0.5];
         let robot =

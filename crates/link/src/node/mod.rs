@@ -76,7 +76,7 @@ pub struct Node {
     /// The part of a cycle that was logged last.
     part: (Cycle, &'static str),
     report_at: Instant,
-    /// Time before which no link is opened anew.
+    /// Time before which no link is opened again.
     mend_at: Instant,
     /// Whether its links are closed, and could not be opened.
     is_cut_off: bool,
@@ -284,7 +284,7 @@ impl Node {
         self.mend_links(now);
     }
 
-    /// Opens the direct links anew when one of them is deaf: alive at both ends, and nothing comes through. Zenoh
+    /// Opens the direct links again when one of them is deaf: alive at both ends, and nothing comes through. Zenoh
     /// leaves such links behind where opening one took as long as it may, and on a busy machine that is not rare.
     fn mend_links(&mut self, now: Instant) {
         // Of two, the one with the higher id has opened the link.

@@ -1,4 +1,4 @@
-//! One cycle of an agent at its node: packets out and in, until its control is there.
+//! One cycle of an agent at its node: packets out and in, until its control is ready.
 
 use crate::mail::Mail;
 use crate::ports::{Arrival, Channel, Outgoing, Program, Sent};
@@ -15,7 +15,7 @@ enum Time {
     Still,
     /// Ticks that the server counts.
     Counted,
-    /// A clock that runs so many times as fast as the real one.
+    /// A clock that runs this many times as fast as the real one.
     Running(f64),
 }
 
@@ -127,7 +127,7 @@ impl Turn {
         self.arrived.entry(arrives).or_default().push((from, packet));
     }
 
-    /// Returns how long the node may wait, unless something comes; none if that may be forever.
+    /// Returns the time that the node may wait, unless something comes; none if that may be forever.
     pub(super) fn wait(&self, program: &dyn Program) -> Option<Duration> {
         let Time::Running(speed) = self.time else { return None };
         let leaves = self.leaving.keys().next().map(|&(at, ..)| at);

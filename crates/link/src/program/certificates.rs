@@ -17,7 +17,7 @@ pub(super) fn check_all<'a>(
     check_endpoints(endpoints, tls)
 }
 
-/// Checks that the files are there, and are certificates that hold today.
+/// Checks that the files exist, and are certificates that are valid today.
 ///
 /// # Errors
 /// With the first that is not.

@@ -233,7 +233,7 @@ impl<'a> Captain<'a> {
         };
     }
 
-    /// Returns the present state of a node, so many seconds after the last look.
+    /// Returns the present state of a node, a number of seconds after the last look.
     fn node(
         &mut self,
         fleet: &Look<'_>,

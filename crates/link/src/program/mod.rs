@@ -3,7 +3,7 @@
 //! ```text
 //! fleet.rs   the server of a world, and nodes that it starts    crew.rs     processes of nodes
 //! node.rs    one node                                           lifeline.rs the end of the parent process
-//! told.rs    lines that are told                                metrics.rs  Prometheus' text
+//! told.rs    lines for the parent process                       metrics.rs  Prometheus' text
 //! log.rs     logs to standard error                             scenario.rs the scenario they fly
 //! packets.rs the table of all packets                           certificates.rs whether they hold
 //! shown.rs   the view of a fleet                                watch.rs    the watcher of one

@@ -60,7 +60,7 @@ pub enum Broken {
     /// A node is gone, and lockstep does not go on without it.
     #[error("the node of {agent} is gone in cycle {cycle}: {reason}")]
     Gone {
-        /// Its agent, as people call it.
+        /// Its agent, by its name for people.
         agent: String,
         /// The cycle.
         cycle: Cycle,

@@ -51,7 +51,7 @@ impl Server<'_> {
         }
     }
 
-    /// Returns why a node may not join, in a word and at length; none if it may.
+    /// Returns the reason why a node may not join, in one word and in detail; none if it may.
     fn refusal(&self, agent: EntityId, life: Life, join: &Join) -> Option<(&'static str, Refusal)> {
         let refused = |word, cause: String, remedy: &str| {
             Some((word, Refusal { cause, remedy: remedy.into() }))

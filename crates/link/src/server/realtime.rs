@@ -14,7 +14,7 @@ const LATE_PART: f64 = 0.1;
 const SHORTEST: Duration = Duration::from_millis(1);
 
 impl Server<'_> {
-    /// Flies the world to its end, so many times as fast as in the scenario.
+    /// Flies the world to its end, `speed` times as fast as in the scenario.
     ///
     /// # Errors
     /// When the world cannot go on, or the fleet is asked to end.

@@ -43,7 +43,7 @@ pub trait Wire: Send {
         false
     }
 
-    /// Closes the direct links to all other nodes, and opens them anew.
+    /// Closes the direct links to all other nodes, and opens them again.
     ///
     /// # Errors
     /// When an endpoint cannot be taken again: there are no direct links then, and it can be tried once more.

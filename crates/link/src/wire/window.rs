@@ -142,7 +142,7 @@ impl Outlook {
         self.ask(SCENE)
     }
 
-    /// Asks for a view newer than one with a number: nothing where there is none. `None` when there is no answer.
+    /// Asks for a view newer than the one with a number: empty if there is none. `None` when there is no answer.
     pub fn view(&self, after: u64) -> Option<String> {
         self.ask(&format!("{VIEW}?after={after}"))
     }

@@ -138,7 +138,7 @@ struct Line {
     session: Session,
 }
 
-/// The bits of a session's name that identify its node: the other bits count how often that node has opened it.
+/// The bits of a session's name that identify its node: the other bits count the times that that node has opened it.
 const NAME: u128 = u128::MAX >> 32;
 
 /// Returns the name of a node in its present life.

@@ -1,4 +1,5 @@
-//! Chains of connectors that are nodes: they come out as in one process, and stand while one of them is missing.
+//! Chains of connectors that are nodes: they give the same results as in one process, and stand still while one of
+//! them is missing.
 
 use crate::input::refused;
 use crate::processes::{Program, folder, job, signal};
@@ -120,7 +121,7 @@ fn resumed(mut program: Program, out: &Path) {
     replay_all(&recorded, 1, &Unwatched).expect("computed again, to the same digest");
 }
 
-/// Checks that a fleet has waited for a node, said so, and gone on once it was there in another life.
+/// Checks that a fleet has waited for a node, said so, and gone on once it was back in another life.
 fn waits_and_goes_on(program: &Program, again: impl FnOnce()) {
     let waits = program.fleet("it is missed", |now| now.waits_for == ["0.2"]);
     assert_eq!((&*waits.nodes[2].state, &*waits.noun), ("gone", "connector"), "{waits:?}");

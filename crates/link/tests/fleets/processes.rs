@@ -141,7 +141,7 @@ pub(crate) fn folder(text: &str) -> tempfile::TempDir {
     folder
 }
 
-/// Returns whether a process is there, and is no zombie.
+/// Returns whether a process exists, and is no zombie.
 fn is_alive(process: u32) -> bool {
     let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
     stat.rsplit(')')

@@ -33,7 +33,7 @@ struct Plan {
     topology: Topology,
     /// Time since the beginning, airplane and fault, by rising time.
     faults: Vec<(Duration, EntityId, Fault)>,
-    /// Partitions and losses, as the scenario has them.
+    /// Partitions and losses, in the form of the scenario.
     network: String,
 }
 
@@ -91,7 +91,7 @@ impl Plan {
     }
 }
 
-/// Returns a network that loses some messages, and is parted now and then.
+/// Returns a network that loses some messages, and is partitioned now and then.
 fn network(seconds: u64, draw: impl Fn(u64) -> [u32; 4]) -> String {
     let mut partitions = Vec::new();
     let mut at = 60;
@@ -148,7 +148,7 @@ fn own_memory_kb(process: u32) -> Option<u64> {
     line.split_whitespace().nth(1)?.parse().ok()
 }
 
-/// Lets the faults happen, and returns the fleet as it is at the end of time.
+/// Lets the faults happen, and returns the fleet at the end of the time.
 fn fly(program: &Program, plan: &Plan, lasts: Duration) -> FleetNow {
     let mut faults = plan.faults.iter().peekable();
     let mut stopped: Vec<(Instant, u32)> = Vec::new();

@@ -107,7 +107,7 @@ impl Attendant for Nobody {
     }
 }
 
-/// The manner in which a fleet is flown in a test.
+/// The way in which a fleet is flown in a test.
 pub(crate) struct Way<'a> {
     pub(crate) clock: Clock,
     pub(crate) topology: Topology,

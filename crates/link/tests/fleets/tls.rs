@@ -15,7 +15,7 @@ fn openssl(folder: &Path, words: &str) -> bool {
     made.is_ok_and(|made| made.status.success())
 }
 
-/// Makes an authority, and a certificate of it that holds so many days for this machine.
+/// Makes an authority, and a certificate of it that is valid for a number of days on this machine.
 fn authority(folder: &Path, name: &str, days: i32) -> Option<Tls> {
     let ca = format!(
         "req -x509 {KEY} -keyout {name}-ca.key -out {name}-ca.pem -subj /CN={name}-ca -days 2"

@@ -67,7 +67,7 @@ fn value_of(line: &str) -> (String, BTreeMap<String, String>, f64) {
     (name.into(), labels, number.parse().unwrap_or_else(|_| panic!("no number: {line}")))
 }
 
-/// Reads Prometheus' text, line by line, as its format (0.0.4) is written.
+/// Reads Prometheus' text, line by line, by its format (0.0.4).
 fn families(text: &str) -> BTreeMap<String, Family> {
     let mut families: BTreeMap<String, Family> = BTreeMap::new();
     let mut present = String::new();

@@ -76,7 +76,7 @@ fn end_of_quoted(text: &str, quote: u8) -> usize {
     text.len()
 }
 
-/// Returns the places of the parts of the key that stands at a place of a text, which is TOML.
+/// Returns the places of the parts of the key at a place of a text, which must be TOML.
 pub(super) fn keys_at(text: &str, at: usize) -> Vec<std::ops::Range<usize>> {
     let mut found = Vec::new();
     let mut at = behind_blanks(text, at);

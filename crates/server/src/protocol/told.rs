@@ -146,7 +146,7 @@ pub struct Problem {
     pub column: Option<u32>,
     /// Line of its end, from 1.
     pub end_line: Option<u32>,
-    /// Column behind its end, from 1.
+    /// Column after its end, from 1.
     pub end_column: Option<u32>,
     /// Key of the scenario that is wrong, as `--set` names it: `robots.1.at.0`.
     pub key: Option<Box<str>>,

@@ -4,12 +4,12 @@ use super::Failed;
 use crate::protocol::Problem;
 use std::collections::BTreeMap;
 
-/// The fields behind the question mark of an address.
+/// The fields after the question mark of an address.
 #[derive(Debug, Default)]
 pub(super) struct Fields(BTreeMap<String, String>);
 
 impl Fields {
-    /// Reads fields as `encodeURIComponent` writes them.
+    /// Reads fields in the encoding of `encodeURIComponent`.
     pub(super) fn of(query: Option<&str>) -> Self {
         let parts = query.unwrap_or_default().split('&').filter_map(|part| part.split_once('='));
         Self(parts.filter_map(|(name, value)| Some((decoded(name)?, decoded(value)?))).collect())

@@ -131,10 +131,10 @@ impl Stage {
         Ok(Self { run, until, source, recorded: Some(recorded), means, seed, own, shown })
     }
 
-    /// Starts anew. Without a text it stays the same, also in its seed unless another is given.
+    /// Starts again. Without a text the scenario stays the same, including its seed unless another is given.
     ///
     /// # Errors
-    /// When the seed or the text is wrong; then everything stays as it is.
+    /// When the seed or the text is wrong; then everything stays the same.
     pub(crate) fn restart(
         &mut self,
         seed: Option<u64>,

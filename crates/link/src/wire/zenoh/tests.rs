@@ -274,7 +274,8 @@ fn until(mut is_so: impl FnMut() -> bool) {
     }
 }
 
-/// A link over which signs of life come and nothing else: Zenoh keeps it for good, and the wire sees it and opens it anew.
+/// A link over which signs of life come and nothing else: Zenoh keeps it for good, and the wire notices it and opens
+/// it again.
 #[test]
 fn a_link_that_lives_and_is_deaf_is_found_out_and_opened_anew() {
     let ([_hub, mut first, mut second], members) = two_in_a_mesh(deaf_at_first);

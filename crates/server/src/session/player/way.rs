@@ -8,7 +8,7 @@ use std::time::Instant;
 /// A way to a cycle that a page waits for.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Errand {
-    /// The request that is answered on arrival; none of a viewer's.
+    /// The request that is answered on arrival; none for a viewer's.
     pub(super) id: Option<u32>,
     pub(super) target: Cycle,
     /// The speed at which the run goes on from there.
