@@ -78,7 +78,7 @@ fn rounds(team: u32, rounds: usize) {
     println!("one round of a team of {team}, 500 B, all hear all: {}", percentiles(&times));
 }
 
-/// Returns words for times in rising order.
+/// Returns the percentiles of times in rising order, in words.
 fn percentiles(times: &[Duration]) -> String {
     let at = |part: f64| 1e3 * times[(part * (times.len() - 1) as f64) as usize].as_secs_f64();
     format!("p50 {:.2} ms, p99 {:.2} ms", at(0.5), at(0.99))

@@ -5,7 +5,7 @@
 //! party.rs     names of the parties                  post.rs   letters: numbered, acknowledged, repeated
 //! mail.rs      a party's letters and notes           words.rs  words that parties exchange
 //! deployed.rs  the interface of a world              ports.rs  the interface of an agent's program
-//! worlds.rs    the known worlds                    stage.rs  the run at the server
+//! worlds.rs    the known worlds                      stage.rs  the run at the server
 //! airspace.rs  airplanes and their pilots            chain.rs  connectors of chains and their agents
 //! faults.rs    the faults of a scenario's network    heard.rs  agents that an agent has heard
 //! program/   the process: job, logs, metrics, other processes

@@ -20,7 +20,7 @@ pub(crate) struct Chronicle {
     kept: Vec<Entry>,
     /// The first cycle not computed yet.
     frontier: Cycle,
-    /// Numbers of events that were not kept, and roughly when.
+    /// Numbers of events that were not kept, with their approximate cycles.
     lost: Vec<(Cycle, u64)>,
     /// The events since the last frame that was sent.
     fresh: Fresh,

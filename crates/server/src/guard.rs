@@ -93,7 +93,7 @@ impl Guard {
         }
     }
 
-    /// Checks that a request for something that costs work comes from our own page, also where it has no `Origin`:
+    /// Checks that a request for something that costs work comes from our own page, even if it has no `Origin`:
     /// a foreign page may make a browser fetch an address, though it never sees the answer.
     ///
     /// # Errors

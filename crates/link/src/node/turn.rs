@@ -232,7 +232,7 @@ impl Turn {
     /// Sends a packet to each of its receivers, with the faults that happen to it.
     fn send(&mut self, packet: Outgoing, ends: &mut Ends<'_>, sent: &mut Vec<(EntityId, u64)>) {
         let bytes = packet.payload.len();
-        // In real time the number is the sender's in the whole cycle, as all draws are for its first tick.
+        // In real time packets are numbered within the whole cycle, because all draws are for its first tick.
         let (tick, sequence) = match self.time {
             Time::Running(_) => (self.first_tick, self.sequence),
             _ => (self.tick, packet.sequence),

@@ -62,7 +62,7 @@ impl Packets {
     /// # Errors
     /// When they cannot be written.
     pub(super) fn add(&mut self, mut rows: Vec<Row>) -> Result<(), RecordError> {
-        // They come in the order in which nodes reported them.
+        // Nodes may have reported them in any order.
         rows.sort_unstable_by_key(|(sender, packet)| (packet.cycle, *sender, *packet));
         self.waiting.append(&mut rows);
         if self.waiting.len() < BLOCK {

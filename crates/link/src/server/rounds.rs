@@ -54,7 +54,7 @@ impl Server<'_> {
         self.note_absurd(absurd);
     }
 
-    /// Takes the control of an agent, if there is a valid one.
+    /// Takes the control of an agent, if there is one that counts.
     fn take_control(&mut self, agent: EntityId) -> Option<Vec<u8>> {
         let is_heeded = !self.is_gone(agent) || self.stage.world().heeds_lost();
         let seat = self.seats.get_mut(&agent)?;

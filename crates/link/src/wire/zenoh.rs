@@ -344,7 +344,7 @@ impl Wire for ZenohWire {
         let others = members.iter().map(|member| Party::Node(member.agent));
         self.others = others.filter(|&party| party != self.me).collect();
         self.others.sort_unstable();
-        // The session finds nodes that were away again.
+        // The session reconnects to returning nodes by itself.
         if self.listens.is_empty() || self.mesh.is_some() {
             return Ok(());
         }

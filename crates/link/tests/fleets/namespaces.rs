@@ -190,7 +190,7 @@ fn a_pulled_cable_costs_delay_and_no_separation_and_all_fly_on_afterwards() {
     });
 }
 
-/// The second machine hears the first one until that misses its answers.
+/// The second machine hears the first until the first misses its answers.
 #[test]
 fn a_cable_that_carries_one_way_costs_delay_and_no_separation_and_all_fly_on_afterwards() {
     let Some(machines) = Machines::new() else { return };

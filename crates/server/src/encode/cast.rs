@@ -1,4 +1,4 @@
-//! Casts: which bodies the columns of frames stand for.
+//! Casts: the bodies that the columns of frames stand for.
 
 use super::{CONDITIONS, plain};
 use crate::protocol::{Cast, Look, SessionId};

@@ -67,7 +67,7 @@ pub(super) fn look(body: &Body, dimensions: u8) -> Look {
     Look { color, opacity, layer }
 }
 
-/// Returns which body it is.
+/// Returns the name of a body.
 pub(crate) fn who(&(kind, number, part): &view::Who) -> Who {
     Who { kind: kind.name().into(), number, part }
 }

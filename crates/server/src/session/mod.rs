@@ -1,6 +1,6 @@
 //! Sessions: each is a thread of its own that owns a run, and takes requests by a channel.
 //!
-//! Nothing that comes from a socket waits for another socket, and no result depends on one: the thread alone decides
+//! Nothing that comes from a socket waits for another socket, and no result depends on one: the thread alone controls
 //! the computation, and its views go to an [`Outbox`], which never makes it wait.
 
 mod edit;
