@@ -1,8 +1,8 @@
 //! Puts the page into the program: `studio/` of the repository, built by npm, as a table of files.
 //!
 //! Without Node or `studio/` (as in a published package) the build succeeds, and the server has one plain page that
-//! says how to get the real one. `SIDESTEP_PAGE=require` fails instead, `SIDESTEP_PAGE=skip` does not even try, and
-//! `SIDESTEP_PAGE_DIST=DIR` takes a page that was built before.
+//! explains how to get the real one. `SIDESTEP_PAGE=require` fails instead, `SIDESTEP_PAGE=skip` does not even try,
+//! and `SIDESTEP_PAGE_DIST=DIR` takes a page that was built before.
 
 use std::collections::hash_map::DefaultHasher;
 use std::fmt::Write;
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, io};
 
-/// Parts of `studio/` that the page is not made of.
+/// Parts of `studio/` that do not go into the page.
 const ASIDE: [&str; 6] =
     ["node_modules", "dist", "tests", "screenshots", "README.md", ".build-lock"];
 
@@ -56,7 +56,7 @@ fn built(studio: &Path, page: &Path) -> Result<PathBuf, String> {
     if npm().arg("--version").output().is_err() {
         return Err("npm was not there when it was built".into());
     }
-    // Several cargo processes may be at it, such as an editor's.
+    // Several cargo processes may build at once, such as an editor's.
     let lock = File::create(studio.join(".build-lock")).map_err(|e| e.to_string())?;
     lock.lock().map_err(|e| e.to_string())?;
     let made = install(studio).and_then(|()| {
@@ -69,7 +69,7 @@ fn built(studio: &Path, page: &Path) -> Result<PathBuf, String> {
     Ok(page.to_path_buf())
 }
 
-/// Installs what the page is built with, unless it is there.
+/// Installs the tools that build the page, unless they are installed already.
 fn install(studio: &Path) -> Result<(), String> {
     let wanted = studio.join("package-lock.json");
     let changed = |path: &Path| path.metadata().and_then(|about| about.modified());
@@ -156,7 +156,7 @@ fn media(name: &str) -> &'static str {
     }
 }
 
-/// Writes the page that is there without the page.
+/// Writes the page served in place of the real one.
 fn write_plain(out: &Path, cause: &str) -> PathBuf {
     let cause = cause.replace('&', "&amp;").replace('<', "&lt;");
     let text = format!(

@@ -16,13 +16,13 @@ use std::path::PathBuf;
 
 /// An arm of a robot model (URDF): its joints from a base link to a tip link.
 ///
-/// Arm(urdf, *, base=None, tip=None, srdf=None, group=None): `base` is the root link and `tip` the end of the longest arm where
-/// they are not named; `group` takes both from the SRDF file, which also says which links may touch. Positions are in m in the
-/// frame of the base, angles in rad. It never changes, and threads may share it.
+/// Arm(urdf, *, base=None, tip=None, srdf=None, group=None): `base` is the root link and `tip` the end of the longest
+/// arm if they are not named; `group` takes both from the SRDF file, which also lists the links that may touch.
+/// Positions are in m in the frame of the base, angles in rad. It never changes, and threads may share it.
 ///
 /// Raises InputError when a file, a link or the group is wrong.
 ///
-/// Examples of its methods go on from here, in the root of a clone:
+/// Examples of its methods continue from here, in the root of a clone:
 ///
 /// >>> import sidestep
 /// >>> arm = sidestep.Arm("scenarios/chain/arm.urdf")
@@ -107,7 +107,7 @@ impl Arm {
         &self.0.chain.tip
     }
 
-    /// Names of the joints that have a value, from the base out.
+    /// Names of the joints that have a value, outward from the base.
     #[getter]
     fn joints(&self) -> Vec<&str> {
         self.0.chain.variables.iter().map(|v| v.name.as_str()).collect()
@@ -129,8 +129,8 @@ impl Arm {
         shaped(py, flat, vec![variables.len(), 2])
     }
 
-    /// The joint values of a named posture of the SRDF file; without a name each is as near to zero as its limits
-    /// allow.
+    /// The joint values of a named posture of the SRDF file; without a name, each value is as near to zero as its
+    /// limits allow.
     ///
     /// Raises InputError when there is no such posture.
     ///
@@ -150,7 +150,7 @@ impl Arm {
         format!("Arm({robot}, {} to {}, {} joints)", chain.base, chain.tip, chain.variables.len())
     }
 
-    /// Forward kinematics: what `sidestep.fk` stands on. Joint values of the shape (n, joints).
+    /// Forward kinematics: the native part of `sidestep.fk`. Joint values of the shape (n, joints).
     fn forward<'py>(
         &self,
         py: Python<'py>,
@@ -176,8 +176,8 @@ impl Arm {
         Ok(dict)
     }
 
-    /// Inverse kinematics: what `sidestep.ik` stands on. Targets of the shape (n, 3), (n, 6) with roll, pitch and yaw, or (n, 7)
-    /// with a quaternion x, y, z, w.
+    /// Inverse kinematics: the native part of `sidestep.ik`. Targets of the shape (n, 3), (n, 6) with roll, pitch and
+    /// yaw, or (n, 7) with a quaternion x, y, z, w.
     fn inverse<'py>(
         &self,
         py: Python<'py>,
@@ -234,7 +234,7 @@ struct Options {
 }
 
 impl Options {
-    /// Returns what all targets share, and remarks on the arm's body.
+    /// Returns the part of the goal that all targets share, and remarks on the arm's body.
     fn goal(&self, arm: &ChosenArm) -> PyResult<(ArmGoal, Vec<String>)> {
         let engine = match self.engine.as_str() {
             "auto" => Engine::Auto,

@@ -1,4 +1,4 @@
-//! Arrays: ids and values that come from Python, and columns of bodies that go there.
+//! Arrays: ids and values that come from Python, and columns of bodies that go to it.
 
 use crate::error;
 use crate::json::list;
@@ -9,7 +9,7 @@ use pyo3::types::{PyDict, PyList, PyString, PyTuple};
 use sidestep::kernel::EntityId;
 use sidestep::kernel::view::Body;
 
-/// An argument that is a whole number, of which Python has more than Rust.
+/// An argument that is a whole number, which may be larger in Python than in Rust.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Whole(pub(crate) u64);
 
@@ -27,7 +27,7 @@ impl FromPyObject<'_, '_> for Whole {
     }
 }
 
-/// Returns the ids of agents; truth values are no ids, though Python counts with them.
+/// Returns the ids of agents; truth values are no ids, although they are integers in Python.
 pub(crate) fn ids(py: Python<'_>, agents: &Bound<'_, PyAny>) -> PyResult<Vec<EntityId>> {
     let told = || {
         let words = "`agents` must be ids: whole numbers; of a mask, `team.agents[mask]`";
@@ -57,7 +57,7 @@ pub(crate) fn numbers(
     let array = py.import("numpy")?.call_method1("asarray", (values, float));
     let array = array.map_err(|e| told(format!("must be numbers: {}", e.value(py))))?;
     let array = array.cast::<PyArrayDyn<f64>>().map_err(|e| told(e.to_string()))?;
-    // An order that nobody knows is refused with the names of those that are known.
+    // An unknown order is refused with the names of the known ones.
     let Some(shape) = shape else { return Ok(array.to_vec().unwrap_or_default()) };
     let wanted: Vec<usize> = [agents].iter().chain(shape).copied().collect();
     if array.ndim() == 0 {
@@ -69,21 +69,21 @@ pub(crate) fn numbers(
         return Err(told(format!("needs an array of the shape {wanted}, not {has}")));
     }
     let array = array.readonly();
-    // Where they lie in a row they are copied at once.
+    // Contiguous values are copied at once.
     Ok(array
         .as_slice()
         .map_or_else(|_| array.as_array().iter().copied().collect(), <[f64]>::to_vec))
 }
 
-/// Returns a dict for each of `names`: the k-th one has the k-th cell of each column, by its name. It is what PettingZoo
-/// wants of observations, for which loops of Python take twice as long.
+/// Returns a dict for each of `names`: the k-th one has the k-th cell of each column, by its name. This is the form
+/// of observations in PettingZoo, for which loops in Python take twice as long.
 #[pyfunction]
 pub(crate) fn rows_by_name<'py>(
     py: Python<'py>,
     names: Vec<Bound<'py, PyString>>,
     columns: &Bound<'py, PyDict>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    // A copy of a dict with all keys has room for them; one that grows takes longer.
+    // A copy of a dict with all keys has room for them; a growing one takes longer.
     let empty = PyDict::new(py);
     let mut cells = Vec::with_capacity(columns.len());
     for (key, column) in columns {
@@ -101,7 +101,7 @@ pub(crate) fn rows_by_name<'py>(
     Ok(found)
 }
 
-/// Returns a number of each body.
+/// Returns a number for each body.
 pub(crate) fn column<'py, T: numpy::Element>(
     py: Python<'py>,
     bodies: &[Body],
@@ -110,7 +110,7 @@ pub(crate) fn column<'py, T: numpy::Element>(
     PyArray1::from_iter(py, bodies.iter().map(of))
 }
 
-/// Returns some numbers of each body, of the shape (bodies, N).
+/// Returns N numbers for each body, in an array of the shape (bodies, N).
 pub(crate) fn rows<'py, const N: usize>(
     py: Python<'py>,
     bodies: &[Body],
@@ -120,7 +120,7 @@ pub(crate) fn rows<'py, const N: usize>(
     PyArray1::from_vec(py, flat).reshape([bodies.len(), N])
 }
 
-/// Returns a word of each body.
+/// Returns a word for each body.
 pub(crate) fn texts<'py>(
     py: Python<'py>,
     bodies: &[Body],

@@ -19,19 +19,19 @@ const SLICE: Duration = Duration::from_millis(10);
 
 /// Largest number of worlds.
 const MOST_WORLDS: usize = 1 << 20;
-/// Largest number of workers, as of a sweep.
+/// Largest number of workers, as for a sweep.
 const MOST_WORKERS: usize = 1024;
 
-/// Many worlds of one scenario, each with a seed of its own, that step together.
+/// Many worlds of one scenario that step together, each with its own seed.
 ///
 /// Batch(scenario, worlds, *, workers=1, seeds=None): `scenario` is a Scenario, a path or a dict; `seeds` has one for each
 /// world, by default the scenario's and those that follow it. Arrays have a row for each world: (worlds, agents, ...).
-/// Each world has the bits of a `Simulation` with its seed, whatever the number of workers; nothing is recorded.
+/// Each world has the bits of a `Simulation` with its seed, for any number of workers; nothing is recorded.
 ///
 /// Python's lock is released while worlds advance, and Ctrl-C stops them between two cycles, all at the same one. A world that
-/// breaks off (which is a bug) is named, and the others go on once it has been reset.
+/// breaks off (which is a bug) is named in the error, and the others go on once it has been reset.
 ///
-/// Examples of its methods go on from here:
+/// Examples of its methods continue from here:
 ///
 /// >>> import sidestep
 /// >>> scenario = {"world": "robots", "map": {"ascii": "....."},
@@ -99,7 +99,7 @@ impl Batch {
     }
 }
 
-/// Returns a number of something.
+/// Returns a number of things, which must be at most `most`.
 fn within(name: &str, Whole(count): Whole, most: usize) -> PyResult<usize> {
     let count = usize::try_from(count).unwrap_or(usize::MAX);
     if (1..=most).contains(&count) {
@@ -132,7 +132,8 @@ fn told(error: &BatchError) -> PyErr {
     }
 }
 
-/// Returns the way to a world at its start: checkpoints are not made of it, so that all seeds share one text.
+/// Returns the function that makes a world at its start: no checkpoints are made of it, so that all seeds share one
+/// text.
 fn start(scenario: &Arc<Made>) -> PyResult<Arc<Start>> {
     let source = Source::new("scenario.toml", scenario.identity()?, "");
     let (own, scenario) = (scenario.compiled.plan().seed, Arc::clone(scenario));
@@ -192,7 +193,7 @@ impl Batch {
         self.workers
     }
 
-    /// The teams of each world: agents that observe, and are ordered, alike.
+    /// The teams of each world: agents with the same observations and orders.
     #[getter]
     fn teams<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         list(py, self.teams.iter().cloned().map(Team))
@@ -210,13 +211,13 @@ impl Batch {
         Ok(self.with(py, |batch| batch.cycles())?.to_pyarray(py))
     }
 
-    /// Returns whether nothing can happen anymore, of each world (bool).
+    /// Returns whether nothing can happen anymore, for each world (bool).
     #[getter]
     fn is_over<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
         Ok(self.with(py, |batch| batch.is_over())?.to_pyarray(py))
     }
 
-    /// Digest of the state of each world, in hexadecimal; orders that wait for the next step are not in it.
+    /// Digest of the state of each world, in hexadecimal; orders waiting for the next step are not in it.
     #[getter]
     fn digests(&self, py: Python<'_>) -> PyResult<Vec<String>> {
         self.with(py, |batch| batch.ask(|run| run.digest().to_string()))
@@ -231,10 +232,10 @@ impl Batch {
         to_python(py, &serde_json::Value::from(all))
     }
 
-    /// Orders something of all agents of a team (by number or name) in all worlds for the next step: an array of the shape
-    /// (worlds, agents, ...), or one number for all.
+    /// Gives an order to all agents of a team (by number or name) in all worlds for the next step: an array of the
+    /// shape (worlds, agents, ...), or one number for all.
     ///
-    /// Raises OrderError; nobody is ordered anything then.
+    /// Raises OrderError; no agent gets an order then.
     ///
     /// >>> batch.order("action", 0)
     #[pyo3(signature = (name, values, *, team=None))]
@@ -251,14 +252,14 @@ impl Batch {
             space.map(|space| [team.agents.len()].iter().chain(&space.shape).copied().collect());
         let values = match &shape {
             Some(shape) => numbers(py, name, values, self.worlds, Some(shape))?,
-            // Refused with the names of those that are known.
+            // An unknown order is refused with the names of the known ones.
             None => vec![0.0; self.worlds * team.agents.len()],
         };
         self.with(py, |batch| batch.order(number, name, values))
     }
 
-    /// Advances all worlds by `cycles` cycles (one if not said), or those for which `mask` (bool, one for each
-    /// world) is true; orders to the others are dropped. A world that is over stays as it is.
+    /// Advances all worlds by `cycles` cycles (one by default), or those for which `mask` (bool, one for each
+    /// world) is true; orders to the others are dropped. A world that is over stays the same.
     ///
     /// Raises ReplayError when a world breaks off; the others have advanced then.
     ///
@@ -284,8 +285,8 @@ impl Batch {
         }
     }
 
-    /// Returns what the agents of a team (by number or name) observe in all worlds before the next cycle: arrays by name, of the
-    /// shape (worlds, agents, ...). With `out`, arrays of an earlier call are written anew and returned.
+    /// Returns the observations of a team's agents (by number or name) in all worlds before the next cycle: arrays by
+    /// name, of the shape (worlds, agents, ...). With `out`, arrays of an earlier call are overwritten and returned.
     ///
     /// Raises OrderError when there is no such team, InputError when `out` has other arrays.
     ///
@@ -311,10 +312,10 @@ impl Batch {
         Ok(out)
     }
 
-    /// Starts worlds anew with these seeds, one for each world; with `mask` (bool, one for each world) only those for which
-    /// it is true. Orders that wait are dropped.
+    /// Restarts worlds with these seeds, one for each world; with `mask` (bool, one for each world) only those for
+    /// which it is true. Waiting orders are dropped.
     ///
-    /// Raises InputError when a world cannot start with its seed; it stays as it was then.
+    /// Raises InputError when a world cannot start with its seed; it then stays as it was.
     ///
     /// >>> batch.reset([8, 9, 10])
     /// >>> batch.seeds.tolist(), batch.cycles.tolist()

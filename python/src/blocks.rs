@@ -4,11 +4,11 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sidestep::kernel::Cycle;
 
-/// An iterator over the rows of a run, as `Simulation.blocks` makes it: each step advances the run, and gives the tables of
-/// these cycles by name.
+/// An iterator over the rows of a run, made by `Simulation.blocks`: each step advances the run, and gives the tables
+/// of these cycles by name.
 #[pyclass(module = "sidestep", frozen)]
 pub(crate) struct Blocks {
-    /// A simulation; it is asked as any caller in Python asks it.
+    /// The simulation, called as by any code in Python.
     pub(crate) simulation: Py<PyAny>,
     pub(crate) cycles: Cycle,
     pub(crate) until: Cycle,

@@ -18,7 +18,7 @@ use std::sync::{Mutex, PoisonError};
 /// The random streams of the players' samples.
 const SAMPLES: Purpose = Purpose(0);
 
-/// The settings of an optimization, as `sidestep.collectives.minimize` hands them over.
+/// The settings of an optimization, as passed by `sidestep.collectives.minimize`.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct Options {
@@ -95,17 +95,17 @@ impl Options {
 
     fn uniform(&self) -> impl Fn(usize, u64) -> f64 + use<> {
         let streams = Streams::new(Seed(self.seed));
-        // One pair of numbers for each player and draw, so that any of them comes without those before it.
+        // One pair of numbers for each player and draw, so that any of them can be drawn without those before it.
         move |player, k| streams.draws(player as u32, k, SAMPLES).uniform()
     }
 }
 
-/// Returns the error of an optimization that was interrupted: whoever interrupted it has raised another one before.
+/// Returns the error of an interrupted optimization: another exception has already been raised at the interrupt.
 fn interrupted() -> PyErr {
     wrong("minimize", "it was interrupted", "call it again")
 }
 
-/// Minimizes a sum over players and pairs: what `sidestep.collectives.minimize` stands on.
+/// Minimizes a sum over players and pairs: the native part of `sidestep.collectives.minimize`.
 #[pyfunction]
 pub(crate) fn minimize_pairs<'py>(
     py: Python<'py>,
@@ -143,7 +143,7 @@ pub(crate) fn minimize_pairs<'py>(
     told(py, &outcome, cost)
 }
 
-/// A game whose cost Python computes.
+/// A game with a cost that Python computes.
 struct Objective {
     strategies: Vec<usize>,
     cost: Py<PyAny>,
@@ -180,7 +180,7 @@ impl Game for Objective {
     }
 }
 
-/// Minimizes a cost that Python computes, by samples: what `sidestep.collectives.minimize` stands on.
+/// Minimizes a cost that Python computes, by samples: the native part of `sidestep.collectives.minimize`.
 #[pyfunction]
 pub(crate) fn minimize_objective<'py>(
     py: Python<'py>,

@@ -7,7 +7,7 @@ use sidestep::kernel::control::Team;
 use sidestep::kernel::{Cycle, Plan};
 use std::sync::Arc;
 
-/// A team, with its number before it.
+/// A team, preceded by its number.
 pub(crate) type Numbered = (usize, Arc<Team>);
 
 /// A run, as far as functions decide in it.
@@ -22,9 +22,9 @@ pub(crate) trait Deciding {
     fn team(&self, team: &Bound<'_, PyAny>) -> PyResult<Numbered>;
     /// Returns the teams that take orders, with their numbers.
     fn ordered_teams(&self) -> Vec<Numbered>;
-    /// Returns what a team observes.
+    /// Returns the observations of a team.
     fn observed<'py>(&self, py: Python<'py>, team: &Numbered) -> PyResult<Bound<'py, PyDict>>;
-    /// Orders something of all agents of a team.
+    /// Gives an order to all agents of a team.
     fn give(
         &self,
         py: Python<'_>,
@@ -42,7 +42,7 @@ struct Decider<'py> {
     decide: Bound<'py, PyAny>,
 }
 
-/// Advances a run to a cycle in which functions decide, and returns how many cycles were done.
+/// Advances a run to a cycle in which functions decide, and returns the number of cycles done.
 pub(crate) fn decided(
     py: Python<'_>,
     run: &impl Deciding,
@@ -56,7 +56,7 @@ pub(crate) fn decided(
     while run.now(py)? < until && !run.has_ended(py)? {
         for decider in &deciders {
             decider.order(py, run, &state).inspect_err(|raised| {
-                // Who reads the traceback learns where the run stands; nothing else depends on it.
+                // The traceback shows the cycle of the run; nothing else depends on it.
                 let _ = note(py, run, raised);
             })?;
         }
@@ -65,7 +65,7 @@ pub(crate) fn decided(
     Ok(run.now(py)? - from)
 }
 
-/// Adds to an exception of a function where the run stands, where Python can.
+/// Adds the cycle of the run to an exception of a function, in versions of Python that can do so.
 fn note(py: Python<'_>, run: &impl Deciding, raised: &PyErr) -> PyResult<()> {
     let (plan, cycle, version) = (run.plan(), run.now(py)?, sidestep::VERSION);
     let words = format!(
@@ -96,7 +96,7 @@ fn deciders<'py>(run: &impl Deciding, decide: &Bound<'py, PyAny>) -> PyResult<Ve
 }
 
 impl<'py> Decider<'py> {
-    /// Returns who decides for a team: the function, or what it returns of that team if it makes one for each.
+    /// Returns the decider of a team: the function, or its result for that team if it makes a function for each.
     fn new(team: Numbered, decide: &Bound<'py, PyAny>) -> PyResult<Self> {
         let decide = match decide.getattr_opt("of_team")? {
             Some(of_team) => of_team.call1((crate::space::Team(Arc::clone(&team.1)),))?,
@@ -111,7 +111,7 @@ impl<'py> Decider<'py> {
         let decided = self.decide.call1((observed, state))?;
         let (_, team) = &self.team;
         if decided.is_none() {
-            // Far more often a forgotten `return` than a decision.
+            // This is far more often a forgotten `return` than a decision.
             let words = format!(
                 "the function that decides for team `{}` returned None; return its orders, {{}} for none",
                 team.name

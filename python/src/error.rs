@@ -27,7 +27,7 @@ pub(crate) fn input(error: &kernel::InputError) -> PyErr {
     ))
 }
 
-/// Returns the exception of input that came as a dict: its text was made from it, so the error names the
+/// Returns the exception of input that came as a dict: its text was made from the dict, so the error names the
 /// key and no line.
 pub(crate) fn input_of_dict(error: &kernel::InputError) -> PyErr {
     let place = error.key().unwrap_or(error.place()).to_string();

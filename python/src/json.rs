@@ -1,4 +1,4 @@
-//! Values of other sorts as Python's own.
+//! Values of other kinds as values of Python.
 
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;

@@ -12,7 +12,7 @@ use sidestep::learn::sensor::{self, SensorModel, SensorOptions};
 use sidestep_session::csv_table;
 use std::path::PathBuf;
 
-/// An error model that was learned: its counts, probabilities with intervals, and its form in a profile.
+/// A learned error model: its counts, probabilities with intervals, and its form in a profile.
 #[pyclass(module = "sidestep", frozen)]
 pub(crate) struct Learned(Model);
 
@@ -23,7 +23,7 @@ enum Model {
 
 #[pymethods]
 impl Learned {
-    /// Returns whether it is a sensor or an effector.
+    /// The kind of the device: a sensor or an effector.
     #[getter]
     fn kind(&self) -> &'static str {
         match self.0 {
@@ -32,8 +32,8 @@ impl Learned {
         }
     }
 
-    /// Everything that `sidestep learn --json` prints: counts, probabilities with their counts and 95 % intervals, thin rows,
-    /// tests of the fit on events held out, warnings.
+    /// All the output of `sidestep learn --json`: counts, probabilities with their counts and 95 % intervals, thin
+    /// rows, tests of the fit on events held out, warnings.
     #[getter]
     fn report(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let value = match &self.0 {
@@ -72,7 +72,7 @@ impl Learned {
     }
 }
 
-/// Returns a table: the text of one, or that which a run recorded.
+/// Returns a table, from its text, or as recorded by a run.
 fn table(text: Option<&str>, run: Option<PathBuf>, name: &str) -> Result<CsvTable, InputError> {
     match (text, run) {
         (_, Some(run)) => csv_table(&run, name),
@@ -84,7 +84,7 @@ fn estimate((alpha, hold_out_every): (f64, usize)) -> EstimateOptions {
     EstimateOptions { alpha, hold_out_every, ..EstimateOptions::default() }
 }
 
-/// Learns an effector: what `sidestep.learn.effector` stands on.
+/// Learns an effector: the native part of `sidestep.learn.effector`.
 #[pyfunction]
 pub(crate) fn learn_effector(
     py: Python<'_>,
@@ -99,7 +99,7 @@ pub(crate) fn learn_effector(
     Ok(Learned(Model::Effector(Box::new(model))))
 }
 
-/// The shape of a sensor, as `sidestep.learn.sensor` hands it over.
+/// The shape of a sensor, as passed by `sidestep.learn.sensor`.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct Shape {
@@ -110,7 +110,7 @@ pub(crate) struct Shape {
     sensor: Option<String>,
 }
 
-/// Learns a sensor: what `sidestep.learn.sensor` stands on.
+/// Learns a sensor: the native part of `sidestep.learn.sensor`.
 #[pyfunction]
 pub(crate) fn learn_sensor(
     py: Python<'_>,

@@ -3,18 +3,18 @@
 //! ```text
 //! scenario.rs    a file, text or dict -> a compiled scenario
 //! simulation.rs  a run that Python advances, observes and orders
-//! blocks.rs      the rows of a long run          batch.rs       many worlds that step together
-//! space.rs       what goes in and out       decide.rs  functions in Python that decide
-//! table.rs       rows -> Arrow, NumPy       arrays.rs  ids, values and columns of bodies
+//! blocks.rs      the rows of a long run     batch.rs        many worlds that step together
+//! space.rs       spaces of numbers          decide.rs       functions in Python that decide
+//! table.rs       rows -> Arrow, NumPy       arrays.rs       ids, values and columns of bodies
 //! read.rs        folders -> tables
-//! sweep.rs       many runs, by threads or by others
-//! arm.rs         kinematics of arms         learn.rs   error models from tables
+//! sweep.rs       many runs, by threads or by a crew
+//! arm.rs         kinematics of arms         learn.rs        error models from tables
 //! stats.rs       intervals and pairs        collectives.rs  games of tables or of an objective
-//! json.rs        values of other sorts           notebook.rs    what cells of notebooks show
-//! error.rs       the exceptions             watch.rs   Ctrl-C
+//! json.rs        values of other kinds      notebook.rs     output of notebook cells
+//! error.rs       the exceptions             watch.rs        Ctrl-C
 //! ```
 //!
-//! It stands on the crate `session`, as the command does: the same scenario and seed give the same bits.
+//! It builds on the crate `session`, like the command: the same scenario and seed give the same bits.
 
 mod arm;
 mod arrays;

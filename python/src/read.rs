@@ -23,7 +23,7 @@ pub(crate) fn table_names(py: Python<'_>, folder: PathBuf) -> PyResult<Vec<Strin
     py.detach(|| tables_of(&folder)).map_err(|e| error::input(&e))
 }
 
-/// Returns the tables of a run folder or a sweep's folder by name, all of them or those that are named.
+/// Returns the tables of a run folder or a sweep's folder by name, all of them or the named ones.
 ///
 /// Raises InputError when there is no such folder or table, or a file is damaged.
 #[pyfunction]
@@ -49,7 +49,7 @@ pub(crate) fn read<'py>(
     Ok(dict)
 }
 
-/// Returns the tables of a sweep's folder: of the runs that are finished.
+/// Returns the tables of a sweep's folder, for the finished runs.
 fn read_folder<'py>(
     py: Python<'py>,
     folder: &Path,

@@ -12,16 +12,16 @@ use sidestep::worlds::WORLDS;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-/// Number of bodies up to which another seed takes less time than a thread that could be interrupted.
+/// Number of bodies up to which reseeding takes less time than starting an interruptible thread.
 const FEW_BODIES: usize = 100;
 
-/// A scenario that was read, checked and compiled. It never changes; simulations share it.
+/// A scenario, read, checked and compiled. It never changes; simulations share it.
 ///
 /// Scenario(scenario=None, *, text=None, base=None): a path (or a file of another program that the command reads,
-/// such as BlueSky's .scn), a dict with the keys of a scenario file, or `text`, which is one. Paths in a dict or text are
-/// relative to `base`, by default the present folder.
+/// such as BlueSky's .scn), a dict with the keys of a scenario file, or `text`, the content of one. Paths in a dict
+/// or text are relative to `base`, by default the present folder.
 ///
-/// Raises InputError, with the key that is wrong. Examples of its methods go on from here:
+/// Raises InputError, with the key that is wrong. Examples of its methods continue from here:
 ///
 /// >>> import sidestep
 /// >>> scenario = sidestep.Scenario({"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2}]})
@@ -34,10 +34,10 @@ pub(crate) struct Scenario(pub(crate) Arc<Made>);
 pub(crate) struct Made {
     pub(crate) compiled: Box<dyn Compiled>,
     text: Text,
-    /// Whether its text was made from a dict, so that its lines are nobody's.
+    /// Whether its text was made from a dict, so that users do not know its lines.
     is_dict: bool,
     resolved: OnceLock<Result<Resolved, InputError>>,
-    /// The resolved text without its seed, where it has one.
+    /// The resolved text without its seed, if it has one.
     seedless: OnceLock<Option<Seedless>>,
     /// Holds its files, if it was unpacked from a bundle.
     unpacked: Option<Arc<tempfile::TempDir>>,
@@ -45,15 +45,15 @@ pub(crate) struct Made {
 
 /// The text of a scenario.
 enum Text {
-    /// One that was read or written.
+    /// A text that was read or written.
     Own(Source),
-    /// Another scenario with this seed. It is written when somebody asks: to write a text anew takes longer than
-    /// to start a small world.
+    /// Another scenario with this seed. Its text is written on demand: writing it anew takes longer than starting a
+    /// small world.
     Reseeded { of: Arc<Made>, seed: u64, source: OnceLock<Result<Source, InputError>> },
 }
 
 impl Made {
-    /// Reads and compiles a scenario while other threads of Python go on; Ctrl-C ends that.
+    /// Reads and compiles a scenario while other threads of Python go on; Ctrl-C interrupts it.
     fn new(py: Python<'_>, source: Source, is_dict: bool) -> PyResult<Self> {
         let compiled = interruptible(py, || WORLDS.compile(&source))?;
         let compiled = compiled.map_err(|e| told(&e, is_dict))?;
@@ -83,7 +83,7 @@ impl Made {
         Ok(Self { unpacked, ..made })
     }
 
-    /// Returns its text and where that is from.
+    /// Returns its text with the origin of that.
     pub(crate) fn source(&self) -> PyResult<&Source> {
         self.own_source().map_err(|e| told(e, self.is_dict))
     }
@@ -101,7 +101,7 @@ impl Made {
         }
     }
 
-    /// Returns it with all its files, as run folders keep it; checkpoints belong to this text.
+    /// Returns the scenario with all its files, as kept in run folders; checkpoints belong to this text.
     pub(crate) fn resolved(&self) -> PyResult<&Resolved> {
         let resolve = || match self.own_source() {
             Ok(source) => self.compiled.resolve(source),
@@ -121,13 +121,14 @@ impl Made {
         Ok(self.resolved()?.text.clone())
     }
 
-    /// Returns the same scenario with another seed, compiled anew only where its world needs that.
+    /// Returns the same scenario with another seed, recompiled only if its world needs that.
     pub(crate) fn reseeded(self: &Arc<Self>, py: Python<'_>, seed: u64) -> PyResult<Self> {
         if i64::try_from(seed).is_err() {
             let remedy = "give at most 2^63 - 1: scenario files have no larger numbers";
             return Err(wrong("seed", format!("{seed} is too large"), remedy));
         }
-        // The text of a text is never looked for: who reseeds again and again keeps one scenario alive, and no chain of them.
+        // A reseeded text never refers to another reseeded one: repeated reseeding keeps one scenario alive, not a
+        // chain of them.
         let of = match &self.text {
             Text::Own(_) => self,
             Text::Reseeded { of, .. } => of,
@@ -177,7 +178,7 @@ fn unpack(files: &[(String, Vec<u8>)]) -> PyResult<tempfile::TempDir> {
     stored().map_err(failed)
 }
 
-/// Returns a scenario from whatever stands for one: a path, a dict, or a scenario.
+/// Returns a scenario from anything that represents one: a path, a dict, or a scenario.
 pub(crate) fn made(scenario: &Bound<'_, PyAny>) -> PyResult<Arc<Made>> {
     if let Ok(scenario) = scenario.cast::<Scenario>() {
         return Ok(Arc::clone(&scenario.get().0));
@@ -213,7 +214,7 @@ fn of_any(
     }
 }
 
-/// Returns the scenario of a dict; `format` may be left out there.
+/// Returns the scenario of a dict, in which `format` may be left out.
 fn of_dict(mapping: &Bound<'_, PyMapping>, base: &Path) -> PyResult<Source> {
     let mut table = table(mapping, "")?;
     table.entry("format").or_insert(toml::Value::Integer(1));
@@ -236,7 +237,7 @@ impl Scenario {
     }
 
     /// Returns the same scenario with other values: `set(seed=3)`, `set({"robots.0.count": 5})`. A dotted key goes by tables and
-    /// by the numbers of arrays, as `--set` of the command does.
+    /// by the numbers of arrays, like `--set` of the command.
     ///
     /// Raises InputError, with the key that is wrong.
     ///
@@ -260,7 +261,7 @@ impl Scenario {
         self.0.with(py, &overrides).map(|made| Self(Arc::new(made)))
     }
 
-    /// Returns what will surprise its author, the weightiest first: `key: words`.
+    /// Returns the surprises for its author, the weightiest first: `key: words`.
     ///
     /// >>> scenario.check()
     /// []
@@ -287,19 +288,19 @@ impl Scenario {
         self.0.compiled.plan().seed
     }
 
-    /// Number of cycles that it asks for.
+    /// Number of planned cycles.
     #[getter]
     fn cycles(&self) -> u64 {
         self.0.compiled.plan().cycles
     }
 
-    /// Number of bodies that are simulated.
+    /// Number of simulated bodies.
     #[getter]
     fn agents(&self) -> usize {
         self.0.compiled.bodies()
     }
 
-    /// The text of its file, with the values that were set.
+    /// The text of its file, with all values set.
     #[getter]
     fn text(&self) -> PyResult<&str> {
         Ok(&self.0.source()?.text)
@@ -318,7 +319,7 @@ impl Scenario {
         shown(slf.as_any(), "scenario")
     }
 
-    /// Pickled with all files that it names.
+    /// Pickles the scenario with all files that it names.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bundle)> {
         let maker = slf.py().import("sidestep._native")?.getattr("unpack_scenario")?;
         let Resolved { text, files } = slf.get().0.resolved()?.clone();
@@ -337,7 +338,7 @@ impl Scenario {
 /// A scenario's text, and its files by name.
 pub(crate) type Bundle = (String, Vec<(String, Vec<u8>)>);
 
-/// Returns the scenario that was pickled.
+/// Returns a pickled scenario.
 #[pyfunction]
 pub(crate) fn unpack_scenario(
     py: Python<'_>,

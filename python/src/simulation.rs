@@ -30,14 +30,15 @@ const NOTEBOOK_PX: u32 = 480;
 ///
 /// Simulation(scenario, *, seed=None, workers=1, record=False, out=None, replace=False): `scenario` is a Scenario, a path
 /// or a dict. With `record` the rows of all tables are kept in memory, or of those in a list of names (see the method `record`,
-/// and `tables` and `blocks`); with `out` they go to a run folder, as `sidestep run --out` writes it, and `close` completes it.
-/// Same scenario and seed, same bits: whatever the workers, as the command and the library.
+/// and `tables` and `blocks`); with `out` they go to a run folder, like that of `sidestep run --out`, and `close`
+/// completes it. The same scenario and seed give the same bits, with any number of workers, and the same as in the
+/// command and the library.
 ///
 /// It may be used from several threads, one at a time; Python's lock is released while it advances, and Ctrl-C stops it between
-/// two cycles. Handlers of signals may use it, too: they see it between two cycles. It can be pickled: its whole state goes along,
-/// but no rows.
+/// two cycles. Handlers of signals may use it, too: they see it between two cycles. It can be pickled: with its whole
+/// state, but without rows.
 ///
-/// Examples of its methods go on from here:
+/// Examples of its methods continue from here:
 ///
 /// >>> import sidestep
 /// >>> floor = {"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2, "behaviour": {"kind": "external"}}]}
@@ -50,7 +51,7 @@ const NOTEBOOK_PX: u32 = 480;
 pub(crate) struct Simulation {
     scenario: Arc<Made>,
     workers: usize,
-    /// Its teams, which never change: they are asked for in every cycle.
+    /// Its teams, which never change and are needed in every cycle.
     teams: Vec<Arc<control::Team>>,
     /// `None` when it is closed.
     journey: Mutex<Option<Journey>>,
@@ -70,7 +71,7 @@ impl Simulation {
             return Err(wrong("workers", "0 workers cannot simulate", "give 1 or more"));
         }
         let journey = py.detach(|| {
-            // Without a folder it is identified by the text that a folder would have: checkpoints fit both.
+            // Without a folder it is identified by the text that a folder would have, so that checkpoints fit both.
             let source = match keep.folder {
                 Some(_) => scenario.source()?.clone(),
                 None => Source::new("scenario.toml", scenario.identity()?, ""),
@@ -95,7 +96,7 @@ impl Simulation {
         })
     }
 
-    /// Reads something of the run.
+    /// Returns a value read from the run.
     fn ask<T: Send>(
         &self,
         py: Python<'_>,
@@ -111,8 +112,8 @@ impl Simulation {
 
     /// Advances to the goal, or to the end of the run, and returns the number of cycles done.
     ///
-    /// Signals are looked for between two slices, while nobody holds the run: their handlers are functions of Python
-    /// on this thread, and may ask the simulation whatever they like.
+    /// Signals are checked between two slices, while no code holds the run: their handlers are functions of Python on
+    /// this thread, and may call the simulation in any way.
     fn advance_towards(&self, py: Python<'_>, mut goal: Goal) -> PyResult<u64> {
         let mut done = 0;
         loop {
@@ -128,8 +129,8 @@ impl Simulation {
 
     /// Advances toward a goal for a little while.
     ///
-    /// The cycle is read by who then advances, with no other thread in between: of two threads that step at once, each
-    /// adds its own step.
+    /// The cycle is read and the run advanced under one lock, with no other thread in between: of two threads that
+    /// step at once, each adds its own step.
     fn slice(&self, py: Python<'_>, goal: Goal) -> PyResult<Slice> {
         py.detach(|| {
             let mut held = self.journey.lock().unwrap_or_else(PoisonError::into_inner);
@@ -137,7 +138,7 @@ impl Simulation {
             let from = journey.cycle();
             let until = goal.from(from);
             if let Err(error) = journey.advance_to(until, &ForAWhile::default()) {
-                // A run that broke off has no state that anybody can use.
+                // A run that broke off has no usable state.
                 *held = None;
                 return Err(error::session(&error));
             }
@@ -152,7 +153,7 @@ impl Simulation {
         named(&self.teams, team).map(|(number, team)| (number, Arc::clone(team)))
     }
 
-    /// Returns the team of an agent; the first one for an agent that is in none, whose order will be refused.
+    /// Returns the team of an agent; the first one for an agent that is in none: its order will be refused.
     fn team_of(&self, agent: Option<EntityId>) -> PyResult<Numbered> {
         let has = |team: &Arc<control::Team>| {
             agent.is_some_and(|id| team.agents.binary_search(&id).is_ok())
@@ -174,7 +175,7 @@ impl Simulation {
         written?.into_dict(py, team)
     }
 
-    /// Orders something of agents of a team.
+    /// Gives an order to agents of a team.
     fn ordered(
         &self,
         py: Python<'_>,
@@ -207,16 +208,16 @@ impl Simulation {
         })
     }
 
-    /// Returns the end that the scenario plans, or another one.
+    /// Returns the end: `until`, or else the one planned by the scenario.
     fn end(&self, until: Option<Cycle>) -> Cycle {
         until.unwrap_or_else(|| self.scenario.compiled.plan().cycles)
     }
 }
 
-/// The cycle that somebody advances to.
+/// The cycle to advance to.
 #[derive(Clone, Copy)]
 enum Goal {
-    /// So many cycles after the present one.
+    /// This many cycles after the present one.
     Further(u64),
     /// This one.
     Until(Cycle),
@@ -231,7 +232,7 @@ impl Goal {
         }
     }
 
-    /// Returns what is left of it once so many cycles are done.
+    /// Returns the remaining goal once a number of cycles are done.
     fn after(self, done: u64) -> Self {
         match self {
             Self::Further(cycles) => Self::Further(cycles - done),
@@ -261,7 +262,7 @@ fn tables(py: Python<'_>, rows: Vec<(TableSchema, Vec<Values>)>) -> PyResult<Bou
     Ok(dict)
 }
 
-/// The argument `record`: whether rows are kept, or those of which tables.
+/// The argument `record`: whether rows are kept, or the tables of the kept rows.
 pub(crate) struct Recorded(Option<Wanted>);
 
 impl FromPyObject<'_, '_> for Recorded {
@@ -313,8 +314,8 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// Advances by `cycles` cycles (one if not said), and returns how many were done: fewer when nothing can happen
-    /// anymore.
+    /// Advances by `cycles` cycles (one by default), and returns the number of cycles done: fewer when nothing can
+    /// happen anymore.
     ///
     /// >>> sim.step(), sim.step(5)
     /// (1, 5)
@@ -323,11 +324,11 @@ impl Simulation {
         self.advance_towards(py, Goal::Further(cycles.0))
     }
 
-    /// Advances to cycle `until`, by default the planned end, and returns how many cycles were done.
+    /// Advances to cycle `until`, by default the planned end, and returns the number of cycles done.
     ///
     /// With `decide`, a function or a dict of functions by team, agents are decided from outside: before each
-    /// cycle it is called with a dict of what all agents of a team observe (arrays of the shape (agents, ...)) and with `state`,
-    /// and returns their orders: a dict of arrays by name, or the array of the only or first order.
+    /// cycle it is called with a dict of the observations of all agents of a team (arrays of the shape (agents, ...))
+    /// and with `state`, and returns their orders: a dict of arrays by name, or the array of the only or first order.
     ///
     /// >>> def decide(observed, state):
     /// ...     return (observed["contact"] > 0).astype(int)        # left where it touched something, else forward
@@ -366,7 +367,7 @@ impl Simulation {
         self.ask(py, |run| run.cycle())
     }
 
-    /// Returns whether nothing can happen anymore, e.g. because everybody has arrived.
+    /// Returns whether nothing can happen anymore, e.g. because all have arrived.
     #[getter]
     fn is_over(&self, py: Python<'_>) -> PyResult<bool> {
         self.ask(py, |run| run.is_over())
@@ -378,7 +379,7 @@ impl Simulation {
         self.ask(py, |run| run.digest().to_string())
     }
 
-    /// Returns the measurements of the run so far, as the command's summary has them.
+    /// Returns the measurements of the run so far, as in the command's summary.
     ///
     /// >>> sim.metrics()["contacts"]
     /// 0
@@ -394,14 +395,15 @@ impl Simulation {
         to_python(py, &self.ask(py, |run| run.agent_metrics())?)
     }
 
-    /// The teams: agents that observe, and are ordered, alike.
+    /// The teams: agents with the same observations and orders.
     #[getter]
     fn teams<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         crate::json::list(py, self.teams.iter().cloned().map(Team))
     }
 
-    /// Returns what the agents of a team (by number or name) observe before the next cycle: arrays by name, of the shape (agents, ...),
-    /// in the order of `Team.agents`. It is what an agent of its own would perceive, errors and all.
+    /// Returns the observations of a team's agents (by number or name) before the next cycle: arrays by name, of the
+    /// shape (agents, ...), in the order of `Team.agents`. They are the percepts of an agent that decides for itself,
+    /// errors included.
     ///
     /// Raises OrderError when there is no such team.
     ///
@@ -417,11 +419,11 @@ impl Simulation {
         self.perceived(py, &team)
     }
 
-    /// Orders something of agents for the next cycle: `order("action", [0, 2])`. `values` has a row for each
+    /// Gives agents an order for the next cycle: `order("action", [0, 2])`. `values` has a row for each
     /// of `agents` (all of the team, by default), or is one number for all. An order stands until its agent has
     /// acted.
     ///
-    /// Raises OrderError; nobody is ordered anything then.
+    /// Raises OrderError; no agent gets an order then.
     ///
     /// >>> sim.order("action", [0, 1])
     /// >>> sim.order("action", 0, agents=[1])
@@ -443,7 +445,7 @@ impl Simulation {
         self.ordered(py, name, values, agents, &team)
     }
 
-    /// Returns the state as bytes, for `restore`; run folders of the same scenario hold the like.
+    /// Returns the state as bytes, for `restore`; run folders of the same scenario hold such checkpoints.
     ///
     /// >>> isinstance(sim.checkpoint(), bytes)
     /// True
@@ -451,12 +453,13 @@ impl Simulation {
         Ok(PyBytes::new(py, &self.saved(py)?))
     }
 
-    /// Goes on from a checkpoint of the same scenario. Rows that are kept in memory lose those of its cycle and of later ones:
-    /// `tables` gives what a run has that never went there. What `tables` gave before is yours.
+    /// Goes on from a checkpoint of the same scenario. Rows kept in memory lose those of its cycle and of later ones:
+    /// `tables` gives the rows of a run that never went there. Rows that `tables` has already given are up to you.
     ///
-    /// Raises CheckpointError when it is damaged, or belongs to another scenario or version. What is recorded has one past: it is
-    /// also raised where rows of earlier cycles are kept and this simulation did not make the checkpoint on its way, and where rows
-    /// go to a folder (`out`) and it is not the present state: restore it in a `copy`, or in a new Simulation without a folder.
+    /// Raises CheckpointError when it is damaged, or belongs to another scenario or version. Recorded rows have one
+    /// past: it is also raised if rows of earlier cycles are kept and this simulation did not make the checkpoint on
+    /// its way, and if rows go to a folder (`out`) and it is not the present state: restore it in a `copy`, or in a
+    /// new Simulation without a folder.
     ///
     /// >>> before = sim.checkpoint()
     /// >>> sim.step(5)
@@ -487,7 +490,7 @@ impl Simulation {
         self.copy(py)
     }
 
-    /// Pickled with its scenario, all files of it, and its state.
+    /// Pickles the simulation with its scenario, all files of that, and its state.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
         let (py, simulation) = (slf.py(), slf.get());
         let maker = py.import("sidestep._native")?.getattr("rebuild")?;
@@ -539,8 +542,8 @@ impl Simulation {
         rows.and_then(|(schema, columns)| Table::new(schema, columns))
     }
 
-    /// Returns what a body perceives and decides in the next cycle, and what will come of it, as a dict;
-    /// None where nothing is to tell. Looking changes nothing.
+    /// Returns the percepts and decisions of a body in the next cycle, and their outcome, as a dict; None if there is
+    /// nothing to show. Looking changes nothing.
     ///
     /// Raises InputError when there is no such kind.
     ///
@@ -572,7 +575,7 @@ impl Simulation {
     /// Keeps rows in memory from now on: those of all tables, or of these; with `frames=n` also the table `frames`, with all
     /// bodies at every n-th cycle. `tables` and `blocks` hand them over.
     ///
-    /// Raises InputError when there is no such table, rows are kept already, or they go to a folder.
+    /// Raises InputError when there is no such table, or rows are already kept or go to a folder.
     ///
     /// >>> sim = sidestep.Simulation(floor)
     /// >>> sim.record(["trajectories"], frames=5)
@@ -595,7 +598,7 @@ impl Simulation {
         self.with(py, |journey| journey.keep_rows(&wanted).map_err(|e| error::input(&e)))
     }
 
-    /// Takes the rows that were recorded since the last call: tables by name. Needs `record=True`, or `record` before.
+    /// Takes the rows recorded since the last call: tables by name. Needs `record=True`, or `record` before.
     ///
     /// Raises InputError when rows are not kept in memory.
     ///
@@ -615,7 +618,7 @@ impl Simulation {
     /// Runs on to cycle `until` (the planned end, by default) and hands the rows over as they come: an iterator that
     /// advances by `cycles` cycles at a time, and gives the tables of those, by name. So a run of any length takes the
     /// memory of one block. `decide` and `state` are those of `run`. Rows of all tables are kept from now on, unless
-    /// `record` has said which.
+    /// `record` has named some.
     ///
     /// >>> sim = sidestep.Simulation(floor)
     /// >>> for tables in sim.blocks(40, until=100):
@@ -643,14 +646,14 @@ impl Simulation {
             false => journey.keep_rows(&Wanted::default()).map_err(|e| error::input(&e)),
         })?;
         let until = simulation.end(until.map(|Whole(until)| until));
-        // What functions keep from cycle to cycle, they keep from block to block.
+        // Functions keep their state from block to block, as from cycle to cycle.
         let state = state.unwrap_or_else(|| PyDict::new(py).into_any().unbind());
         let simulation = slf.into_any().unbind();
         Ok(Blocks { simulation, cycles: cycles.0, until, decide, state })
     }
 
-    /// Ends the run. A run folder gets its summary and picture: it is complete at the planned end, and can be
-    /// resumed otherwise. Returns the summary as a dict; None if it was closed before.
+    /// Ends the run. A run folder gets its summary and picture: it is complete at the planned end, and otherwise can
+    /// be resumed. Returns the summary as a dict; None if it was closed before.
     ///
     /// Raises RecordError when something cannot be stored.
     ///
@@ -747,7 +750,7 @@ impl Deciding for Simulation {
 /// The arguments of [`rebuild`].
 type Pickled<'py> = (Bundle, usize, Bound<'py, PyBytes>);
 
-/// Returns the simulation that was pickled.
+/// Returns a pickled simulation.
 #[pyfunction]
 pub(crate) fn rebuild(
     py: Python<'_>,

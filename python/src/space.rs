@@ -1,4 +1,4 @@
-//! Teams of agents, and the spaces of the numbers that go in and out.
+//! Teams of agents, and the spaces of their observations and orders.
 
 use crate::error::{self, wrong};
 use crate::json::list;
@@ -90,7 +90,7 @@ impl Space {
     }
 }
 
-/// Agents that observe, and are ordered, alike.
+/// Agents with the same observations and orders.
 ///
 /// >>> import sidestep
 /// >>> floor = {"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2, "behaviour": {"kind": "external"}}]}
@@ -114,13 +114,13 @@ impl Team {
         self.0.agents.to_pyarray(py)
     }
 
-    /// The spaces of what they observe.
+    /// The spaces of their observations.
     #[getter]
     fn observed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         list(py, self.0.observed.iter().cloned().map(Space))
     }
 
-    /// The spaces of what may be ordered of them; empty for agents that decide for themselves.
+    /// The spaces of orders to them; empty for agents that decide for themselves.
     #[getter]
     fn ordered<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         list(py, self.0.ordered.iter().cloned().map(Space))
@@ -187,7 +187,7 @@ impl Buffer {
 }
 
 impl Room {
-    /// Returns room for what `team` observes.
+    /// Returns room for the observations of `team`.
     pub(crate) fn of(team: &control::Team) -> Self {
         let buffer = |space: &control::Space| {
             let n = team.agents.len() * space.width();
@@ -201,7 +201,7 @@ impl Room {
         self.0.iter_mut().map(Buffer::cells).collect()
     }
 
-    /// Returns what was written as arrays of the shape (agents, ...), by name.
+    /// Returns the written values as arrays of the shape (agents, ...), by name.
     pub(crate) fn into_dict<'py>(
         self,
         py: Python<'py>,
@@ -228,7 +228,7 @@ fn shaped<T: numpy::Element>(
     PyArray1::from_vec(py, values).reshape(shape)
 }
 
-/// Returns arrays for what a team observes in many worlds, by name.
+/// Returns arrays for the observations of a team in many worlds, by name.
 pub(crate) fn room<'py>(
     py: Python<'py>,
     team: &control::Team,
@@ -249,7 +249,7 @@ fn shape(space: &control::Space, team: &control::Team, worlds: usize) -> Vec<usi
     [worlds, team.agents.len()].iter().chain(&space.shape).copied().collect()
 }
 
-/// Arrays of a caller, to write the observations of many worlds into.
+/// Arrays of a caller for the observations of many worlds.
 pub(crate) struct Lent<'py>(Vec<Array<'py>>);
 
 enum Array<'py> {
@@ -310,7 +310,7 @@ fn writable<'py, T: numpy::Element>(
     fits.then(|| array.try_readwrite().ok())?
 }
 
-/// Returns a shape as Python writes it.
+/// Returns a shape in the notation of Python.
 fn words(shape: &[usize]) -> String {
     let numbers: Vec<_> = shape.iter().map(ToString::to_string).collect();
     format!("({})", numbers.join(", "))

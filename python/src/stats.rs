@@ -18,8 +18,8 @@ fn options(values: &Values<'_>) -> Vec<Option<f64>> {
     values.as_array().iter().map(|value| value.is_finite().then_some(*value)).collect()
 }
 
-/// Mean, standard deviation, Student's and the bootstrap's interval of the mean, the number of values and of those
-/// missing: what `sidestep.stats.mean` stands on.
+/// Mean, standard deviation, Student's and the bootstrap's interval of the mean, the number of values and of missing
+/// ones: the native part of `sidestep.stats.mean`.
 #[pyfunction]
 pub(crate) fn stats_mean(
     py: Python<'_>,
@@ -38,7 +38,7 @@ pub(crate) fn stats_mean(
     )
 }
 
-/// Wilson's and Clopper and Pearson's intervals of a share: what `sidestep.stats.share` stands on.
+/// Wilson's and Clopper and Pearson's intervals of a share: the native part of `sidestep.stats.share`.
 #[pyfunction]
 pub(crate) fn stats_share(successes: u64, n: u64) -> PyResult<((f64, f64), (f64, f64))> {
     if successes > n {
@@ -53,7 +53,8 @@ pub(crate) fn stats_share(successes: u64, n: u64) -> PyResult<((f64, f64), (f64,
     Ok((ends(wilson), ends(exact)))
 }
 
-/// A quantile, its interval by order statistics and the coverage of that: what `sidestep.stats.quantile` stands on.
+/// A quantile, its interval by order statistics and the coverage of that: the native part of
+/// `sidestep.stats.quantile`.
 #[pyfunction]
 pub(crate) fn stats_quantile(values: Values<'_>, q: f64) -> (Option<f64>, Ends, Option<f64>) {
     let sorted = Sample::of(options(&values)).sorted();
@@ -71,7 +72,7 @@ type Compared = (
     (Option<f64>, Ends),
 );
 
-/// Differences and ratios of pairs: what `sidestep.stats.paired` stands on.
+/// Differences and ratios of pairs: the native part of `sidestep.stats.paired`.
 #[pyfunction]
 pub(crate) fn stats_paired(py: Python<'_>, a: Values<'_>, b: Values<'_>) -> PyResult<Compared> {
     let (a, b) = (options(&a), options(&b));
@@ -95,13 +96,14 @@ pub(crate) fn stats_paired(py: Python<'_>, a: Values<'_>, b: Values<'_>) -> PyRe
     ))
 }
 
-/// P-values adjusted by Holm: what `sidestep.stats.holm` stands on.
+/// P-values adjusted by Holm: the native part of `sidestep.stats.holm`.
 #[pyfunction]
 pub(crate) fn stats_holm(p_values: Vec<Option<f64>>) -> Vec<Option<f64>> {
     statistics::holm(&p_values)
 }
 
-/// The rank correlation of two quantities with its interval and p-value: what `sidestep.stats.correlation` stands on.
+/// The rank correlation of two quantities with its interval and p-value: the native part of
+/// `sidestep.stats.correlation`.
 #[pyfunction]
 pub(crate) fn stats_correlation(a: Values<'_>, b: Values<'_>) -> Option<(f64, Ends, usize)> {
     let pair = |(a, b): (Option<f64>, Option<f64>)| Some((a?, b?));
@@ -111,8 +113,8 @@ pub(crate) fn stats_correlation(a: Values<'_>, b: Values<'_>) -> Option<(f64, En
     Some((found.value, found.interval.map(ends), pairs.len()))
 }
 
-/// The stopping rule: what `sidestep.stats.StoppingRule` stands on. Returns the number of runs, and why they are enough if
-/// they are.
+/// The stopping rule: the native part of `sidestep.stats.StoppingRule`. Returns the number of runs, and the reason if
+/// they are enough.
 #[pyfunction]
 pub(crate) fn stats_next(
     half_width: f64,

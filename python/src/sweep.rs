@@ -1,4 +1,4 @@
-//! Sweeps: the plan, the journal and the stopping rule of the command, with runs in threads or by others.
+//! Sweeps: the plan, the journal and the stopping rule of the command, with runs in threads or by a crew.
 
 use crate::error::{self, wrong};
 use crate::json::{to_python, to_toml};
@@ -26,7 +26,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The changes of a sweep, as `sidestep.sweep` hands them over.
+/// The changes of a sweep, as passed by `sidestep.sweep`.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct Options<'py> {
@@ -42,7 +42,7 @@ pub(crate) struct Options<'py> {
     record: bool,
 }
 
-/// A sweep that is asked for; the scenario that it was made of, if there is one, keeps its files.
+/// A requested sweep; the scenario from which it was made, if any, keeps its files.
 struct Asked {
     sweep: Sweep,
     _made: Option<Arc<Made>>,
@@ -106,7 +106,7 @@ impl Options<'_> {
     }
 }
 
-/// Returns the sweep of a sweep file, or of a dict of the same keys, or of a scenario of any sort.
+/// Returns the sweep of a sweep file, or of a dict of the same keys, or of a scenario in any form.
 fn of_any(of: &Bound<'_, PyAny>) -> PyResult<(Sweep, Option<Arc<Made>>)> {
     if let Ok(path) = of.extract::<PathBuf>() {
         return Ok((Sweep::read(&path).map_err(|e| error::input(&e))?, None));
@@ -168,19 +168,19 @@ fn came(plan: &Plan, folder: Option<&Folder>, done: &sweep::Done) -> Result<Came
     })
 }
 
-/// Others who run cells: a generator of Python that is driven from here.
+/// A crew that runs cells: a generator of Python that is driven from here.
 struct Others {
-    /// Called with the cells; gives a generator of wishes and outcomes.
+    /// Called with the cells; returns a generator of requests and outcomes.
     begin: Py<PyAny>,
     at_once: usize,
     raised: Mutex<Option<PyErr>>,
 }
 
-/// A cell as Python has it: its number, variant, replicate and seed.
+/// A cell in the form used in Python: its number, variant, replicate and seed.
 type AsTuple = (u64, u32, u32, u64);
 
 impl Others {
-    /// Drives the generator: what it yields is the number of a variant whose scenario it wants, or a list of outcomes.
+    /// Drives the generator: it yields the number of a variant to request its scenario, or a list of outcomes.
     fn drive(&self, py: Python<'_>, deal: &Deal<'_>, take: &mut Taken<'_>) -> PyResult<()> {
         let tuple = |cell: &Cell| (cell.id, cell.variant, cell.replicate, cell.seed);
         let cells: Vec<AsTuple> = deal.cells().iter().map(tuple).collect();
@@ -205,7 +205,7 @@ impl Others {
     }
 }
 
-/// Reads an outcome that was sent.
+/// Reads an outcome received as text.
 fn read(text: &str) -> PyResult<Outcome> {
     let told = |e: serde_json::Error| {
         let remedy = "install the same build of sidestep wherever tasks run";
@@ -218,7 +218,7 @@ impl Crew for Others {
     fn run(&self, deal: &Deal<'_>, take: &mut Taken<'_>) -> Result<(), Error> {
         Python::attach(|py| self.drive(py, deal, take)).map_err(|raised| {
             *self.raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(raised);
-            // Whoever called raises it; nothing between looks at the reason.
+            // The caller raises it; no code in between looks at the reason.
             Error::Interrupted
         })
     }
@@ -231,7 +231,7 @@ impl Crew for Others {
 /// Tables of results and of timings, and the summary.
 type Told<'py> = (Table, Table, Bound<'py, PyAny>);
 
-/// Runs a sweep on threads, all processors where `workers` is 0, or by a crew: what `sidestep.sweep` stands on.
+/// Runs a sweep on threads, all processors if `workers` is 0, or by a crew: the native part of `sidestep.sweep`.
 #[pyfunction]
 #[pyo3(signature = (sweep, options, out, workers, begin))]
 pub(crate) fn run_sweep<'py>(
@@ -257,7 +257,7 @@ pub(crate) fn run_sweep<'py>(
             came
         }
     };
-    // A run is interrupted by a signal alone, which is raised before.
+    // A run is interrupted only by a signal, which is raised before.
     let came = came.and_then(|came| came.ok_or(Error::Interrupted));
     let Came { results, timings, told, world } = came.map_err(|e| error::session(&e))?;
     let results = Table::of_runs("results", results, &world)?;
@@ -265,8 +265,8 @@ pub(crate) fn run_sweep<'py>(
     Ok((results, timings, to_python(py, &told)?.into_bound(py)))
 }
 
-/// Runs some cells of a sweep that another process drives, and returns their outcomes as JSON: what tasks of
-/// `sidestep.sweep` call wherever they run.
+/// Runs some cells of a sweep that another process drives, and returns their outcomes as JSON: the function that
+/// tasks of `sidestep.sweep` call, on any machine.
 ///
 /// Raises InputError when the sweep is of another build of sidestep.
 #[pyfunction]
@@ -292,7 +292,7 @@ pub(crate) fn run_task(
     outcomes.iter().map(text).collect()
 }
 
-/// Returns how far the sweep in a folder is: what `sidestep.sweep_status` stands on.
+/// Returns the state of the sweep in a folder: the native part of `sidestep.sweep_status`.
 ///
 /// Raises InputError when there is no sweep, or something in it cannot be read.
 #[pyfunction]
@@ -302,7 +302,7 @@ pub(crate) fn sweep_status(py: Python<'_>, folder: PathBuf) -> PyResult<Py<PyAny
     to_python(py, &serde_json::to_value(&status).unwrap_or_default())
 }
 
-/// Compares methods of collision avoidance on the same air traffic: what `sidestep.compare` stands on.
+/// Compares methods of collision avoidance on the same air traffic: the native part of `sidestep.compare`.
 #[pyfunction]
 pub(crate) fn compare_methods(
     py: Python<'_>,
@@ -340,7 +340,7 @@ pub(crate) fn compare_methods(
     to_python(py, &json!({ "name": compiled.name, "seed": span.0, "methods": results }))
 }
 
-/// Goes on unwinding, unless the interrupt explains it: then nobody looks at the results.
+/// Goes on unwinding, unless the interrupt explains it: then the results are not used.
 fn resume_unless<T>(
     payload: Box<dyn Any + Send>,
     interrupt: &Interrupt,

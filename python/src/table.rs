@@ -26,10 +26,10 @@ use sidestep::worlds::WORLDS;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Rows of one table: what a run records.
+/// Rows of one table that a run records.
 ///
 /// It has `__arrow_c_stream__`, so `polars.DataFrame(table)`, `pandas.DataFrame.from_arrow(table)`, `pyarrow.table(table)` and DuckDB take it
-/// without a copy of the numbers; `table["column"]` is a NumPy array. Examples of its methods go on from here:
+/// without a copy of the numbers; `table["column"]` is a NumPy array. Examples of its methods continue from here:
 ///
 /// >>> import sidestep
 /// >>> sim = sidestep.Simulation({"world": "robots", "map": {"ascii": "....."}, "robots": [{"count": 2}]}, record=True)
@@ -94,7 +94,7 @@ impl Table {
         self.schema.columns.iter().map(|column| column.name.as_str()).collect()
     }
 
-    /// Units by column; only of those that have one.
+    /// Units by column, for the columns that have one.
     #[getter]
     fn units<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
@@ -131,7 +131,7 @@ impl Table {
         values(py, self.batch.column(position), self.schema.columns[position].ty)
     }
 
-    /// Returns the same rows with these columns alone, in this order; nothing is copied.
+    /// Returns the same rows with only these columns, in this order; nothing is copied.
     ///
     /// Raises KeyError when there is no such column.
     ///
@@ -163,7 +163,7 @@ impl Table {
         shown(slf.as_any(), "table")
     }
 
-    /// Returns the first rows as tuples of Python's own values; None where one is missing.
+    /// Returns the first rows as tuples of Python values; None where one is missing.
     ///
     /// >>> [row[:2] for row in table.head(2)]
     /// [(0, 0), (1, 0)]
@@ -195,7 +195,7 @@ impl Table {
         py: Python<'py>,
         requested_schema: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyCapsule>> {
-        // The protocol allows to ignore it.
+        // The protocol allows ignoring it.
         let _ = requested_schema;
         let batches = vec![Ok::<_, ArrowError>(self.batch.clone())];
         let reader: Box<dyn RecordBatchReader + Send> =
@@ -274,7 +274,7 @@ where
     Arc::new(PrimitiveArray::<A>::new(ScalarBuffer::from(values), nulls))
 }
 
-/// Returns the cells of a column as Python's own values.
+/// Returns the cells of a column as Python values.
 fn plain<'py>(py: Python<'py>, array: &ArrayRef, ty: ColumnType) -> PyResult<Bound<'py, PyList>> {
     match ty {
         ColumnType::U32 => list(py, array.as_primitive::<UInt32Type>()),
@@ -300,7 +300,7 @@ fn values<'py>(py: Python<'py>, array: &ArrayRef, ty: ColumnType) -> PyResult<Bo
         ColumnType::I32 => to_numpy(array.as_primitive::<Int32Type>(), py, f64::from),
         ColumnType::I64 => to_numpy(array.as_primitive::<Int64Type>(), py, |value| value as f64),
         ColumnType::F64 => to_numpy(array.as_primitive::<Float64Type>(), py, |value| value),
-        // As objects, so that they can be compared and be a mask.
+        // As objects, so that they can be compared and used as a mask.
         ColumnType::Bool | ColumnType::Text | ColumnType::Label => {
             py.import("numpy")?.call_method1("array", (plain(py, array, ty)?, "O"))
         }

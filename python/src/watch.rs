@@ -1,4 +1,4 @@
-//! Ctrl-C: between two slices of a run, or while work goes on in other threads, Python is asked for signals.
+//! Ctrl-C: between two slices of a run, or while work goes on in other threads, Python is checked for signals.
 
 use pyo3::prelude::*;
 use sidestep::kernel::Interrupt;
@@ -8,22 +8,22 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Time after which a run is handed back, so that Python can be asked for signals: a fraction of what anybody notices.
+/// Time after which a run is handed back, so that Python can be checked for signals: too short for users to notice.
 const A_WHILE: Duration = Duration::from_millis(50);
 
-/// A watcher that stops a run between two cycles after a while. It asks Python nothing: whoever drives the run holds
-/// its lock, and a handler of a signal may want that.
+/// A watcher that stops a run between two cycles after a while. It does not call Python: the driver of the run holds
+/// its lock, and a signal handler may want that.
 #[derive(Debug, Default)]
 pub(crate) struct ForAWhile(OnceLock<Instant>);
 
 impl Watcher for ForAWhile {
     fn go_on(&self) -> bool {
-        // It is asked before the first cycle, too, which so is done in any case.
+        // It is also asked before the first cycle, which is therefore done in any case.
         self.0.get_or_init(Instant::now).elapsed() < A_WHILE
     }
 }
 
-/// A watcher that stops work when Python has a signal to handle. Whoever uses it holds no lock that a handler may want.
+/// A watcher that stops work when Python has a signal to handle. Its user must hold no lock that a handler may want.
 #[derive(Debug, Default)]
 pub(crate) struct Signals(Mutex<Option<PyErr>>);
 
@@ -37,7 +37,7 @@ impl Signals {
 
 impl Watcher for Signals {
     fn go_on(&self) -> bool {
-        // Python tells of a signal once.
+        // Python reports a signal once.
         let mut raised = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if raised.is_none() {
             *raised = Python::attach(|py| py.check_signals()).err();
@@ -49,13 +49,13 @@ impl Watcher for Signals {
         Python::attach(|py| {
             let text = std::ffi::CString::new(error.to_string()).unwrap_or_default();
             let category = py.get_type::<pyo3::exceptions::PyRuntimeWarning>();
-            // A warning that is turned into an exception stops nothing here.
+            // A warning turned into an exception stops nothing here.
             let _ = PyErr::warn(py, &category, &text, 1);
         });
     }
 }
 
-/// A watcher of work in other threads, which hear of no signals: the calling one looks for them.
+/// A watcher of work in other threads, which do not hear of signals: the calling one checks for them.
 #[derive(Debug, Default)]
 struct Attended {
     signals: Signals,
@@ -64,7 +64,8 @@ struct Attended {
 }
 
 impl Attended {
-    /// Asks Python for signals; the first stops the work at once, also within a cycle: what is half done is not kept.
+    /// Checks Python for signals; the first stops the work at once, even within a cycle: a half-done cycle is not
+    /// kept.
     fn look(&self) {
         if !self.signals.go_on() {
             self.is_over.store(true, Ordering::Relaxed);
@@ -87,7 +88,7 @@ impl Watcher for Attended {
     }
 }
 
-/// Does work that heeds an interrupt; `None` if that was raised.
+/// Does work that heeds an interrupt; returns `None` if that was raised.
 pub(crate) fn heeding<T>(interrupt: &Interrupt, work: impl FnOnce() -> T) -> Option<T> {
     let heeded = || {
         let _heeded = interrupt.heeded_here();
@@ -100,7 +101,7 @@ pub(crate) fn heeding<T>(interrupt: &Interrupt, work: impl FnOnce() -> T) -> Opt
     }
 }
 
-/// Does work on another thread that heeds an interrupt, while this one waits without Python's lock and looks for
+/// Does work on another thread that heeds an interrupt, while this one waits without Python's lock and checks for
 /// signals.
 ///
 /// # Errors
@@ -113,7 +114,7 @@ pub(crate) fn interruptible<T: Send>(
     Ok(done.expect("only a signal interrupts it, and that has raised its exception"))
 }
 
-/// Does work in other threads, while this one waits without Python's lock and looks for signals.
+/// Does work in other threads, while this one waits without Python's lock and checks for signals.
 ///
 /// # Errors
 /// The exception of a signal.

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! A world knows nothing of the others, so the number of workers changes no bit. One that breaks off is
-//! named; the others are whole.
+//! named in the error; the others are whole.
 
 mod error;
 mod world;
@@ -40,7 +40,7 @@ pub struct Batch {
 struct Shared {
     start: Arc<Start>,
     worlds: Vec<Mutex<World>>,
-    /// Whether a world may have an error, so that mostly none has to be asked.
+    /// Whether a world may have an error, so that usually none has to be asked.
     is_wrong: AtomicBool,
 }
 
@@ -86,7 +86,7 @@ impl Batch {
         self.shared.worlds.len()
     }
 
-    /// Number of workers: those that were asked for, at most one for each world.
+    /// Number of workers: as many as requested, but at most one for each world.
     pub fn workers(&self) -> usize {
         self.crew.workers()
     }
@@ -96,8 +96,8 @@ impl Batch {
         &self.teams
     }
 
-    /// Orders something of all agents of a team in all worlds before the next cycle: the values of one world after
-    /// the other, in each those of one agent after the other.
+    /// Gives an order to all agents of a team in all worlds before the next cycle: the values of one world after the
+    /// other, and within each world those of one agent after the other.
     ///
     /// # Errors
     /// When an order cannot be obeyed; nothing of it is noted then.
@@ -105,8 +105,8 @@ impl Batch {
         let Some(its) = self.teams.get(team) else { return Err(self.no_team(team).into()) };
         let width = values.len() / self.len();
         let first = self.world(0);
-        // All worlds have these teams, and what can be ordered depends on no state: one may answer for all,
-        // also one that broke off for want of an answer.
+        // All worlds have these teams, and the valid orders depend on no state: one world may answer for all; a
+        // broken one accepts them.
         let check = |(world, values)| {
             let orders = Orders { order, agents: &its.agents, values };
             let checked = first.run.as_ref().map_or(Ok(()), |run| run.check(&orders));
@@ -125,12 +125,12 @@ impl Batch {
         Ok(())
     }
 
-    /// Gives the orders that wait, and runs `cycles` cycles, of those worlds for which `mask` is true (all, without
-    /// one); orders to others are dropped. A world in which nothing can happen anymore stays as it is.
+    /// Gives the waiting orders, and runs `cycles` cycles, in the worlds for which `mask` is true (all, without
+    /// one); orders to others are dropped. A world in which nothing can happen anymore stays the same.
     ///
     /// # Errors
-    /// When a world had broken off before, and then nothing is done; or does so now, or cannot obey, and then
-    /// all others have done their cycles.
+    /// When a world had broken off before: nothing is done then. When it does so now, or cannot obey: all others have
+    /// done their cycles then.
     pub fn advance(&mut self, cycles: u64, mask: Option<&[bool]>) -> Result<(), BatchError> {
         self.check_count(mask.map(<[bool]>::len), "truth values")?;
         self.told()?;
@@ -169,8 +169,8 @@ impl Batch {
         self.check_room(team, &lengths, room)?;
         let n = self.len();
         let shared = Arc::clone(&self.shared);
-        // The calling thread writes where the caller wants it; the others write beside it, for they may outlive
-        // what the caller has lent, as far as the compiler knows.
+        // The calling thread writes into the caller's room; the others write beside it, because as far as the
+        // compiler knows they may outlive the borrowed room.
         let own = |index: usize| {
             let mut world = shared.world(index);
             let parts = &mut part(room, &lengths, index);
@@ -191,10 +191,10 @@ impl Batch {
         self.told()
     }
 
-    /// Starts worlds anew, those that have a seed here; orders that wait are dropped.
+    /// Starts anew the worlds that have a seed here; waiting orders are dropped.
     ///
     /// # Errors
-    /// When a world cannot start with its seed: it stays as it was then, and all others have started.
+    /// When a world cannot start with its seed: it then stays as it was, and all others have started.
     pub fn restart(&mut self, seeds: &[Option<u64>]) -> Result<(), BatchError> {
         self.check_count(Some(seeds.len()), "seeds")?;
         self.orders.clear();
@@ -204,7 +204,7 @@ impl Batch {
                 world.restart(index, seed, &*shared.start, Some(&teams));
             }
         });
-        // Those that were broken before, and are not among them, are none of this call's.
+        // Worlds that were broken before, and have no seed here, do not concern this call.
         let refused = self.first_error(|index, _| seeds[index].is_some());
         refused.map_or(Ok(()), Err)
     }
@@ -230,7 +230,7 @@ impl Batch {
         self.ask(|run| run.is_over())
     }
 
-    /// Returns the digest of each world; orders that wait are not in it.
+    /// Returns the digest of each world; waiting orders are not in it.
     ///
     /// # Errors
     /// When a world has broken off.
@@ -238,7 +238,7 @@ impl Batch {
         self.ask(|run| run.digest())
     }
 
-    /// Returns something of each world.
+    /// Returns the result of a function for each world.
     ///
     /// # Errors
     /// When a world has broken off.
@@ -254,7 +254,7 @@ impl Batch {
         self.shared.world(index)
     }
 
-    /// Does something in each world, on all workers.
+    /// Does some work in each world, on all workers.
     fn each(&mut self, work: impl Fn(&mut World, usize, &Shared) + Send + Sync + 'static) {
         let (n, shared) = (self.len(), Arc::clone(&self.shared));
         let work = Arc::new(move |k: usize| {
@@ -300,7 +300,7 @@ impl Batch {
         wrong.map_or(Ok(()), |found| Err(BatchError::Worlds { worlds, what, found }))
     }
 
-    /// Checks that there is room for exactly what a team observes in all worlds.
+    /// Checks that there is exactly the room that a team's observations in all worlds need.
     fn check_room(
         &self,
         team: usize,
@@ -330,7 +330,7 @@ impl std::fmt::Debug for Batch {
 }
 
 impl Shared {
-    /// A world that panicked has no run any more, so nothing that it left behind is read.
+    /// A world that panicked no longer has a run, so nothing that it left behind is read.
     fn world(&self, index: usize) -> MutexGuard<'_, World> {
         self.worlds[index].lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -343,7 +343,7 @@ impl Shared {
     }
 }
 
-/// Returns one world's part of the room of all.
+/// Returns one world's part of the room for all worlds.
 fn part<'a>(room: &'a mut [CellsMut<'_>], lengths: &[usize], index: usize) -> Vec<CellsMut<'a>> {
     let range = |length: usize| index * length..(index + 1) * length;
     let one = |(room, &length): (&'a mut CellsMut<'_>, &usize)| match room {

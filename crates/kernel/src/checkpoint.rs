@@ -1,4 +1,4 @@
-//! Checkpoints: a state as bytes that continue a run bit for bit, or an error that says why not.
+//! Checkpoints: a state as bytes that continue a run bit for bit, or an error that gives the reason.
 //!
 //! ```text
 //! magic 8 | header (postcard) | conflict groups, state (postcard) | BLAKE3 of all before, 16 bytes

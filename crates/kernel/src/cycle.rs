@@ -57,8 +57,8 @@ pub struct Mate<S> {
 pub struct Tally {
     /// Conflict groups seen.
     pub groups: GroupSizes,
-    /// Processor time of the worker's thread, in nanoseconds; where calls are of a single cycle, that of some of
-    /// them stands for all.
+    /// Processor time of the worker's thread, in nanoseconds; where calls are of a single cycle, only some are
+    /// measured and stand for all.
     pub cpu_ns: u64,
     /// Calls of a single cycle.
     single: u64,
@@ -67,14 +67,13 @@ pub struct Tally {
     pending: Vec<Slot>,
 }
 
-/// Calls of a single cycle that are all measured, and of how many later ones one is: to read the processor time
-/// is a system call, and small worlds that somebody orders from cycle to cycle take not much longer.
+/// The number of first calls of a single cycle that are all measured, and of later calls per measured one: reading
+/// the processor time is a system call, and small worlds that get orders from cycle to cycle take not much longer.
 const MEASURED_SINGLE: u64 = 64;
 const SINGLE_PER_MEASURED: u64 = 16;
 
 impl Tally {
-    /// Returns the number of calls for which the processor time of the one that comes stands; 0 for those that
-    /// are not measured.
+    /// Returns the number of calls for which the processor time of the next one stands; 0 if it is not measured.
     fn weight(&mut self, cycles: u64) -> u64 {
         if cycles > 1 {
             return 1;
@@ -98,9 +97,9 @@ impl<S> Mate<S> {
 /// The workers of an engine. A worker holds its lock while it works, so it never waits for one.
 pub(crate) type Crew<S> = [Mutex<Mate<S>>];
 
-/// Looks on between the cycles of a run, on the calling thread, while all workers wait.
+/// An onlooker between the cycles of a run, on the calling thread, while all workers wait.
 ///
-/// It sees the state and takes over the results of the workers, so that a caller who must look
+/// It sees the state and takes over the results of the workers, so that a caller that must look
 /// after every cycle (keep poses, gather events, ask whether the run is over) costs no thread and
 /// no system call per cycle. It cannot change the state.
 pub trait Observer<W: Phases> {

@@ -29,7 +29,8 @@ pub enum RowError {
     },
 }
 
-/// Returns a number with six digits behind the point at most: those that adding leaves behind tell nobody anything.
+/// Returns a number with at most six digits after the decimal point: the digits left over from adding are
+/// meaningless.
 fn short(value: f64) -> f64 {
     (1e6 * value).round() / 1e6
 }
@@ -96,7 +97,7 @@ impl Categorical {
             cumulated += p / sum;
             let threshold = (cumulated * (1u64 << 32) as f64).round() as u64;
             let before = thresholds.last().map_or(0, |&t| u64::from(t));
-            // An outcome whose threshold is not above the one before could never be drawn.
+            // An outcome with a threshold not above the one before could never be drawn.
             if p == 0.0 || threshold <= before {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! Runs a world for many cycles: the crew, the groups, and how many workers are worth it.
+//! Runs a world for many cycles: the crew, the groups, and the choice of the number of workers.
 //!
 //! A cycle that is too small to share out runs on one worker alone. The engine measures instead of
 //! guessing, see `Pace`. Results do not depend on its choice.
@@ -75,8 +75,8 @@ impl<W: Phases> Engine<W> {
         self.groups.heap_bytes()
     }
 
-    /// Runs `cycles` cycles from `from` on, for worlds that need no look in between: events carry
-    /// their cycle, and wait in the scratches.
+    /// Runs `cycles` cycles from `from` on, for worlds that need no observer in between: events
+    /// carry their cycle, and wait in the scratches.
     pub fn advance(
         &mut self,
         world: &W,
@@ -87,7 +87,7 @@ impl<W: Phases> Engine<W> {
         self.run(world, state, span, clock, None);
     }
 
-    /// Runs up to `cycles` cycles from `from` on, and returns how many: fewer where `observer`,
+    /// Runs up to `cycles` cycles from `from` on, and returns their number: fewer where `observer`,
     /// which is called between all cycles, has ended the run. One call with many cycles is cheaper
     /// than many calls, because every call starts the threads anew.
     pub fn advance_observed(
@@ -179,9 +179,9 @@ const NEWEST: f64 = 0.25;
 
 /// Decides by measurement whether one worker or all run the next stretch.
 ///
-/// It keeps to the faster of the two, its favorite, and looks at the other now and then. Whatever
-/// the other costs (with a barrier on processors that are busy with other work, a thousand times as
-/// much), looking takes at most 1 part in [`WAIT_PER_COST`] of the time: a look ends after
+/// It keeps to the faster of the two, its favorite, and looks at the other now and then. However
+/// costly the other is (with a barrier on processors that are busy with other work, a thousand
+/// times as much), looking takes at most 1 part in [`WAIT_PER_COST`] of the time: a look ends after
 /// [`LOOK_NS`] or [`LOOK_CYCLES`], and its own cost determines when the next is due. A look that
 /// finds nothing doubles the wait for the next, up to [`LONGEST_WAIT_NS`], so that a change is
 /// still noticed. Only a look can make all workers the favorite, so an old measurement never does;
@@ -309,7 +309,7 @@ mod tests {
 
     const SECOND_NS: u64 = 1_000_000_000;
 
-    /// A pace on a machine whose cycles take a known time.
+    /// A pace on a machine with cycles of a known duration.
     #[derive(Default)]
     struct Trial {
         pace: Pace,
@@ -457,7 +457,7 @@ mod tests {
         }
 
         fn bodies(&self, state: &Ticks) -> usize {
-            // Every worker asks once a cycle.
+            // Every worker calls it once a cycle.
             let is_helper = std::thread::current().name().is_some_and(|n| n.starts_with("worker"));
             self.clock.advance_ns(if is_helper { self.helper_ns } else { self.alone_ns });
             state.0.len()

@@ -1,7 +1,7 @@
-//! The one error for wrong input, whatever file or option it comes from.
+//! The one error for wrong input, from any file or option.
 //!
-//! Promise E1: no input panics the program. Every error says what was wrong, where, and what would
-//! be right; the command then ends with exit code 2 and has written nothing.
+//! Promise E1: no input panics the program. Every error gives the place, the cause and the remedy;
+//! the command then ends with exit code 2 and has written nothing.
 
 use std::fmt;
 use std::ops::Range;
@@ -25,7 +25,7 @@ pub struct InputError {
 struct Position {
     line: usize,
     column: usize,
-    /// Line and column behind the wrong part, where it is known.
+    /// Line and column after the wrong part, where it is known.
     end: Option<(usize, usize)>,
     /// The line itself, where the text is known.
     text: Option<String>,
@@ -95,7 +95,7 @@ impl InputError {
         self.position.as_ref().map(|p| (p.line, p.column))
     }
 
-    /// Line and column behind the wrong part, from 1, where known.
+    /// Line and column after the wrong part, from 1, where known.
     pub fn end(&self) -> Option<(usize, usize)> {
         self.position.as_ref()?.end
     }
@@ -105,12 +105,12 @@ impl InputError {
         self.key.as_deref()
     }
 
-    /// The cause: a sentence that says what is wrong.
+    /// The cause, in a sentence.
     pub fn cause(&self) -> &str {
         &self.cause
     }
 
-    /// The remedy: a sentence that says what would be right.
+    /// The remedy, in a sentence.
     pub fn remedy(&self) -> &str {
         &self.remedy
     }
@@ -141,7 +141,7 @@ impl fmt::Display for InputError {
 
 impl std::error::Error for InputError {}
 
-/// Returns the last start of a character that is not behind `offset`.
+/// Returns the last start of a character at or before `offset`.
 fn boundary(text: &str, offset: usize) -> usize {
     let mut offset = offset.min(text.len());
     while !text.is_char_boundary(offset) {

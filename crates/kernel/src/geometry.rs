@@ -60,7 +60,7 @@ pub fn norm2<const D: usize>(a: Point<D>) -> f64 {
     dot(a, a)
 }
 
-/// Distance of two points.
+/// Distance between two points.
 #[inline]
 pub fn distance<const D: usize>(a: Point<D>, b: Point<D>) -> f64 {
     norm(sub(a, b))

@@ -1,13 +1,13 @@
 //! A request to leave a cycle half done.
 //!
 //! A run stops in good order between two cycles. But one cycle of many airplanes may take minutes,
-//! and nobody who asks a run to end waits for them. So long computations look at an [`Interrupt`]
+//! and no user who ends a run wants to wait for them. So long computations look at an [`Interrupt`]
 //! again and again ([`look`]), and when it is raised they unwind. The half-done state is lost; a
 //! recorded run continues from its last checkpoint, as after a kill.
 //!
 //! The engine attaches the interrupt of a run to the threads of its workers for the time of a call, so
-//! that loops deep inside a world need not be handed it. Nothing else is attached to threads, for no
-//! result depends on an interrupt: a cycle is either done, or there is no state after it.
+//! that it need not be passed to loops deep inside a world. Nothing else is attached to threads. This is safe because
+//! no result depends on an interrupt: a cycle is either done, or there is no state after it.
 
 use std::any::Any;
 use std::cell::RefCell;
@@ -33,7 +33,7 @@ struct Interrupted;
 #[derive(Debug)]
 struct Deserted;
 
-/// The interrupt that a thread heeds. Looks are counted by the thread alone, so that workers which look all the
+/// The interrupt that a thread heeds. Each thread counts its own looks, so that workers that look all the
 /// time do not wait for each other's cache lines.
 #[derive(Debug)]
 struct Heed {
@@ -50,8 +50,8 @@ thread_local! {
 /// once in some milliseconds of work, however deep inside it is.
 ///
 /// # Panics
-/// When that interrupt is raised. The unwinding prints nothing; [`Interrupt::explains`] tells it
-/// from that of a bug.
+/// When that interrupt is raised. The unwinding prints nothing; [`Interrupt::explains`]
+/// distinguishes it from that of a bug.
 #[inline]
 pub fn look() {
     let is_raised = HEEDED.with_borrow_mut(|heeded| heeded.as_mut().is_some_and(Heed::look));
@@ -73,12 +73,12 @@ impl Interrupt {
         self.0.is_raised.store(true, Relaxed);
     }
 
-    /// Lets this thread heed the interrupt until the answer is dropped.
+    /// Lets this thread heed the interrupt until the returned guard is dropped.
     pub fn heeded_here(&self) -> Heeded {
         Heeded { before: HEEDED.replace(Some(Heed { interrupt: self.clone(), looks: 0 })) }
     }
 
-    /// Number of looks by threads that no longer heed it, for tests of how often a computation looks.
+    /// Number of looks by threads that no longer heed it, for tests of the frequency of looks.
     pub fn looks(&self) -> u64 {
         self.0.looks.load(Relaxed)
     }
@@ -140,7 +140,7 @@ mod tests {
             assert!(caught(true, workers));
             assert!(!caught(false, workers));
         }
-        // Nothing is heeded any more.
+        // Nothing is heeded any longer.
         look();
     }
 }

@@ -14,12 +14,12 @@
 //! - [`stream`]: a draw is a function of (seed, entity, cycle, purpose, index) alone.
 //! - [`workers`], [`cycle`]: the same bits for every number of workers.
 //! - [`digest`], [`checkpoint`]: a state has one digest, and continues bit for bit.
-//! - [`control`]: what agents observe, and orders from outside, checked and recorded.
+//! - [`control`]: the observations of agents, and orders from outside, checked and recorded.
 //! - [`batch`]: many simulations of one scenario at once, the same bits for every number of workers.
 //! - [`interrupt`]: a cycle that takes long can be left half done.
 //! - [`view`]: the scenery and the frames of any world; looking at them changes nothing.
 //! - [`math`], [`distr`], [`geometry`]: numbers that are the same on every platform.
-//! - [`network`]: what agents say to each other, and the faults that happen to it.
+//! - [`network`]: the messages between agents, and their faults.
 //! - [`ports`]: recorder, transport and clock, each with an in-memory version.
 
 pub mod batch;

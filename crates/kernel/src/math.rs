@@ -26,7 +26,7 @@ unary! {
     log10 = log10, "Logarithm to base 10.";
 }
 
-/// Sine and cosine of an angle in radians, for less than both cost alone.
+/// Sine and cosine of an angle in radians, for less than two separate calls cost.
 #[inline]
 pub fn sin_cos(x: f64) -> (f64, f64) {
     libm::sincos(x)

@@ -3,7 +3,7 @@
 use crate::units::Cycle;
 use serde::{Deserialize, Serialize};
 
-/// The settings of a run that every scenario has, whatever its world.
+/// The settings of a run that every scenario has, in any world.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Plan {
     /// The scenario's name; may be empty.
@@ -38,7 +38,7 @@ pub struct Effort {
 pub struct GroupSizes {
     /// Number of groups by size: index k counts groups of `2^k .. 2^(k+1)` bodies.
     pub counts: [u64; 32],
-    /// Number of bodies of the largest group in which bodies met; 0 where none ever did.
+    /// Number of bodies of the largest group in which bodies met; 0 if none ever did.
     pub largest: u64,
 }
 

@@ -36,11 +36,11 @@ pub struct Run<W: World> {
     /// Whether rows are kept for a recorder.
     records: bool,
     teams: Arc<Teams>,
-    /// Orders that are given as the run comes by,
+    /// Orders to be given when the run reaches their cycles.
     ahead: OrderBook,
-    /// controls likewise,
+    /// Controls to be handed over likewise.
     controls: ControlBook,
-    /// and the cycle for which that was done last.
+    /// The last cycle for which that was done.
     obeyed: Option<Cycle>,
     /// Orders that were given and wait to be recorded.
     given: RowBuffer<OrderRow>,
@@ -150,7 +150,7 @@ impl<W: World> Run<W> {
     /// Number of cycles that may run before rows must be handed over.
     fn room(&self) -> u64 {
         let room = self.world.room(&self.state, &self.books, self.cycle);
-        // Orders come from outside of cycles, so one more never makes it worse.
+        // Orders come from outside of cycles, so one more cycle never makes it worse.
         if self.given.is_full() || self.handed.is_full() { room.min(1) } else { room }
     }
 
@@ -173,7 +173,7 @@ impl<W: World> Run<W> {
         done
     }
 
-    /// Gives an order, or refuses it whole.
+    /// Gives an order, or refuses it as a whole.
     fn give(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
         self.examine(orders)?;
         let Self { world, state, teams, .. } = self;
@@ -220,7 +220,7 @@ impl<W: World> Run<W> {
         self.ahead = ahead;
         let controls = std::mem::take(&mut self.controls);
         if let Some(handed) = controls.of(self.cycle) {
-            // What can no longer be done is not done. Then the run comes out otherwise, and its digest says so.
+            // A control that can no longer be carried out is skipped. The run then differs, and its digest shows it.
             let taken = self.hand_over(handed);
             if taken.is_err() {
                 let _ = self.hand_over(&[]);
@@ -229,7 +229,7 @@ impl<W: World> Run<W> {
         self.controls = controls;
     }
 
-    /// Returns the first cycle after the present one before which something is given or handed over.
+    /// Returns the first cycle after the present one before which orders are given or controls handed over.
     fn next_given(&self) -> Option<Cycle> {
         let orders = self.ahead.next_after(self.cycle);
         orders.into_iter().chain(self.controls.next_after(self.cycle)).min()
@@ -361,7 +361,7 @@ impl<W: World> Simulation for Run<W> {
     }
 
     fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError> {
-        // Rows of cycles that are over cannot be had any more: an empty recording would hide that.
+        // Rows of past cycles are lost: an empty recording would hide that.
         if !self.records {
             let cause = "no rows were kept; call `begin_recording` before the first `advance`";
             return Err(RecordError::new(format!("the recording of `{}`", self.plan.name), cause));

@@ -22,7 +22,7 @@ pub trait Simulation: Any + Send {
     /// The noun for one of its agents, e.g. `robot`.
     fn agent(&self) -> &'static str;
 
-    /// The phase in which its agents decide, by which reports name the phases.
+    /// The phase in which its agents decide, which determines the names of the phases in reports.
     fn decides(&self) -> Decides;
 
     /// The plan that the scenario asks for.
@@ -34,16 +34,16 @@ pub trait Simulation: Any + Send {
     /// Number of entities that act (robots, connectors of chains, airplanes).
     fn agents(&self) -> usize;
 
-    /// Returns whether nothing can happen anymore, e.g. because everybody has arrived; the run is then
+    /// Returns whether nothing can happen anymore, e.g. because all have arrived; the run is then
     /// complete before its planned number of cycles.
     fn is_over(&self) -> bool;
 
-    /// Runs up to `cycles` cycles and returns how many were done: fewer when a buffer for recording
+    /// Runs up to `cycles` cycles and returns the number done: fewer when a buffer for recording
     /// is full or the run is over, and 0 only if `cycles` is 0.
     fn advance(&mut self, cycles: u64) -> u64;
 
-    /// Lets [`Simulation::advance`] unwind when `interrupt` is raised; the run is then of no more
-    /// use but for what was recorded of it.
+    /// Lets [`Simulation::advance`] unwind when `interrupt` is raised; the run is then useless
+    /// except for its recording.
     fn heed(&mut self, interrupt: Interrupt);
 
     /// Returns the digest of the present state: equal for equal scenario, seed and cycle.
@@ -70,7 +70,7 @@ pub trait Simulation: Any + Send {
     /// When the recorder cannot store it, or [`Simulation::begin_recording`] was never called.
     fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError>;
 
-    /// The scenery: everything that stays as it is during the run.
+    /// The scenery: everything that stays the same during the run.
     fn scenery(&self) -> Scenery;
 
     /// Starts to keep events for the next [`Simulation::frame`]; no result depends on it.
@@ -80,20 +80,20 @@ pub trait Simulation: Any + Send {
     /// no result depends on it.
     fn watch_odometry(&mut self);
 
-    /// Returns the present frame, with the events since the last call and what wheels claim since
-    /// [`Simulation::watch_odometry`] (none without it). No result depends on it.
+    /// Returns the present frame, with the events since the last call and the claims of wheels
+    /// since [`Simulation::watch_odometry`] (none without it). No result depends on it.
     fn frame(&mut self, look: Look) -> Frame;
 
-    /// Returns what a body perceives and decides in the cycle that comes next, and what will come of
-    /// it; `None` for a body that is not there or of which nothing is to tell. No result depends on it.
+    /// Returns the percepts and decisions of a body in the next cycle, and their outcome; `None` for a body that does
+    /// not exist or has nothing to show. No result depends on it.
     fn inspect(&self, who: Who) -> Option<Inspection>;
 
-    /// The teams of agents that observe, and may be ordered, alike.
+    /// The teams of agents with the same observations and orders.
     fn teams(&self) -> &[Team] {
         &[]
     }
 
-    /// Writes what the agents of a team, in its order, observe in the cycle that comes next: one room for
+    /// Writes the observations of a team's agents, in its order, in the next cycle: one room for
     /// each of its spaces. No result depends on it.
     ///
     /// # Errors
@@ -102,7 +102,7 @@ pub trait Simulation: Any + Send {
         Err(OrderError::NoTeam { team, teams: 0 })
     }
 
-    /// Checks an order as [`Simulation::order`] does, and gives it to nobody. The answer is the same in every
+    /// Checks an order as [`Simulation::order`] does, without giving it. The answer is the same in every
     /// cycle, and with every seed of a scenario.
     ///
     /// # Errors
@@ -111,39 +111,39 @@ pub trait Simulation: Any + Send {
         Teams::default().check(orders)
     }
 
-    /// Orders something of several agents for the cycle that comes next. An order stands until its
-    /// agent has acted; a later one takes its place.
+    /// Gives an order to several agents for the next cycle. An order stands until its agent has
+    /// acted; a later one replaces it.
     ///
     /// # Errors
-    /// When one of them cannot be obeyed; nobody is ordered anything then.
+    /// When one of them cannot be obeyed; no agent gets an order then.
     fn order(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
         Teams::default().check(orders)
     }
 
-    /// Gives these orders, each before its cycle, whenever the run comes by there: also after
-    /// [`Simulation::restore`]. They take the place of those of an earlier call.
+    /// Gives these orders, each before its cycle, whenever the run gets there: also after
+    /// [`Simulation::restore`]. They replace those of an earlier call.
     ///
     /// # Errors
-    /// When one of them cannot be obeyed; all remain as they were then.
+    /// When one of them cannot be obeyed; all then remain as they were.
     fn follow(&mut self, orders: OrderBook) -> Result<(), OrderError> {
         orders.iter().try_for_each(|(_, orders)| Teams::default().check(&orders))
     }
 
-    /// Hands over what agents do in the cycle that comes next, because they decide outside of the run, each as its
-    /// world's message. An agent that is missing does what is safe. In later cycles agents decide as ever, unless
-    /// that is called again.
+    /// Hands over the actions of agents in the next cycle, because they decide outside of the run, each as its
+    /// world's message. An agent that is missing does the safe thing. In later cycles agents decide as usual, unless
+    /// this is called again.
     ///
     /// # Errors
-    /// When no agents of this world decide outside, or one does what cannot be done; when the run is recorded without
+    /// When no agents of this world decide outside, or an action is impossible; when the run is recorded without
     /// its controls, and could not be computed again.
     fn hand_over(&mut self, _: &[(EntityId, Vec<u8>)]) -> Result<(), OrderError> {
         let cause = format!("agents of the world {} decide in the run alone", self.world());
         Err(OrderError::NobodyOutside { cause })
     }
 
-    /// Hands over these controls again, each before its cycle, whenever the run comes by there: also after
-    /// [`Simulation::restore`]. They take the place of those of an earlier call. One that no longer can be carried
-    /// out counts as missing, and the state tells that it did.
+    /// Hands over these controls again, each before its cycle, whenever the run gets there: also after
+    /// [`Simulation::restore`]. They replace those of an earlier call. One that can no longer be carried out counts
+    /// as missing, and the state shows that it did.
     fn retrace(&mut self, _: ControlBook) {}
 
     /// The recorded tables and columns that hold the places of bodies.

@@ -29,7 +29,7 @@ pub fn grouped(number: u64) -> String {
     head.into_iter().chain(groups).collect::<Vec<_>>().join(" ")
 }
 
-/// Returns a number with so many decimals; what rounds to 0 has no sign.
+/// Returns a number with the given number of decimals; a value that rounds to 0 has no sign.
 pub fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
@@ -38,7 +38,7 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// Begin of a value that is a command to copy.
+/// The first characters of a value that is a command to copy.
 const COMMAND: &str = "sidestep ";
 
 /// Columns of a line of text.
@@ -63,7 +63,7 @@ pub fn aligned(rows: &[(String, String)]) -> String {
 }
 
 /// Returns text in lines of at most `cols` columns, broken at spaces; a longer word is a line. Text
-/// that fits, and each line feed in it, stays as it is.
+/// that fits, and each line feed in it, stays unchanged.
 pub fn wrapped(text: &str, cols: usize) -> Vec<String> {
     text.split('\n').flat_map(|line| wrapped_line(line, cols)).collect()
 }
@@ -85,7 +85,7 @@ fn wrapped_line(text: &str, cols: usize) -> Vec<String> {
     lines
 }
 
-/// Splits text at its spaces, but for one before a percent sign: a number keeps its unit.
+/// Splits text at its spaces, except one before a percent sign: a number keeps its unit.
 fn words(text: &str) -> Vec<&str> {
     let mut words = Vec::new();
     let mut start = 0;

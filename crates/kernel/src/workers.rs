@@ -2,8 +2,8 @@
 //!
 //! A pool holds the numbers `0..n`. Each worker has a share of it, takes chunks of its own share
 //! first (its caches still hold those bodies) and then helps with the others' shares, so the load
-//! balances itself and nobody waits for a lock. A single worker runs the very same code on the
-//! calling thread; it takes the pool from front to back, waits for nobody, and makes no system
+//! balances itself and no worker waits for a lock. A single worker runs the very same code on the
+//! calling thread; it takes the pool from front to back, never waits, and makes no system
 //! call.
 //!
 //! [`Waiting`] are workers that are kept between calls.
@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 
 /// Pools that may be in use between two barriers and the one after: a pool's cursors are reset by
-/// the next pool but one, when nobody reads them anymore.
+/// the next pool but one, when no worker reads them anymore.
 const POOLS: usize = 4;
 
 /// Numbers in the largest chunk of a pool.
@@ -29,8 +29,8 @@ const CHUNK: usize = 64;
 const SPINS_BEFORE_YIELD: u32 = 4_000;
 const YIELDS_BEFORE_SLEEP: u32 = 200;
 
-/// Returns how many processors this process may use, at least 1. The answer takes system calls that
-/// read files, so ask once.
+/// Returns the number of processors that this process may use, at least 1. The answer takes system
+/// calls that read files, so ask once.
 pub fn available() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }
@@ -51,7 +51,7 @@ pub fn run<S: Send>(crew: &mut [S], work: impl Fn(&Worker<'_>, &mut S) + Sync) {
 /// One of the workers of a [`run`].
 #[derive(Debug)]
 pub struct Worker<'a> {
-    /// `None` for a worker that is alone.
+    /// `None` for a lone worker.
     team: Option<&'a Team>,
     index: usize,
 }
@@ -78,10 +78,10 @@ impl Worker<'_> {
             return (0..n).step_by(CHUNK).for_each(|from| task(from..n.min(from + CHUNK)));
         };
         let size = team.size();
-        // Nobody uses the cursors of the next pool but one now, so they can be reset without a
+        // No worker uses the cursors of the next pool but one now, so they can be reset without a
         // barrier.
         team.cursor((pool + 2) % POOLS as u64, self.index).store(0, Ordering::Relaxed);
-        // At least eight chunks per share, so that the others find something to help with.
+        // At least eight chunks per share, so that the others find some work to take over.
         let chunk = (n / (size * 8)).clamp(1, CHUNK);
         for k in 0..size {
             let owner = (self.index + k) % size;

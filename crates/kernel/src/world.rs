@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Phases   claim, join, act: called by the cycle, on any number of workers
-//! Auction  bids for what is claimed, an extension of some worlds
+//! Auction  bids for claims, an extension of some worlds
 //! World    everything else a run needs: rows, frames, metrics, checkpoints, texts
 //! ```
 
@@ -56,7 +56,7 @@ pub trait Phases: Sync + Sized {
     /// A worker's own buffers, events and sums, kept between tasks.
     type Scratch: Send;
 
-    /// The phase in which agents decide, by which reports name the phases.
+    /// The phase in which agents decide, which determines the names of the phases in reports.
     const DECIDES: Decides = Decides::Alone;
 
     /// Returns a fresh scratch.
@@ -79,8 +79,8 @@ pub trait Phases: Sync + Sized {
     fn join(turn: &mut Turn<'_, Self>, bodies: Range<usize>, groups: &Groups);
 
     /// *Act*: the bodies of one conflict group decide (where agents decide together) and act, in an
-    /// order that depends on state and seed alone. Writes only what the group has claimed. The
-    /// order of `group` itself is arbitrary.
+    /// order that depends on state and seed alone. Writes only things that the group has claimed.
+    /// The order of `group` itself is arbitrary.
     fn act(turn: &mut Turn<'_, Self>, group: &mut [Slot]);
 
     /// The auction by which bodies in conflict act, in worlds that hold one.
@@ -136,7 +136,7 @@ pub trait World: Phases<State: Send> + Send + 'static {
     /// Keeps rows of the state at the start of a cycle, if they are recorded.
     fn before_cycle(&self, _: &Self::State, _: &mut Self::Books, _: Cycle) {}
 
-    /// Returns whether nothing can happen anymore, e.g. because everybody has arrived; the run is then
+    /// Returns whether nothing can happen anymore, e.g. because all have arrived; the run is then
     /// complete before its planned number of cycles.
     fn is_over(&self, _: &Self::State) -> bool {
         false
@@ -194,29 +194,28 @@ pub trait World: Phases<State: Send> + Send + 'static {
         books: &mut Self::Books,
     ) -> Result<Self::State, CheckpointError>;
 
-    /// Returns the scenery: everything that stays as it is during the run.
+    /// Returns the scenery: everything that stays the same during the run.
     fn scenery(&self, name: &str) -> Scenery;
 
     /// Returns the present frame, with the events since the last one.
     fn frame(&self, state: &Self::State, books: &mut Self::Books, now: Cycle, look: Look) -> Frame;
 
-    /// Returns what a body perceives and decides in cycle `now`, and what will come of it if nothing
-    /// else is asked of the run; `None` for a body that is not there or of which nothing is to tell.
-    /// It works on a copy of what it needs, so that no result depends on it.
+    /// Returns the percepts and decisions of a body in cycle `now`, and their outcome if nothing
+    /// else is asked of the run; `None` for a body that does not exist or has nothing to show. It
+    /// works on a copy of the data, so that no result depends on it.
     fn inspect(&self, _: &Self::State, _: &Self::Books, _: Cycle, _: Who) -> Option<Inspection> {
         None
     }
 
-    /// Returns the teams of agents that observe, and may be ordered, alike.
+    /// Returns the teams of agents with the same observations and orders.
     fn teams(&self) -> Arc<Teams> {
         Arc::default()
     }
 
-    /// Returns why an order whose values are all within their bounds makes no sense all the same, and
-    /// what would be right.
+    /// Checks whether an order with values that are all within their bounds makes sense.
     ///
     /// # Errors
-    /// With these words.
+    /// When it does not: words for the reason, and for the remedy.
     fn check_order(&self, _: &Order<'_>) -> Result<(), String> {
         Ok(())
     }
@@ -224,11 +223,11 @@ pub trait World: Phases<State: Send> + Send + 'static {
     /// Notes an order for the next turn of its agent. It was checked.
     fn order(&self, _: &mut Self::State, _: &Order<'_>) {}
 
-    /// Notes what agents do in cycle `now`, of which nothing was noted yet: they have decided outside of the run. An
-    /// agent that is missing has said nothing.
+    /// Notes the actions of agents in cycle `now`, for which none were noted yet: they have decided outside of the
+    /// run. An agent that is missing has sent nothing.
     ///
     /// # Errors
-    /// When somebody decides in the run, or does what cannot be done; nothing is noted then.
+    /// When an agent decides within the run, or an action is impossible; nothing is noted then.
     fn hand_over(
         &self,
         _: &mut Self::State,
@@ -239,12 +238,12 @@ pub trait World: Phases<State: Send> + Send + 'static {
         Err(OrderError::NobodyOutside { cause })
     }
 
-    /// Returns whether a recorded run keeps what is handed over.
+    /// Returns whether a recorded run keeps the controls handed over.
     fn keeps_controls(&self, _: &Self::Books) -> bool {
         false
     }
 
-    /// Writes what the agents of a team observe in cycle `now` of the frozen state; there is one room
+    /// Writes the observations of a team's agents in cycle `now` from the frozen state; there is one room
     /// for each of [`crate::control::Team::observed`], and each is as large as it must be.
     fn observe(&self, _: &Self::State, _: Cycle, _team: usize, _: &mut [CellsMut<'_>]) {}
 

@@ -1,8 +1,8 @@
-//! Benchmarks of fleets: a round of a team, a whole super-conflict beside one process, how long a group takes to go on
-//! without one that is killed, memory and bytes of nodes.
+//! Benchmarks of fleets: a round of a team, a whole super-conflict beside one process, the time that a group takes to
+//! go on after the loss of a member, memory and bytes of nodes.
 //!
-//! Percentiles, and ratios within one run: `cargo bench -p sidestep-link`. Words choose: `round`, `conflict`, `recovery`,
-//! `nodes`. `SIDESTEP_BENCH_S` is how many seconds the last one flies (60).
+//! Percentiles, and ratios within one run: `cargo bench -p sidestep-link`. Words select parts: `round`, `conflict`,
+//! `recovery`, `nodes`. `SIDESTEP_BENCH_S` is the number of seconds that the last one flies (60).
 
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
@@ -78,13 +78,13 @@ fn rounds(team: u32, rounds: usize) {
     println!("one round of a team of {team}, 500 B, all hear all: {}", percentiles(&times));
 }
 
-/// Returns words for times in rising order.
+/// Returns the percentiles of times in rising order, in words.
 fn percentiles(times: &[Duration]) -> String {
     let at = |part: f64| 1e3 * times[(part * (times.len() - 1) as f64) as usize].as_secs_f64();
     format!("p50 {:.2} ms, p99 {:.2} ms", at(0.5), at(0.99))
 }
 
-/// A frame of a round: its number, the sender, and as many bytes as a small message has.
+/// A frame of a round: its number, the sender, and the payload of a small message.
 fn frame(round: u32, agent: u32) -> Vec<u8> {
     let mut frame = [round.to_le_bytes(), agent.to_le_bytes()].concat();
     frame.resize(500, 0);
@@ -95,7 +95,7 @@ fn number(bytes: &[u8]) -> u32 {
     u32::from_le_bytes(std::array::from_fn(|k| bytes[k]))
 }
 
-/// Says something until all others have been heard, and lets them hear it, too.
+/// Sends frames until all others have been heard, and lets them hear it, too.
 fn meet(wire: &mut dyn Wire, agent: u32, team: u32) {
     let mut heard = BTreeMap::new();
     let until = Instant::now() + LONG;
@@ -194,7 +194,7 @@ fn conflict(n: u32) {
         let alone_s = began.elapsed().as_secs_f64();
         let mut first = None;
         let (digest, fleet) = fly(job(folder.path(), Clock::Lockstep), |now| {
-            // Processes start once, whatever the length of the flight.
+            // Processes start once, however long the flight is.
             first = first.or(now.has_begun.then(Instant::now));
             true
         });
@@ -214,7 +214,7 @@ fn conflict(n: u32) {
     println!("  median of the ratios: {:.1}", ratios[1]);
 }
 
-/// News of a fleet: how it is, or the part of a cycle to which an airplane has come.
+/// News of a fleet: its state, or the part of a cycle to which an airplane has come.
 enum News {
     Fleet(FleetNow),
     Part { airplane: u32, cycle: u64, talk: String, at: Instant },
@@ -253,14 +253,15 @@ fn watched(job: FleetJob) -> (Child, Receiver<News>) {
     (child, news)
 }
 
-/// A node that was killed, and those of the others that have their controls since.
+/// A node that was killed, and the others that have had their controls since then.
 struct Killed {
     at: Instant,
     cycle: u64,
     done: BTreeSet<u32>,
 }
 
-/// Returns airplanes side by side whose ways cross far ahead: they decide together in every cycle, for half an hour.
+/// Returns airplanes side by side on paths that cross far ahead: they decide together in every cycle, for half an
+/// hour.
 fn abreast(n: u32) -> String {
     let airplane = |k: u32| {
         let aside_m = 700.0 * (f64::from(k) - f64::from(n - 1) / 2.0);
@@ -273,7 +274,7 @@ fn abreast(n: u32) -> String {
     std::iter::once(head.to_string()).chain((0..n).map(airplane)).collect()
 }
 
-/// Prints how long the others of a group take until all have their controls after one of them, where the coordinator is or
+/// Prints the time until all others of a group have their controls after a member, where the coordinator is or
 /// comes next, is killed while they decide.
 fn recovery(n: u32, kills: usize) {
     let folder = tempfile::tempdir().expect("a folder");
@@ -292,7 +293,7 @@ fn recovery(n: u32, kills: usize) {
             News::Part { airplane, cycle, talk, at } => match &mut killed {
                 None if airplane == victim && talk == "decide" => {
                     let Some(node) = now.nodes.get(victim as usize) else { continue };
-                    // All are back from what has happened before.
+                    // All have recovered from the kill before.
                     let is_whole = now.nodes.iter().all(|node| node.heard + 1 == n as usize);
                     if let Some(process) = node.process.filter(|_| is_whole) {
                         killer.kill(process);
@@ -342,10 +343,10 @@ impl Drop for Killer {
     }
 }
 
-/// Prints what many nodes take in real time: deadlines missed, memory, bytes.
+/// Prints the cost of many nodes in real time: deadlines missed, memory, bytes.
 fn nodes(n: u32, flown_for: Duration) {
     let folder = tempfile::tempdir().expect("a folder");
-    // As wide as they fly in that time, so that they meet in the middle of it.
+    // As wide as the distance that they fly in that time, so that they meet in the middle of it.
     let radius_m = 8_000.0 + 35.0 * flown_for.as_secs_f64() / 2.0;
     let text = format!("{}radius_m = {radius_m:?}\n", text(n, 1_000_000));
     std::fs::write(folder.path().join("s.toml"), text).expect("written");

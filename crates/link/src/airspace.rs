@@ -64,7 +64,7 @@ impl Deployed for Airplanes {
     }
 
     fn patience(&self, _: f64) -> Option<String> {
-        // As long as may be, since processes are slower to answer than agents in memory.
+        // As long as possible, because processes answer more slowly than agents in memory.
         let patience_s = PATIENCE_PART * self.cycle_s();
         (!self.has_faults()).then(|| format!("airspace.network.patience_s={patience_s}"))
     }

@@ -17,7 +17,7 @@ use std::sync::Arc;
 /// Part of a cycle after which a connector asks again: an eighth of the time that a talk has, and a little less.
 const PATIENCE_PART: f64 = 0.1;
 
-/// Seconds of real time in which a process answers: who asks sooner asks for nothing.
+/// Seconds of real time in which a process answers: a request repeated sooner is useless.
 const ANSWERS_S: f64 = 2e-3;
 
 /// Connectors that may be nodes, of chains in `D` dimensions.
@@ -82,7 +82,7 @@ impl<const D: usize> Deployed for Connectors<D> {
     }
 
     fn patience(&self, speed: f64) -> Option<String> {
-        // A bus answers in microseconds, and a process does not: who repeats so soon says everything many times.
+        // A bus answers in microseconds, and a process does not: repeating so soon would send everything many times.
         let is_long = |given_s: f64| given_s / speed >= ANSWERS_S;
         let given_s = self.world.network.as_ref().map(|network| network.patience_s);
         let patience_s = PATIENCE_PART * self.cycle_s();
@@ -95,7 +95,7 @@ impl<const D: usize> Deployed for Connectors<D> {
     }
 
     fn heeds_lost(&self) -> bool {
-        // What it has said to its neighbors since it decided may be lost with it.
+        // Its messages to neighbors since its decision may be lost with it.
         false
     }
 
@@ -150,7 +150,7 @@ impl<const D: usize> Deployed for Connectors<D> {
         let why = |(agent, bytes): &(EntityId, Vec<u8>)| {
             let reason = match self.world.read_control(now, *agent, bytes) {
                 Err(reason) => reason,
-                // Only the server says that somebody is gone.
+                // Only the server declares an agent gone.
                 Ok(None) => "it is no decision".into(),
                 Ok(Some(_)) => return None,
             };
@@ -176,7 +176,7 @@ impl<const D: usize> Deployed for Connectors<D> {
     }
 }
 
-/// The agent of a connector, at a node. Of the world it knows the clock, and what the agent does.
+/// The agent of a connector, at a node. Of the world it knows the clock and the agent's behavior.
 struct Aboard<const D: usize> {
     /// Returns the first tick of a cycle's talk.
     first_tick: Box<dyn Fn(Cycle) -> u64 + Send>,

@@ -1,10 +1,10 @@
-//! A world whose agents may be processes: all that a server and its nodes ask of it.
+//! A world with agents that may be processes: the interface that a server and its nodes use.
 
 use crate::ports::{Absurd, Channel, Controls, Program, Sight};
 use sidestep::kernel::{EntityId, InputError, Simulation};
 use sidestep_session::fleet::AgentName;
 
-/// A world whose agents have programs of their own.
+/// A world of agents with programs of their own.
 pub trait Deployed: Send + Sync {
     /// Number of agents; their ids on the network are those below.
     fn count(&self) -> usize;
@@ -21,8 +21,8 @@ pub trait Deployed: Send + Sync {
     /// Returns whether packets may be lost, delayed or doubled.
     fn has_faults(&self) -> bool;
 
-    /// Returns the change of the scenario, as `key=value`, with which agents do not wait forever for one that is gone
-    /// where time passes so many times as fast; none where they do not anyway.
+    /// Returns the change of the scenario, as `key=value`, that keeps agents from waiting forever for one that is
+    /// gone where time passes `speed` times as fast; none where they never do.
     fn patience(&self, speed: f64) -> Option<String>;
 
     /// Returns whether a fleet in lockstep waits for a node that is gone. Otherwise it ends.
@@ -30,22 +30,22 @@ pub trait Deployed: Send + Sync {
         false
     }
 
-    /// Returns what agents perceive whose turn it is in the cycle to come, by rising id.
+    /// Returns the percepts of the agents that decide next in the cycle to come, by rising id.
     fn sights(&self, run: &dyn Simulation) -> Vec<Sight>;
 
-    /// Returns the largest number of rounds of this cycle that may follow one of so many groups; none where all decide
-    /// at once.
+    /// Returns the largest number of rounds of this cycle that may follow one with this number of groups; 0 where all
+    /// decide at once.
     fn further_rounds(&self, _: &dyn Simulation, _: usize) -> usize {
         0
     }
 
-    /// Returns whether the control of an agent counts that had come before its node was lost.
+    /// Returns whether a control counts if it came before the node of its agent was lost.
     fn heeds_lost(&self) -> bool {
         true
     }
 
-    /// Takes the controls of a round whose groups are given, where rounds that follow depend on them; those that make no
-    /// sense are left out. Of agents that are gone it is noted that they are; none of the controls is theirs, unless these
+    /// Takes the controls of a round with the given groups, where later rounds depend on them; those that make no
+    /// sense are left out. Agents that are gone are noted; none of the controls is theirs, unless these
     /// are heeded ([`Deployed::heeds_lost`]).
     fn take(
         &self,
@@ -60,10 +60,10 @@ pub trait Deployed: Send + Sync {
     /// Returns the controls of the cycle to come that make no sense.
     fn absurd(&self, run: &dyn Simulation, controls: &Controls) -> Vec<Absurd>;
 
-    /// Returns the program of an agent, which talks with those of the same build alone.
+    /// Returns the program of an agent, which talks only with those of the same build.
     fn program(&self, agent: EntityId, build: &str) -> Box<dyn Program>;
 
-    /// Returns the faults of the scenario's network, for what an agent sends; none where it loses nothing.
+    /// Returns the faults of the scenario's network for packets of an agent; none where it loses nothing.
     fn channel(&self, agent: EntityId) -> Option<Box<dyn Channel>>;
 
     /// Returns the id of a named agent.
@@ -77,7 +77,7 @@ pub trait Deployed: Send + Sync {
         })
     }
 
-    /// Returns words for the agents that there are, by the option that names one.
+    /// Returns words for the existing agents, by the option that names one.
     fn which(&self) -> String {
         let last = self.name(self.count().saturating_sub(1) as EntityId);
         format!("give {} to {last}", self.name(0).option())

@@ -1,4 +1,4 @@
-//! The faults of a scenario's network, for what one agent sends.
+//! The faults of a scenario's network, for the packets of one agent.
 
 use crate::ports::{Arrival, Channel, Sent};
 use sidestep::kernel::network::Ether;
@@ -8,7 +8,7 @@ use sidestep::kernel::{Cycle, EntityId};
 /// First ticks of a cycle's talks, each with its time in seconds after the start of the run.
 type Talks = Box<dyn Fn(Cycle) -> Vec<(u64, f64)> + Send>;
 
-/// The faults of the scenario's network, for what one agent sends.
+/// The faults of the scenario's network, for the packets of one agent.
 pub(crate) struct Faults {
     ether: Ether,
     sender: EntityId,
@@ -16,7 +16,7 @@ pub(crate) struct Faults {
 }
 
 impl Faults {
-    /// Returns the faults of a network, whose talks in each cycle are given.
+    /// Returns the faults of a network, with the given talks in each cycle.
     pub(crate) fn new(
         ether: Ether,
         sender: EntityId,

@@ -4,7 +4,7 @@ use sidestep::kernel::EntityId;
 use sidestep::kernel::network::{Refusal, Refused};
 use std::collections::BTreeSet;
 
-/// Those that an agent has heard in a cycle, and in the one before.
+/// The senders that an agent has heard in a cycle, and in the one before.
 #[derive(Debug, Default)]
 pub(crate) struct Heard {
     now: BTreeSet<EntityId>,
@@ -22,7 +22,7 @@ impl Heard {
         self.now.insert(from);
     }
 
-    /// Returns those that were heard in this cycle, or in the one before if it has just begun.
+    /// Returns the senders heard in this cycle, or in the one before if it has just begun.
     pub(crate) fn all(&self) -> Vec<EntityId> {
         let heard = if self.now.is_empty() { &self.before } else { &self.now };
         heard.iter().copied().collect()

@@ -2,12 +2,12 @@
 //!
 //! ```text
 //! wire/      frames between parties: in memory, or by Zenoh (the one file that names sockets)
-//! party.rs     who speaks                            post.rs   letters: numbered, acknowledged, repeated
-//! mail.rs      a party's letters and notes           words.rs  words that parties say to each other
-//! deployed.rs  what is asked of a world              ports.rs  what is asked of an agent's program
-//! worlds.rs    the worlds there are                  stage.rs  the run at the server
+//! party.rs     names of the parties                  post.rs   letters: numbered, acknowledged, repeated
+//! mail.rs      a party's letters and notes           words.rs  words that parties exchange
+//! deployed.rs  the interface of a world              ports.rs  the interface of an agent's program
+//! worlds.rs    the known worlds                      stage.rs  the run at the server
 //! airspace.rs  airplanes and their pilots            chain.rs  connectors of chains and their agents
-//! faults.rs    the faults of a scenario's network    heard.rs  whom an agent has heard
+//! faults.rs    the faults of a scenario's network    heard.rs  agents that an agent has heard
 //! program/   the process: job, logs, metrics, other processes
 //! server/    the world's server                      node/     the node of an agent
 //! ```

@@ -9,7 +9,7 @@ use std::hash::{BuildHasher, RandomState};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Time in which no letter comes to another node before the straight way there is looked at.
+/// Time in which no letter comes to another node before the direct link there is checked.
 const SUSPECT: Duration = Duration::from_secs(2);
 
 /// Counts of a party's mail.
@@ -17,7 +17,7 @@ const SUSPECT: Duration = Duration::from_secs(2);
 pub struct Counts {
     /// Frames sent.
     pub frames: u64,
-    /// Bytes of those.
+    /// Bytes of these frames.
     pub bytes: u64,
     /// Letters that were sent again.
     pub retries: u64,
@@ -41,7 +41,7 @@ impl Other {
     }
 }
 
-/// A word that has come.
+/// A received word.
 #[derive(Debug, PartialEq)]
 pub struct Heard {
     /// The sender.
@@ -89,7 +89,7 @@ impl Mail {
         self.began.elapsed()
     }
 
-    /// Begins to exchange letters with another party in a life of its. Letters that an earlier life has not
+    /// Begins to exchange letters with one life of another party. Letters that an earlier life has not
     /// taken are lost with it.
     pub fn meet(&mut self, other: Party, life: Life) {
         if self.others.get(&other).is_none_or(|known| known.life != life) {
@@ -98,18 +98,18 @@ impl Mail {
         }
     }
 
-    /// Ends the exchange with another party; what it has not taken is lost.
+    /// Ends the exchange with another party; letters that it has not taken are lost.
     pub fn part(&mut self, other: Party) {
         self.others.remove(&other);
     }
 
-    /// Returns how long another party, that was met, was not heard.
+    /// Returns the time for which another party that was met has been silent.
     pub fn silent_for(&self, other: Party) -> Option<Duration> {
         let heard = self.others.get(&other)?.heard;
         Some(self.now().saturating_sub(heard))
     }
 
-    /// Returns whether the straight way to another node is deaf: no letter comes there, and its end has left
+    /// Returns whether the direct link to another node is deaf: no letter arrives there, and its end has left
     /// questions unanswered for some time.
     pub fn is_deaf(&mut self, member: &Member, within: Duration) -> bool {
         let other = self.others.get(&Party::Node(member.agent));
@@ -118,10 +118,10 @@ impl Mail {
             && self.wire.is_deaf_to(member, within)
     }
 
-    /// Closes the straight ways to all other nodes, and opens them anew.
+    /// Closes the direct links to all other nodes, and opens them again.
     ///
     /// # Errors
-    /// When an endpoint cannot be had again: all goes by the server then, and it can be tried once more.
+    /// When an endpoint cannot be taken again: everything goes by the server then, and it can be tried once more.
     pub fn reopen(&mut self) -> Result<(), WireError> {
         self.wire.reopen()
     }
@@ -146,7 +146,8 @@ impl Mail {
         self.fly(to, Some(word));
     }
 
-    /// Sends a word that may be lost to one life of another party, whichever of them it exchanges letters with.
+    /// Sends a word that may be lost to one life of another party, regardless of the life with which it exchanges
+    /// letters.
     pub fn reply(&mut self, to: Party, life: Life, word: Word) {
         let address = Address { party: to, life: Some(life), received: 0, number: None };
         self.fly(vec![address], Some(&word));
@@ -188,7 +189,7 @@ impl Mail {
         *self.counts.dropped.entry(reason).or_default() += 1;
     }
 
-    /// Sends what is due: letters again, and that letters have come.
+    /// Sends the frames that are due: letters again, and acknowledgments.
     fn tend(&mut self) {
         let now = self.now();
         let is_due = |other: &Other| other.post.next_due().is_some_and(|at| at <= now);
@@ -208,16 +209,16 @@ impl Mail {
         }
     }
 
-    /// Makes the straight ways from this node to all others, where there are any.
+    /// Makes the direct links from this node to all others, where there are any.
     ///
     /// # Errors
-    /// When an endpoint cannot be had.
+    /// When an endpoint cannot be taken.
     pub fn join(&mut self, me: EntityId, members: &[Member]) -> Result<(), WireError> {
         self.wire.join(me, members)
     }
 
     /// Returns the next word that comes within some time; none if none does. Words come in the order in which
-    /// their sender has sent them, but for notes. Of parties that were not met, only notes come.
+    /// their sender has sent them, except for notes. Of parties that were not met, only notes come.
     pub fn receive(&mut self, within: Duration) -> Option<Heard> {
         let until = self.now().saturating_add(within);
         loop {
@@ -244,9 +245,9 @@ impl Mail {
             }
         };
         let Frame { from, life, to, word } = frame;
-        // Where all hear what is for most, some hear what is not for them.
+        // Where all hear the frames meant for most, some frames are not meant for this party.
         let address = to.into_iter().find(|address| address.party == self.me)?;
-        // It is to the process that was here before, whose letters had numbers of their own.
+        // It is addressed to the process that was here before, with its own numbers of letters.
         if address.life.is_some_and(|to| to != self.life) {
             self.drop_for("former-life");
             return None;
@@ -258,7 +259,7 @@ impl Mail {
         Some(Heard { from, life, word: word? })
     }
 
-    /// Notes what a frame says of letters; an error is the reason why its word does not count.
+    /// Notes the acknowledgments of a frame; an error is the reason why its word does not count.
     fn note_of(&mut self, from: Party, life: Life, address: &Address) -> Result<(), &'static str> {
         let now = self.now();
         let Some(other) = self.others.get_mut(&from).filter(|other| other.life == life) else {

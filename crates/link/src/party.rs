@@ -1,4 +1,4 @@
-//! Parties of a fleet, by which words and wires name who speaks.
+//! Parties of a fleet, by which words and wires name the sender.
 
 use serde::{Deserialize, Serialize};
 use sidestep::kernel::EntityId;

@@ -6,14 +6,14 @@ use sidestep::kernel::{Cycle, EntityId};
 /// Controls of agents, serialized.
 pub type Controls = Vec<(EntityId, Vec<u8>)>;
 
-/// All that an agent perceives at the start of a cycle.
+/// Everything that an agent perceives at the start of a cycle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sight {
     /// The agent.
     pub agent: EntityId,
-    /// Those who decide together in this cycle, the agent among them, rising.
+    /// The agents that decide together in this cycle, this one among them, rising.
     pub group: Vec<EntityId>,
-    /// The percept, as it is sent.
+    /// The percept, as sent.
     pub begin: Begin,
 }
 
@@ -50,7 +50,7 @@ pub struct Doing {
 
 /// The program of an agent: a state machine without a clock, a socket or a thread.
 pub trait Program: Send {
-    /// Begins a cycle with what the agent perceives; what it did in the one before is over. Returns the tick in
+    /// Begins a cycle with the agent's percept; anything begun in the cycle before is over. Returns the tick in
     /// which the cycle begins.
     ///
     /// # Errors
@@ -60,22 +60,22 @@ pub trait Program: Send {
     /// Takes a packet of another agent.
     fn on_packet(&mut self, from: EntityId, payload: &[u8], tick: u64);
 
-    /// Does what is due by a tick.
+    /// Does everything that is due by a tick.
     fn on_timer(&mut self, tick: u64);
 
     /// Returns the tick of the next timer.
     fn next_timer(&self) -> Option<u64>;
 
-    /// Takes the packets that it sends.
+    /// Takes the packets that it wants to send.
     fn take_packets(&mut self) -> Vec<Outgoing>;
 
-    /// Returns whether its control is there.
+    /// Returns whether its control is ready.
     fn is_done(&self) -> bool;
 
-    /// Returns its control, once it is there.
+    /// Returns its control, once it is ready.
     fn control(&self) -> Option<Vec<u8>>;
 
-    /// Returns what it does now.
+    /// Returns its present activity.
     fn doing(&self) -> Doing;
 
     /// Returns the others that it has heard in this cycle, or in the one before if it has just begun.
@@ -102,7 +102,7 @@ pub struct Sent {
 /// An arrival of a packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Arrival {
-    /// The tick in which all of it is on its way: a large one takes its time on the link.
+    /// The tick in which all of it is on its way: a large packet occupies the link for some time.
     pub leaves: u64,
     /// The tick in which it arrives.
     pub arrives: u64,

@@ -1,7 +1,7 @@
 //! Letters between two parties: numbered, acknowledged, repeated until they have come, and taken in order.
 //!
-//! Whoever misses one drops those after it, and the sender repeats all of them (go back N). That is simple, and
-//! rare: frames are lost only where a link breaks or a queue is full.
+//! A receiver that misses one drops those after it, and the sender repeats all of them (go back N). That is simple,
+//! and rare: frames are lost only where a link breaks or a queue is full.
 //!
 //! A state machine without a clock: the time is handed in, from any fixed start.
 
@@ -13,10 +13,10 @@ use std::time::Duration;
 /// Time after which a letter is first sent again.
 const FIRST_WAIT: Duration = Duration::from_millis(200);
 
-/// Longest time between two times that a letter is sent.
+/// Longest time between two transmissions of a letter.
 const LONGEST_WAIT: Duration = Duration::from_secs(2);
 
-/// Time after which a letter is acknowledged, if no frame to its sender has done so by the way.
+/// Time after which a letter is acknowledged, if no other frame to its sender has done so by then.
 const ACKNOWLEDGED_WITHIN: Duration = Duration::from_millis(40);
 
 /// Most letters that are sent again at once.
@@ -25,18 +25,18 @@ const AGAIN_AT_ONCE: usize = 16;
 /// The letters from and to one other party.
 #[derive(Debug)]
 pub(crate) struct Post {
-    /// Letters that the other may not have, from the oldest on. Others may wait for the same.
+    /// Letters that the other may not have, from the oldest on. They may be shared with other posts.
     waiting: VecDeque<Arc<Word>>,
-    /// Number of the oldest of them,
+    /// Number of the oldest of them.
     oldest: u64,
-    /// and the time since when it is that.
+    /// Time at which it became the oldest.
     oldest_since: Option<Duration>,
     /// Time at which they are sent again.
     again_at: Option<Duration>,
     wait: Duration,
     /// Number of the next letter of the other.
     next: u64,
-    /// Time at which the other is told which of its letters have come.
+    /// Time at which the receipt of the other's letters is acknowledged.
     acknowledge_at: Option<Duration>,
 }
 
@@ -59,7 +59,7 @@ impl Default for Post {
 pub(crate) struct Due {
     /// Letters that are sent again, with their numbers.
     pub(crate) again: Vec<(u64, Arc<Word>)>,
-    /// Whether the other is told what has come, in a frame of its own.
+    /// Whether receipts are sent to the other in a frame of their own.
     pub(crate) acknowledge: bool,
 }
 
@@ -72,7 +72,7 @@ impl Post {
         self.oldest + self.waiting.len() as u64 - 1
     }
 
-    /// Returns the number up to which all letters of the other have come: every frame to it says so.
+    /// Returns the number up to which all letters of the other have come: every frame to it contains that number.
     pub(crate) fn received(&mut self) -> u64 {
         self.acknowledge_at = None;
         self.next
@@ -82,7 +82,7 @@ impl Post {
     pub(crate) fn takes(&mut self, number: u64, now: Duration) -> bool {
         let is_next = number == self.next;
         self.next += u64::from(is_next);
-        // A repeated one, too: the other has not heard that it came.
+        // A repeated one, too: the other does not know yet that it came.
         self.acknowledge_at.get_or_insert(now + ACKNOWLEDGED_WITHIN);
         is_next
     }
@@ -111,13 +111,13 @@ impl Post {
         }
         if self.acknowledge_at.is_some_and(|at| at <= now) {
             self.acknowledge_at = None;
-            // Letters say it, too.
+            // Letters acknowledge, too.
             due.acknowledge = due.again.is_empty();
         }
         due
     }
 
-    /// Returns the time since when no letter has come, though there are some; none where all have come.
+    /// Returns the time since which no letter has arrived although some are waiting; none where all have arrived.
     pub(crate) fn waits_since(&self) -> Option<Duration> {
         self.oldest_since
     }
@@ -127,7 +127,7 @@ impl Post {
         self.again_at.into_iter().chain(self.acknowledge_at).min()
     }
 
-    /// Returns whether all letters have come.
+    /// Returns whether all letters have arrived.
     pub(crate) fn has_delivered(&self) -> bool {
         self.waiting.is_empty()
     }
@@ -144,7 +144,7 @@ mod tests {
         Arc::new(Word::Close(number))
     }
 
-    /// A frame from one post to another: what it says has come, and a letter.
+    /// A frame from one post to another: the number up to which letters have come, and a letter.
     type Flying = (u64, Option<(u64, Arc<Word>)>);
 
     /// Two posts and the frames between them.
@@ -189,7 +189,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever is lost, doubled and overtaken, until the network is well again.
+        /// With frames lost, doubled and overtaken, until the network is well again.
         #[test]
         fn all_letters_come_once_and_in_order(
             count in 1u64..40, faults in prop::collection::vec((0u8..4, any::<prop::sample::Index>()), 0..200),

@@ -1,4 +1,4 @@
-//! The stage of a fleet at its server: a run that is recorded, whose agents decide elsewhere.
+//! The stage of a fleet at its server: a recorded run with agents that decide elsewhere.
 
 use crate::deployed::Deployed;
 use crate::ports::{Absurd, Controls, Sight};
@@ -7,7 +7,7 @@ use sidestep::kernel::{Cycle, EntityId, Simulation};
 use sidestep_session::{Error, Journey, Watcher};
 use std::sync::Arc;
 
-/// A run whose agents are nodes.
+/// A run of agents that are nodes.
 ///
 /// A cycle is one round of sights and controls, or several where agents decide one after the other; then it is made.
 pub struct Stage {
@@ -30,7 +30,7 @@ impl Stage {
         self.journey
     }
 
-    /// Returns the run, to be looked at.
+    /// Returns the run, for reading.
     pub fn run(&self) -> &dyn Simulation {
         self.journey.simulation()
     }
@@ -45,7 +45,7 @@ impl Stage {
         0..self.world.count() as EntityId
     }
 
-    /// Returns what people call an agent, e.g. `airplane 3`.
+    /// Returns the name of an agent for people, e.g. `airplane 3`.
     pub fn called(&self, agent: EntityId) -> String {
         let name = self.world.name(agent);
         format!("{} {name}", name.noun())
@@ -61,17 +61,18 @@ impl Stage {
         self.run().is_over() || self.run().cycle() >= self.run().plan().cycles
     }
 
-    /// Returns what each agent perceives that decides in the next round of the cycle to come, by rising id.
+    /// Returns the percepts of the agents that decide in the next round of the cycle to come, by rising id.
     pub fn sights(&self) -> Vec<Sight> {
         self.world.sights(self.run())
     }
 
-    /// Returns the largest number of rounds of this cycle that may follow one of so many groups.
+    /// Returns the largest number of rounds of this cycle that may follow one with this number of groups.
     pub fn further_rounds(&self, groups: usize) -> usize {
         self.world.further_rounds(self.run(), groups)
     }
 
-    /// Takes the controls of a round whose groups are given; others do what is safe. Returns those that make no sense.
+    /// Takes the controls of a round with the given groups; agents without one do the safe thing. Returns those that
+    /// make no sense.
     pub fn take(
         &mut self,
         groups: &[Vec<EntityId>],
@@ -84,7 +85,7 @@ impl Stage {
     }
 
     /// Makes the cycle to come with the controls that were taken. Those that make no sense are returned, and their
-    /// agents do what is safe.
+    /// agents do the safe thing.
     ///
     /// # Errors
     /// When it cannot be recorded.
@@ -103,10 +104,10 @@ impl Stage {
         Ok(absurd)
     }
 
-    /// Returns what is to be seen now, with the events since the frame before. Looking changes nothing.
+    /// Returns the present frame, with the events since the frame before. Looking changes nothing.
     pub fn frame(&mut self) -> Frame {
         let run = self.journey.simulation_mut();
-        // Events are kept from now on: a fleet that nobody watches keeps none.
+        // Events are kept from now on: a fleet without watchers keeps none.
         if !std::mem::replace(&mut self.is_watched, true) {
             run.watch();
         }

@@ -1,7 +1,7 @@
-//! Words that parties of a fleet say to each other, and the frames in which they travel.
+//! Words that parties of a fleet exchange, and the frames in which they travel.
 //!
-//! A frame is postcard after a magic number and the version of this format. Whatever cannot be read is
-//! counted and dropped, so that no frame can do harm.
+//! A frame is postcard after a magic number and the version of this format. An unreadable frame is counted and
+//! dropped, so that none can do harm.
 
 use crate::party::Party;
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ pub const MOST_BYTES: usize = 64 << 20;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Life(pub u64);
 
-/// A frame on a wire: a word for some parties, or nothing but what has come.
+/// A frame on a wire: a word for some parties, or only acknowledgments.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Frame<W = Word> {
     /// The sender.
@@ -31,7 +31,7 @@ pub struct Frame<W = Word> {
     pub word: Option<W>,
 }
 
-/// A receiver of a frame, and what is told to it alone.
+/// A receiver of a frame, and the facts for it alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Address {
     /// The receiver.
@@ -40,7 +40,7 @@ pub struct Address {
     pub life: Option<Life>,
     /// All letters of the receiver below this number have come.
     pub received: u64,
-    /// Number of the word among the letters to the receiver, which are repeated until they have come; none of a
+    /// Number of the word among the letters to the receiver, which are repeated until they have come; none for a
     /// note, which may be lost.
     pub number: Option<u64>,
 }
@@ -54,11 +54,11 @@ pub enum Word {
     Welcome(Welcome),
     /// Server to node, as a note: "You may not", with the reasons.
     Refused(Refusal),
-    /// Node to server, as a note: how it is.
+    /// Node to server, as a note: its status.
     Status(Status),
     /// Server to node: all nodes, when they are complete or have changed.
     Roster(Vec<Member>),
-    /// Node to node: whether it is heard.
+    /// Node to node: a test whether it is heard.
     Hello,
     /// Node to server: all other nodes have heard it.
     Ready,
@@ -70,24 +70,24 @@ pub enum Word {
     Ticked(Ticked),
     /// Node to node: packets of a talk, sent in one step.
     Packets(Vec<Packet>),
-    /// Server to node: the cycle's talks are over, or time is.
+    /// Server to node: the cycle's talks are over, or its time is up.
     Close(Cycle),
     /// Node to server: the agent's control.
     Control(Control),
-    /// Server to node, as a note: it is there.
+    /// Server to node, as a note: a sign of life.
     Beat,
     /// Node to server: packets that it has sent, where all are recorded.
     Log(Vec<Logged>),
     /// Server to node: the fleet has ended.
     End,
-    /// Node to server: it has said all that it had to say.
+    /// Node to server: it has sent its last word.
     Left,
 }
 
 /// A node that wants to join.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Join {
-    /// The agent that it is the node of.
+    /// Its agent.
     pub agent: EntityId,
     /// Fingerprint of the scenario that it has read.
     pub scenario: Fingerprint,
@@ -99,7 +99,7 @@ pub struct Join {
     pub process: u32,
 }
 
-/// A digest of what two processes must have in common, in hexadecimal digits.
+/// A digest of the things that two processes must have in common, in hexadecimal digits.
 pub type Fingerprint = String;
 
 /// The server's answer to a node that may join.
@@ -124,7 +124,7 @@ pub struct Refusal {
     pub remedy: String,
 }
 
-/// A node of a fleet, as others know it.
+/// A node of a fleet, as known to others.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Member {
     /// Its agent.
@@ -169,7 +169,7 @@ pub struct Ticked {
     pub sent: Vec<(EntityId, u64)>,
     /// The tick of its next timer.
     pub timer: Option<u64>,
-    /// Whether its control is there.
+    /// Whether its control is ready.
     pub is_done: bool,
 }
 
@@ -189,7 +189,7 @@ pub struct Packet {
     pub payload: Vec<u8>,
 }
 
-/// A packet to one receiver, as it is recorded.
+/// A packet to one receiver, as recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Logged {
     /// The cycle of the talk.
@@ -217,7 +217,7 @@ pub struct Control {
     pub control: Vec<u8>,
 }
 
-/// The state of a node, told twice a second.
+/// The state of a node, reported twice a second.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Status {
     /// The cycle that it is in.
@@ -232,7 +232,7 @@ pub struct Status {
     pub heard: Vec<EntityId>,
     /// Packets that it has sent so far.
     pub packets: u64,
-    /// Bytes of those.
+    /// Bytes of these packets.
     pub bytes: u64,
     /// Frames that were sent again.
     pub retries: u64,
@@ -247,7 +247,7 @@ pub enum Unreadable {
     Foreign,
     /// It is one of ours, and damaged.
     Damaged,
-    /// It is longer than any frame may be.
+    /// It is longer than a frame may be.
     TooLong,
 }
 
@@ -276,7 +276,7 @@ impl Frame {
 }
 
 impl Unreadable {
-    /// Returns the reason in a word, as metrics name it.
+    /// Returns the reason in a word, its name in metrics.
     pub fn word(self) -> &'static str {
         match self {
             Self::Foreign => "foreign",
@@ -286,7 +286,7 @@ impl Unreadable {
     }
 }
 
-/// Bytes in one piece: what is read one by one takes ten times as long. The format is the same.
+/// Bytes in one piece: reading them one by one takes ten times as long. The format is the same.
 mod bytes {
     use serde::de::{Deserializer, Error, Visitor};
     use serde::ser::Serializer;

@@ -1,4 +1,4 @@
-//! The worlds whose agents may be processes, by their scenarios.
+//! The worlds with agents that may be processes, by their scenarios.
 
 use crate::airspace::Airplanes;
 use crate::chain::Connectors;
@@ -24,7 +24,7 @@ pub fn fingerprint(compiled: &dyn Compiled, source: &Source) -> Result<Fingerpri
     Ok(Digest::of(&all).to_string()[..16].to_string())
 }
 
-/// Returns the world of a scenario whose agents can be nodes.
+/// Returns the world of a scenario, if its agents can be nodes.
 ///
 /// # Errors
 /// When it is another world, or one process decides for all.

@@ -1,4 +1,4 @@
-//! A scenario with the files that it names, as a run folder keeps it.
+//! A scenario with the files that it names, as kept in a run folder.
 
 use super::Source;
 use super::file::read_bytes;
@@ -10,10 +10,10 @@ use std::path::Path;
 
 /// The folder of the files, relative to the scenario.
 const FOLDER: &str = "inputs";
-/// Size in bytes of the largest file that is copied as it is, after unpacking.
+/// Size in bytes of the largest file that is copied unchanged, after unpacking.
 const MAX_BYTES: u64 = 64 << 20;
 
-/// A scenario that needs no other file, together with the files that it contains instead.
+/// A scenario that needs no file from elsewhere, together with the files that it contains instead.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Resolved {
     /// The TOML text.
@@ -22,22 +22,22 @@ pub struct Resolved {
     pub files: Vec<(String, Vec<u8>)>,
 }
 
-/// The text of a resolved scenario before and behind its seed: the texts of all others that differ by their
-/// seed alone, without reading or editing any of them.
+/// The text of a resolved scenario before and after its seed: it gives the texts of all scenarios that differ only by
+/// their seed, without reading or editing any of them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Seedless {
     before: String,
     behind: String,
 }
 
-/// The one key of a resolved scenario that is looked for.
+/// The only key of a resolved scenario that is read.
 #[derive(Deserialize)]
 struct OfSeed {
     seed: Spanned<i64>,
 }
 
 impl Resolved {
-    /// Returns its text without its seed; `None` if it is no resolved scenario, which has one.
+    /// Returns its text without its seed; `None` if it has none, and so is no resolved scenario.
     pub fn seedless(&self) -> Option<Seedless> {
         let OfSeed { seed } = toml::from_str(&self.text).ok()?;
         let span = seed.span();

@@ -1,7 +1,7 @@
 //! Numbers that check themselves on reading.
 //!
 //! A field of such a type holds a valid number, or the file was refused:
-//! [`Source::parse`](crate::Source::parse) points at the invalid number and gives the remedy. A
+//! [`Source::parse`](crate::Source::parse) points to the invalid number and gives the remedy. A
 //! type for a later check that needs the position too is wrapped: `Spanned<Positive>`.
 //!
 //! ```
@@ -35,7 +35,7 @@ pub trait Rule {
     /// Returns the valid numbers in words that follow "give", e.g. "a number above 0".
     fn words() -> String;
 
-    /// Returns the valid numbers as a JSON Schema has them, e.g. `{ "exclusiveMinimum": 0 }`.
+    /// Returns the valid numbers in terms of JSON Schema, e.g. `{ "exclusiveMinimum": 0 }`.
     fn limits() -> Value;
 
     /// Returns the valid points in words that follow "give".
@@ -223,7 +223,7 @@ impl<const LEAST: u64, const MOST: u64> Whole<LEAST, MOST> {
         Self::deserialize(deserializer).map(Self::get)
     }
 
-    /// Returns the remedy in words, without a maximum that nobody reaches.
+    /// Returns the remedy in words, without a maximum beyond all practical numbers.
     fn remedy(is_below: bool) -> String {
         match is_below && MOST >= u64::from(u32::MAX) {
             true => format!("give {LEAST} or more"),

@@ -1,11 +1,11 @@
-//! Errors of the TOML reader in words that help.
+//! Errors of the TOML reader in helpful words.
 
 use super::checked::told_by_a_value;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeSet;
 
 /// Returns cause and remedy of an error of the TOML reader; `top` are the keys of the top level, some
-/// of which it did not see, and `otherwise` is the remedy of errors for which there is no better one.
+/// of which the reader did not see, and `otherwise` is the remedy of errors without a better one.
 pub(crate) fn explain(
     error: &toml::de::Error,
     top: &[&str],
@@ -20,7 +20,7 @@ pub(crate) fn explain(
     if let Some((found, known)) = named(message, "unknown field `") {
         let remedy = match path {
             None => nearest(found, &[&quoted(known), top].concat()),
-            // In TOML, what follows a [section] belongs to it, wherever its author meant it to be.
+            // In TOML, keys after a [section] belong to it, even if their author meant otherwise.
             Some(_) if top.contains(&found) => belongs_to_the_top(found),
             Some(_) => nearest(found, &quoted(known)),
         };
@@ -41,7 +41,7 @@ fn belongs_to_the_top(key: &str) -> String {
     )
 }
 
-/// Returns the keys of a table, which its reader tells whoever gives it another one.
+/// Returns the keys of a table, which its reader lists in its error for an unknown one.
 pub(crate) fn keys_of<T: DeserializeOwned>() -> Vec<String> {
     let Err(error) = toml::from_str::<T>("\"\" = 0") else { return Vec::new() };
     let told = named(error.message(), "unknown field `").map(|(_, known)| known.to_string());
@@ -79,13 +79,13 @@ pub fn nearest(found: &str, known: &[&str]) -> String {
         Some(best) if strsim::osa_distance(found, best) <= 1 + found.len() / 3 => {
             format!("did you mean `{best}`?")
         }
-        // A list may be made of several, which have keys in common.
+        // A list may be put together from several, which share keys.
         Some(_) => format!("known are: {}", each_once(known).join(", ")),
         None => "nothing is known here".into(),
     }
 }
 
-/// Returns the words without those that were there before.
+/// Returns the words, without repetitions.
 fn each_once<'a>(words: &[&'a str]) -> Vec<&'a str> {
     let mut seen = BTreeSet::new();
     words.iter().copied().filter(|word| seen.insert(*word)).collect()

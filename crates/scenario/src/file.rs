@@ -15,7 +15,7 @@ const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 /// # Errors
 /// When the file cannot be read or unpacked, or has more than `max_bytes` (unpacked).
 pub fn read_bytes(path: &Path, max_bytes: u64) -> Result<Vec<u8>, InputError> {
-    // One byte more than allowed is enough to detect that there are too many.
+    // One byte beyond the limit is enough to detect that there are too many.
     let bytes = try_read(path, max_bytes.saturating_add(1)).map_err(|e| unreadable(path, &e))?;
     if bytes.len() as u64 > max_bytes {
         let cause = format!("is larger than the {max_bytes} bytes allowed for such a file");

@@ -1,6 +1,6 @@
-//! Places of the keys of a scenario in its text, for errors about keys that were read long ago.
+//! Places of the keys of a scenario in its text, for errors about keys that were read much earlier.
 //!
-//! A key is named as overrides name it, `robots.1.count`: elements of arrays by their number, and
+//! A key is named as in overrides, `robots.1.count`: elements of arrays by their number, and
 //! a section that stands alone by 0 or without a number; names with dots stand in quotes.
 
 use crate::Source;
@@ -65,7 +65,7 @@ impl Source {
     }
 
     /// Returns the place of the first of `keys` that the section at a span has, for errors about keys
-    /// whose values do not know their places; that of the section if it has none of them.
+    /// with values that do not know their places; the place of the section if it has none of them.
     pub fn within(&self, section: Range<usize>, keys: &[&str]) -> Range<usize> {
         let way = locate(&self.text, &section).map(|way| path(&way));
         let place = |key: &&str| self.place_of(&format!("{}.{key}", way.as_ref()?));
@@ -79,7 +79,7 @@ impl Source {
         find(&Spanned::new(span, root), path).map(|(key, _)| key)
     }
 
-    /// Creates the error for a key that is given and does nothing; `because` completes the
+    /// Creates the error for a key that has no effect; `because` completes the
     /// sentence "`key` does nothing ...".
     pub fn idle(&self, path: &str, because: &str) -> InputError {
         let last = parts(path).ok().and_then(|mut parts| parts.pop());
@@ -93,7 +93,7 @@ fn keys_of(value: &Spanned<DeValue<'_>>) -> Vec<Key> {
     keys.map(|key| Key { name: key.get_ref().to_string(), span: key.span() }).collect()
 }
 
-/// Returns the place of a key (of an element of an array, its own) and its value.
+/// Returns the place of a key (or of the element itself, in an array) and its value.
 fn find<'t, 'i>(
     root: &'t Spanned<DeValue<'i>>,
     path: &str,

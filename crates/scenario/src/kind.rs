@@ -1,4 +1,4 @@
-//! The interface of a world for programs that run scenarios and know no world.
+//! The interface of a world for programs that run scenarios without knowing any world.
 
 use crate::{Meaning, Remark, Resolved, Source, nearest};
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,7 @@ use sidestep_kernel::{InputError, Plan, Simulation};
 use std::any::Any;
 use std::path::Path;
 
-/// A world: its name, its files, and how its scenarios compile.
+/// A world: its name, its files, and the compilation of its scenarios.
 pub trait Kind: Sync {
     /// The name, as scenarios write it.
     fn name(&self) -> &'static str;
@@ -22,23 +22,23 @@ pub trait Kind: Sync {
     fn default_scenario(&self) -> &'static str;
 
     /// Returns the JSON Schema of its sections, without the keys that all worlds share: see
-    /// [`crate::schema`]. Without one, all keys are taken.
+    /// [`crate::schema`]. Without one, all keys are accepted.
     fn sections(&self) -> serde_json::Value {
         serde_json::json!({ "additionalProperties": true })
     }
 
-    /// The files beside scenarios that this world reads, each by a word for it, with the JSON Schema of its keys.
+    /// The files beside scenarios that this world reads, each as a word for it, with the JSON Schema of its keys.
     fn other_files(&self) -> Vec<(&'static str, serde_json::Value)> {
         Vec::new()
     }
 
-    /// The things that seeds decide in a scenario of this world, as a list of nouns with the keys that ask for it;
-    /// empty where a world does not say.
+    /// The things that seeds decide in a scenario of this world, as a list of nouns with the keys that cause it;
+    /// empty where a world gives none.
     fn draws(&self) -> &'static str {
         ""
     }
 
-    /// Its metrics in words. Reports split the names of those that are not listed.
+    /// Its metrics in words. Reports make words from the names of metrics that are not listed.
     fn meanings(&self) -> &'static [Meaning] {
         &[]
     }
@@ -67,23 +67,23 @@ pub trait Compiled: Send + Sync {
     /// The plan that the scenario asks for.
     fn plan(&self) -> Plan;
 
-    /// Number of simulated bodies, by which the size of a run is measured.
+    /// Number of simulated bodies, the measure of a run's size.
     fn bodies(&self) -> usize;
 
-    /// Returns the contents of the scenario, for people who check it.
+    /// Returns the contents of the scenario, for people to check.
     fn contents(&self, source: &Source) -> Said;
 
-    /// Returns what will surprise the scenario's author, the weightiest first.
+    /// Returns the surprises for the scenario's author, the weightiest first.
     fn remarks(&self) -> Vec<Remark> {
         Vec::new()
     }
 
-    /// Returns what another seed changes.
+    /// Returns the effect of another seed.
     fn seeds(&self) -> Seeds {
         Seeds::Decide
     }
 
-    /// Returns the scenario as it is stored in a run folder: complete, with all its files.
+    /// Returns the scenario as stored in a run folder: complete, with all its files.
     ///
     /// # Errors
     /// When a file that it names can no longer be read.
@@ -111,9 +111,9 @@ pub trait Compiled: Send + Sync {
 pub enum Seeds {
     /// Nothing: no random number is drawn.
     Nothing,
-    /// Draws only guide a search, which may find the same with all: runs tell.
+    /// Draws only guide a search, which may find the same result with every seed: only runs can tell.
     Perhaps,
-    /// The run; also where a world does not know.
+    /// Draws decide the run; also where a world does not know.
     #[default]
     Decide,
 }

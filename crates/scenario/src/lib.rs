@@ -1,9 +1,9 @@
 #![deny(clippy::disallowed_methods)]
-//! Scenario files: TOML text with overrides -> typed sections, and errors that point.
+//! Scenario files: TOML text with overrides -> typed sections, and errors that point to their cause.
 //!
-//! This crate knows the file format that all worlds share; each world defines its own keys. The way
-//! through the files: [`Source`] reads the text and applies overrides (`overrides.rs`) and edits (`edit/`), serde turns
-//! it into sections ([`Sections`]) whose numbers check themselves ([`Number`], [`Whole`],
+//! This crate knows the file format that all worlds share; each world defines its own keys. The steps of reading:
+//! [`Source`] reads the text and applies overrides (`overrides.rs`) and edits (`edit/`), serde turns it into sections
+//! ([`Sections`]) with numbers that check themselves ([`Number`], [`Whole`],
 //! [`Point`]), errors of the TOML reader get cause and remedy (`explain.rs`), and a [`Bundle`]
 //! gathers a scenario with all the files that it names. The same sections give JSON Schemas for
 //! editors and forms ([`schema`]).

@@ -1,10 +1,10 @@
-//! The key at a place of a text: from spans of bytes to keys as `--set` names them.
+//! The key at a place of a text: from spans of bytes to keys in the notation of `--set`.
 
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// A part of the way to a key.
+/// A part of the path to a key.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Part {
     /// The name of a key in a table.
@@ -13,8 +13,8 @@ pub(crate) enum Part {
     Index(usize),
 }
 
-/// Returns a way as `--set` names it: `robots.1.at.0`. Names that are no bare keys are quoted as in
-/// TOML.
+/// Returns a path in the notation of `--set`: `robots.1.at.0`. Names that are no bare keys are
+/// quoted as in TOML.
 pub(crate) fn path(way: &[Part]) -> String {
     let words: Vec<String> = way
         .iter()
@@ -28,9 +28,9 @@ pub(crate) fn path(way: &[Part]) -> String {
     words.join(".")
 }
 
-/// Returns the way to the innermost key (or element of an array) whose key or value contains a span
-/// of a text; `None` for what stands in no key. A text with errors of syntax is read as far as it
-/// goes.
+/// Returns the path to the innermost key (or element of an array) that contains a span of a text,
+/// in its name or value; `None` for a span in no key. A text with syntax errors is read as far as
+/// possible.
 pub(crate) fn locate(text: &str, span: &Range<usize>) -> Option<Vec<Part>> {
     let (root, _) = DeTable::parse_recoverable(text);
     let mut search = Search { span, way: Vec::new(), best: None };
@@ -77,8 +77,8 @@ impl Search<'_> {
         }
     }
 
-    /// Takes the present way if this is its place; of two places of one size the inner one, which
-    /// comes later.
+    /// Takes the present path if this is its place; of two places of the same size the inner one,
+    /// which comes later.
     fn offer(&mut self, place: &Range<usize>) {
         let contains = place.start <= self.span.start && self.span.end <= place.end;
         let bytes = place.len();

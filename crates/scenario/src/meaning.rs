@@ -2,31 +2,31 @@
 
 use sidestep_kernel::ports::table::split_unit;
 
-/// A metric of a world, for people who read results.
+/// A metric of a world, for readers of results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Meaning {
-    /// Its name in results. One that ends in `.*` stands for all names that begin so.
+    /// Its name in results. One that ends in `.*` stands for all names with that beginning.
     pub name: &'static str,
     /// A few words for titles and axes, without the unit; `*` stands for the end of the name.
     pub words: &'static str,
-    /// Its unit; empty for the one that the name ends in, if it does.
+    /// Its unit; empty for the one that the name ends in, if any.
     pub unit: &'static str,
     /// The thing counted or measured, in a phrase.
     pub meaning: &'static str,
 }
 
-/// A metric as it is told to people.
+/// A metric in words for people.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Told {
     /// A few words for titles and axes, without the unit.
     pub words: String,
     /// Its unit, if it has one.
     pub unit: Option<&'static str>,
-    /// The thing counted or measured; empty where the world does not say.
+    /// The thing counted or measured; empty where the world gives none.
     pub meaning: &'static str,
 }
 
-/// Returns a metric in words, by the meanings of its world; a name that has none is split into its
+/// Returns a metric in words, by the meanings of its world; a name without one is split into its
 /// own words.
 pub fn told(meanings: &[Meaning], name: &str) -> Told {
     let found = known(meanings, name).or_else(|| known(meanings, name.split_once('.')?.1));

@@ -1,7 +1,7 @@
-//! The section of a network that may lose and delay messages: the same keys in every world whose agents
+//! The section of a network that may lose and delay messages: the same keys in every world with agents that
 //! talk.
 //!
-//! A world says how its agents are named in the lists of faults, and which of them there are ([`Names`]).
+//! A world defines the notation of its agents in the lists of faults, and the agents that exist ([`Names`]).
 
 use super::checked::{FromBelow, NonNegative, Number, Positive, Rule, Share};
 use super::schema;
@@ -15,13 +15,13 @@ use sidestep_kernel::network::{Bursts, Network, OneWay, Partition, Silence, Whil
 use std::fmt::Debug;
 use std::ops::Range;
 
-/// The names of a world's agents in its network's section, and what is usual there.
+/// The names of a world's agents in its network's section, and the defaults there.
 pub trait Names {
-    /// A silence, as it is written.
+    /// A silence, as written.
     type Silence: DeserializeOwned + JsonSchema + Debug;
-    /// A partition, as it is written.
+    /// A partition, as written.
     type Partition: DeserializeOwned + JsonSchema + Debug;
-    /// A link that works one way, as it is written.
+    /// A link that works one way, as written.
     type OneWay: DeserializeOwned + JsonSchema + Debug;
     /// Limits of a latency.
     type Latency: Rule + Copy;
@@ -55,7 +55,7 @@ pub trait Names {
 /// A network's section that makes no sense.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wrong {
-    /// The place of what is wrong; none for the section itself.
+    /// The place of the error; none for the section itself.
     pub span: Option<Range<usize>>,
     /// The cause.
     pub cause: String,
@@ -64,7 +64,7 @@ pub struct Wrong {
 }
 
 impl Wrong {
-    /// Returns what is wrong, at no place of its own.
+    /// Returns an error without a place of its own.
     pub fn new(cause: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self { span: None, cause: cause.into(), remedy: remedy.into() }
     }
@@ -209,10 +209,10 @@ fn check_times<N: Names>(n: &Network, dt_s: f64) -> Result<(), Wrong> {
     Err(Wrong::new(cause, remedy))
 }
 
-/// Returns a while.
+/// Returns a while from its two times.
 ///
 /// # Errors
-/// When its times are none.
+/// When its times are invalid.
 pub fn during(from_s: f64, until_s: f64) -> Result<While, Wrong> {
     if from_s >= 0.0 && from_s.is_finite() && until_s > from_s {
         return Ok(While { from_s, until_s });
@@ -221,7 +221,7 @@ pub fn during(from_s: f64, until_s: f64) -> Result<While, Wrong> {
     Err(Wrong::new(cause, "give times in seconds from 0 on, the end after the start"))
 }
 
-/// Checks the sides of a partition, whose agents people call `agent`.
+/// Checks the sides of a partition; `agent` is the word for its agents.
 ///
 /// # Errors
 /// When one is named twice, or there are fewer than two sides.
@@ -237,7 +237,7 @@ pub fn check_sides(sides: &[Vec<EntityId>], agent: &str) -> Result<(), Wrong> {
 /// Checks that no agent is named twice.
 ///
 /// # Errors
-/// With the lowest one that is.
+/// With the lowest id that is.
 pub fn check_once(mut ids: Vec<EntityId>, agent: &str) -> Result<(), Wrong> {
     ids.sort_unstable();
     match ids.windows(2).find(|pair| pair[0] == pair[1]) {
@@ -249,7 +249,7 @@ pub fn check_once(mut ids: Vec<EntityId>, agent: &str) -> Result<(), Wrong> {
     }
 }
 
-/// The end of what has no end, seconds.
+/// The end of an endless while, in seconds.
 pub fn for_ever() -> f64 {
     f64::INFINITY
 }

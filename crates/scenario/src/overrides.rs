@@ -13,7 +13,7 @@ impl Source {
     /// # Errors
     /// When the text is not TOML, or a key leads through something that is not a table.
     pub fn with(mut self, overrides: &[String]) -> Result<Self, InputError> {
-        // Without overrides the text stays as it is, byte for byte.
+        // Without overrides the text stays the same, byte for byte.
         if overrides.is_empty() {
             return Ok(self);
         }
@@ -46,7 +46,7 @@ fn parsed(override_text: &str) -> Result<Wanted<'_>, InputError> {
     let value = value.trim();
     match value.parse() {
         Ok(value) => Ok((place, key, value)),
-        // As text, it would be refused where nobody would see that a number was meant.
+        // As text, it would be refused later, where it is no longer clear that a number was meant.
         Err(_) if is_beyond_all_numbers(value) => {
             let cause = format!("`{value}` is larger than any number that can be held (1.8e308)");
             Err(InputError::new(
@@ -60,7 +60,7 @@ fn parsed(override_text: &str) -> Result<Wanted<'_>, InputError> {
     }
 }
 
-/// Returns whether this is written like a number, of digits, and rounds to infinity.
+/// Returns whether a text is written like a number, in digits, and rounds to infinity.
 fn is_beyond_all_numbers(text: &str) -> bool {
     text.contains(|c: char| c.is_ascii_digit()) && text.parse().is_ok_and(f64::is_infinite)
 }
@@ -105,7 +105,7 @@ mod tests {
         }
     }
 
-    /// Keys that are there or not, alone or in lists, in braces, and above or below each other.
+    /// Keys, existing or not, alone or in lists, in braces, and above or below each other.
     const KEYS: [&str; 13] = [
         "seed",
         "name",

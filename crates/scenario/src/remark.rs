@@ -1,4 +1,4 @@
-//! Remarks on valid scenarios: what will surprise their author.
+//! Remarks on valid scenarios: surprises for their author.
 
 use serde::Serialize;
 
@@ -6,9 +6,9 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// The run will hardly be the one that its author wants.
+    /// The run is hardly the one that its author wants.
     Warning,
-    /// The run is all right, but may differ from what its author expects.
+    /// The run is all right, but may differ from its author's expectation.
     Note,
 }
 
@@ -27,7 +27,7 @@ impl Severity {
 pub struct Remark {
     /// Its weight.
     pub severity: Severity,
-    /// The key that it is about, as overrides name it: `robots.0.effector`.
+    /// The key concerned, in the notation of overrides: `robots.0.effector`.
     pub key: String,
     /// One sentence, or a cause and a remedy: `it does so: do that`.
     pub words: String,

@@ -17,7 +17,7 @@ pub const FORMAT: u32 = 1;
 /// The suffix of the place of a scenario with overrides.
 pub(crate) const WITH_OVERRIDES: &str = " (with --set)";
 
-/// The text of a scenario, where it came from, and the folder its paths are relative to.
+/// The text of a scenario, where it came from, and the folder that its paths are relative to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Source {
     /// Its name in errors.
@@ -28,7 +28,7 @@ pub struct Source {
     pub folder: PathBuf,
 }
 
-/// The first keys of every scenario, by which its world is recognized.
+/// The first keys of every scenario, which identify its world.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 pub struct Preamble {
     /// See [`FORMAT`].
@@ -37,7 +37,7 @@ pub struct Preamble {
     pub world: Spanned<String>,
 }
 
-/// Words in errors about what may go on over many lines.
+/// Words in errors about constructs that may span many lines.
 const OPEN: [&str; 4] = ["array", "inline table", "key-value pairs", "multi-line"];
 
 /// Keys of [`Head`].
@@ -87,7 +87,7 @@ impl Source {
         Self { place: place.into(), text: text.into(), folder: folder.into() }
     }
 
-    /// Parses the text into a type whose fields refuse unknown keys.
+    /// Parses the text into a type with fields that refuse unknown keys.
     ///
     /// # Errors
     /// When the text does not fit the type, with line and column; the error for an unknown key
@@ -115,11 +115,11 @@ impl Source {
         Ok((Head::deserialize(part(head)).map_err(told)?, T::deserialize(part(own)).map_err(told)?))
     }
 
-    /// Returns what is no TOML: one error for each line, and none that only follows from an array, a
+    /// Returns the syntax errors: one for each line, and none that only follows from an array, a
     /// table or a text without an end.
     pub fn syntax_errors(&self) -> Vec<InputError> {
         let (_, mut errors) = DeTable::parse_recoverable(&self.text);
-        // The reader tells what is wrong in an array before what is wrong above it.
+        // The reader reports errors in an array before errors above it.
         errors.sort_by_key(|error| error.span().map(|span| span.start));
         let mut told: Vec<InputError> = Vec::new();
         for error in errors {
@@ -169,7 +169,7 @@ impl Source {
     /// Reads format and world, and refuses a format that this program cannot read.
     ///
     /// # Errors
-    /// When either is missing or the format is another.
+    /// When either is missing or the format is a different one.
     pub fn preamble(&self) -> Result<Preamble, InputError> {
         let preamble = match toml::from_str::<Preamble>(self.top()) {
             Ok(preamble) => preamble,
@@ -183,7 +183,7 @@ impl Source {
     }
 
     /// Returns the text above the first section, where the keys of all worlds stand; it may end in the middle of
-    /// something that has lines which look like a section.
+    /// a value with lines that look like a section.
     fn top(&self) -> &str {
         let section = if self.text.starts_with('[') { Some(0) } else { self.text.find("\n[") };
         &self.text[..section.unwrap_or(self.text.len())]
@@ -197,8 +197,8 @@ impl Source {
         is_sweep.then(|| self.error(None, "this is a sweep, not a scenario", remedy))
     }
 
-    /// Creates an error in the text, at a span if one is given, with the innermost key whose name or
-    /// value contains it. The empty span of a default counts as none.
+    /// Creates an error in the text, at a span if one is given, with the innermost key that
+    /// contains it in its name or value. The empty span of a default counts as none.
     pub fn error(
         &self,
         span: impl Into<Option<Range<usize>>>,
@@ -212,7 +212,7 @@ impl Source {
         }
     }
 
-    /// Adds the position of a section to the error of a part that does not know the text.
+    /// Adds the position of a section to an error from code that does not know the text.
     pub fn error_of(
         &self,
         span: impl Into<Option<Range<usize>>>,
@@ -221,7 +221,7 @@ impl Source {
         self.error(span, format!("{}: {}", error.place(), error.cause()), error.remedy())
     }
 
-    /// Adds to the error of a file that is named at a span the key that names it.
+    /// Adds the key that names a file, at a span, to the file's error.
     pub fn naming(&self, span: Range<usize>, error: InputError) -> InputError {
         match locate(&self.text, &span) {
             Some(way) => error.with_key(path(&way)),
@@ -229,7 +229,8 @@ impl Source {
         }
     }
 
-    /// Returns what came of reading a file that a key of the section at a span names; errors get the way to that key.
+    /// Returns the result of reading a file that a key of the section at a span names; errors get the path to that
+    /// key.
     ///
     /// # Errors
     /// Those of reading it.
@@ -242,8 +243,8 @@ impl Source {
         read.map_err(|error| self.naming(self.within(section, &[key]), error))
     }
 
-    /// Returns an error as one of this text, for those who see nothing else: that of a file which the text names becomes
-    /// one of the key that names it.
+    /// Returns an error as one of this text, for readers who see only that: an error of a file that the text names
+    /// becomes one of the key that names it.
     pub fn told(&self, error: &InputError) -> InputError {
         let Some(key) = error.key().filter(|_| error.place() != self.place) else {
             return error.clone();
@@ -286,7 +287,7 @@ mod tests {
         assert_eq!((told.place(), told.key()), ("s.toml", Some("map.file")));
         assert_eq!(told.position().map(|(line, _)| line), Some(3));
         assert_eq!((told.cause(), told.remedy()), ("a.png:3:4: it is cut off", "copy it again"));
-        // An error of its own, and one that no key names, stay as they are.
+        // An error of the text itself, and one of a file that no key names, stay the same.
         let own = source.error(0..1, "wrong", "right");
         assert_eq!((source.told(&own), source.told(&wrong)), (own, wrong.clone()));
         assert_eq!(source.naming(0..source.text.len(), wrong).key(), None);
@@ -332,7 +333,7 @@ mod tests {
             let error = read(&format!("format = 1\nworld = \"w\"\n{line}\n")).expect_err(line);
             assert_eq!(error.position(), Some(at), "{error}");
             assert!(error.remedy().contains(remedy), "{error}");
-            // What is no TOML has no keys.
+            // Text that is no TOML has no keys.
             let key = line.split_once(' ').map(|(key, _)| key).filter(|_| !line.contains("= ="));
             assert_eq!(error.key(), key, "{error}");
         }

@@ -1,7 +1,7 @@
 //! The costs of watching: frames, cycles a second with a page that watches, inspection, and seeking.
 //!
-//! `cargo bench -p sidestep-server [-- PART ...]` with the parts `frame`, `watched`, `inspect` and `seek`; the bars in
-//! brackets are those of the project. Ratios are taken in one run, as the machine may be noisy.
+//! `cargo bench -p sidestep-server [-- PART ...]` with the parts `frame`, `watched`, `inspect` and `seek`; the limits
+//! in brackets are those of the project. Ratios are taken in one run, because the machine may be noisy.
 
 use cpu_time::ProcessTime;
 use serde_json::{Value, json};
@@ -47,7 +47,7 @@ fn median(times: Vec<f64>) -> f64 {
     sorted(times)[REPEATS / 2]
 }
 
-/// Number of measurements of which the median is told.
+/// Number of measurements of which the median is reported.
 const REPEATS: usize = 9;
 
 /// CPU time of `n` calls, in milliseconds each; the median of several.
@@ -155,7 +155,7 @@ fn studio(folder: &Path, text: &str) -> (Studio, Page) {
 /// Cycles, CPU seconds and wall seconds.
 type Stretch = (f64, f64, f64);
 
-/// Advances a run that nobody watches for a while.
+/// Advances a run without a watcher for a while.
 fn unwatched(run: &mut dyn Simulation, cycles: u64) -> Stretch {
     let (cpu, wall, from) = (ProcessTime::now(), Instant::now(), run.cycle());
     while wall.elapsed() < STRETCH {
@@ -180,7 +180,7 @@ fn watched(page: &mut Page) -> Stretch {
     (page.cycle() - from, times.0, times.1)
 }
 
-/// Length of a stretch that is compared.
+/// Duration of a compared stretch.
 const STRETCH: Duration = Duration::from_millis(1500);
 
 fn watching() {
@@ -210,7 +210,7 @@ fn watching() {
     }
 }
 
-/// Shipped scenarios of each world, with a kind of body to inspect and how many of them there are.
+/// Shipped scenarios of each world, with a kind of body to inspect and the number of these.
 const INSPECTED: [(&str, &str, u32); 3] = [
     ("robots/office", "robot", 24),
     ("chain/serpentine", "connector", 1),

@@ -6,16 +6,16 @@ use std::collections::{BTreeSet, VecDeque};
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-/// The number of files that are told.
+/// The largest number of files listed.
 const MOST_FILES: usize = 300;
-/// The number of files and folders that are looked at.
+/// The largest number of files and folders examined.
 const MOST_ENTRIES: usize = 3000;
-/// Folders in folders are looked into so deep.
+/// The largest depth of folders in folders that is examined.
 const MOST_DEPTH: usize = 3;
 
 impl Files {
-    /// Returns the files below a scenario's folder, and those elsewhere among some names, as the scenario would name
-    /// them; none that may not be read.
+    /// Returns the files below a scenario's folder, and those elsewhere among some names, in the scenario's own
+    /// notation; only those that may be read.
     pub(crate) fn beside(&self, source: &Source, names: &[String]) -> Vec<String> {
         let folder = match source.folder.as_os_str().is_empty() {
             true => Path::new("."),
@@ -34,7 +34,7 @@ impl Files {
         path.canonicalize().is_ok_and(|real| self.holds(&real) && real.is_file())
     }
 
-    /// Returns the paths of files below a folder, relative to it; the nearest first.
+    /// Returns the paths of files below a folder, relative to it, the nearest first.
     fn below_folder(&self, folder: &Path) -> Vec<PathBuf> {
         let mut open = VecDeque::from([(PathBuf::new(), 0)]);
         let (mut found, mut seen) = (Vec::new(), 0);
@@ -65,7 +65,7 @@ fn entries(folder: &Path, most: usize) -> Vec<PathBuf> {
     names
 }
 
-/// Returns a path with slashes, as scenarios have them on every system.
+/// Returns a path with slashes, as in scenarios on every system.
 fn name(path: &Path) -> Option<String> {
     let part = |part: Component<'_>| part.as_os_str().to_str().map(String::from);
     path.components().map(part).collect::<Option<Vec<_>>>().map(|parts| parts.join("/"))

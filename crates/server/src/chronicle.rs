@@ -6,29 +6,29 @@ use sidestep::kernel::Cycle;
 use sidestep::kernel::view::{Entry, Frame};
 use std::ops::Range;
 
-/// The number of events that are kept; further ones are counted.
+/// The largest number of events kept; further ones are counted.
 const MOST_EVENTS: usize = 100_000;
-/// Events that are not kept are counted for so many cycles together.
+/// The number of cycles for which events that are not kept are counted together.
 const LOST_TOGETHER: Cycle = 1024;
-/// The number of events that a frame holds, the last ones.
+/// The largest number of events in a frame, the last ones.
 const MOST_IN_FRAME: usize = 100;
 
 /// The events of one run.
 #[derive(Debug, Default)]
 pub(crate) struct Chronicle {
-    /// Entries as the kernel tells them: most are never asked for, and those that are get their words then.
+    /// Entries as the kernel reports them: most are never asked for, and the others get their words then.
     kept: Vec<Entry>,
-    /// The cycle from which on nothing was computed yet.
+    /// The first cycle not computed yet.
     frontier: Cycle,
-    /// Numbers of events that were not kept, about when.
+    /// Numbers of events that were not kept, with their approximate cycles.
     lost: Vec<(Cycle, u64)>,
-    /// Those since the last frame that was sent.
+    /// The events since the last frame that was sent.
     fresh: Fresh,
-    /// Those since the last frame that viewers beside the page were shown, if there may be any.
+    /// The events since the last frame shown to viewers beside the page, if there may be any.
     others: Option<Fresh>,
 }
 
-/// The last events of those that somebody was not told yet.
+/// The last of the events that have not been reported yet.
 #[derive(Debug, Default)]
 struct Fresh {
     entries: Vec<Entry>,
@@ -46,7 +46,7 @@ impl Fresh {
 }
 
 impl Chronicle {
-    /// Takes over what happened before a frame.
+    /// Takes over the events before a frame.
     pub(crate) fn note(&mut self, frame: &mut Frame) {
         for fresh in [Some(&mut self.fresh), self.others.as_mut()].into_iter().flatten() {
             fresh.note(&frame.log, frame.log_left_out);
@@ -54,7 +54,7 @@ impl Chronicle {
         self.note_ahead(frame);
     }
 
-    /// Takes over what happened before a frame that nobody watches.
+    /// Takes over the events before a frame without a watcher.
     pub(crate) fn note_ahead(&mut self, frame: &mut Frame) {
         let mut log = std::mem::take(&mut frame.log);
         if frame.cycle <= self.frontier {
@@ -76,7 +76,7 @@ impl Chronicle {
         }
     }
 
-    /// Returns the cycle up to which all is known.
+    /// Returns the cycle up to which everything is known.
     pub(crate) fn frontier(&self) -> Cycle {
         self.frontier
     }
@@ -99,7 +99,7 @@ impl Chronicle {
         (entries, left_out)
     }
 
-    /// Returns at most so many of the events of some cycles, after the first ones that are skipped.
+    /// Returns at most the given number of events of some cycles, after the first `skip` ones.
     pub(crate) fn answer(&self, cycles: Range<Cycle>, skip: u32, most: u32) -> Answer {
         let start = self.kept.partition_point(|entry| entry.cycle < cycles.start);
         let end = self.kept.partition_point(|entry| entry.cycle < cycles.end).max(start);

@@ -1,15 +1,15 @@
-//! The number of connections that there may be: of one peer, so that it cannot keep out all others, and in all.
+//! The limits of connections: for one peer, so that it cannot keep out all others, and in total.
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The number of connections at a time.
+/// The largest number of connections at a time.
 const MOST: usize = 128;
-/// The number of connections of a peer at a time. What is forwarded to this machine all comes from itself.
+/// The largest number of connections of a peer at a time. All forwarded connections come from this machine itself.
 const MOST_OF_PEER: usize = 64;
 
-/// The connections that there are, by peer.
+/// The present connections, by peer.
 #[derive(Debug, Default)]
 pub(crate) struct Doors(Mutex<BTreeMap<IpAddr, usize>>);
 

@@ -12,18 +12,18 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Entries of a folder beyond this number are left out.
+/// The largest number of entries listed of a folder; further ones are left out.
 const MOST_ENTRIES: usize = 1000;
-/// Larger files are not looked into when a folder is listed.
+/// The size of the largest file that is read when a folder is listed.
 const MOST_BYTES: u64 = 1 << 20;
-/// Files of other programs are looked into, so many in a folder.
+/// The number of files of other programs that are read in a folder.
 const MOST_FOREIGN: usize = 50;
 
 /// The folders and files that may be read.
 #[derive(Debug, Clone)]
 pub(crate) struct Files {
     roots: Arc<Vec<Root>>,
-    /// Real places elsewhere that scenarios name which were named at start.
+    /// Real places elsewhere named by the scenarios that were named at start.
     granted: Arc<BTreeSet<PathBuf>>,
 }
 
@@ -45,7 +45,7 @@ struct Known {
     profile: Option<String>,
 }
 
-/// Endings of maps and images of floors, and what such a file is.
+/// Endings of maps and images of floors, and words for such a file.
 const MAPS: [(&str, &str); 6] = [
     ("yaml", "map of ROS"),
     ("yml", "map of ROS"),
@@ -56,7 +56,7 @@ const MAPS: [(&str, &str); 6] = [
 ];
 
 impl Files {
-    /// Allows what lies below these folders, and these files.
+    /// Returns the files that may be read: everything below these folders, and these files.
     ///
     /// # Errors
     /// When one of them is not there.
@@ -72,8 +72,8 @@ impl Files {
         Ok(Self { roots: Arc::new(roots?), granted: Arc::default() })
     }
 
-    /// Allows what these scenarios name as well: whoever starts the studio with one of them wants it to run. What pages
-    /// write later names nothing elsewhere beyond that.
+    /// Also allows the files named by these scenarios, because a user who starts the studio with a scenario wants it
+    /// to run. Texts written by pages later can name no further files elsewhere.
     pub(crate) fn with_named_by<'p>(self, scenarios: impl Iterator<Item = &'p Path>) -> Self {
         let sources = scenarios.filter_map(|path| Source::read(path, &[]).ok());
         let named = sources.flat_map(|source| {
@@ -98,8 +98,8 @@ impl Files {
     /// When it is not there, or elsewhere.
     pub(crate) fn find(&self, path: &str) -> Result<PathBuf, Problem> {
         let found = PathBuf::from(path);
-        // What is not there and what may not be read is told alike: a page learns nothing about the rest of the disk.
-        // A pipe or a device might keep whoever reads it waiting forever.
+        // A missing path and a forbidden one are reported alike: a page learns nothing about the rest of the disk. A
+        // pipe or a device might keep its reader waiting forever.
         let is_plain = |real: &Path| real.is_file() || real.is_dir();
         let is_allowed =
             found.canonicalize().is_ok_and(|real| self.holds(&real) && is_plain(&real));
@@ -116,8 +116,7 @@ impl Files {
         self.roots.iter().find_map(|root| real.strip_prefix(&root.real).ok())
     }
 
-    /// Refuses a text that names a file elsewhere: whatever key it is, a value that is the path of something that is
-    /// there.
+    /// Refuses a text that names a file elsewhere: under any key, a value that is the path of something that exists.
     ///
     /// # Errors
     /// With the value.
@@ -127,12 +126,12 @@ impl Files {
     }
 
     fn check_value(&self, source: &Source, text: &str) -> Result<(), Problem> {
-        // It is read from the scenario's folder, wherever the server was started.
+        // Paths start at the scenario's folder, wherever the server was started.
         let real = source.path(Path::new(text)).canonicalize();
         if real.is_ok_and(|real| !self.holds(&real)) { Err(elsewhere(text)) } else { Ok(()) }
     }
 
-    /// Lists what can be opened in a folder, or all that was named at start.
+    /// Lists the things that can be opened in a folder, or everything that was named at start.
     ///
     /// # Errors
     /// When it is no folder that may be read.
@@ -187,8 +186,8 @@ fn named(source: &Source) -> Result<Vec<String>, InputError> {
     Ok(names)
 }
 
-/// Returns what is to be told of a file or folder; `None` of what cannot be opened. `foreign` counts how many files
-/// of other programs were looked into.
+/// Returns the entry of a file or folder; `None` if it cannot be opened. `foreign` counts the files of other programs
+/// that were read.
 fn entry(path: &Path, worlds: Worlds, foreign: &mut usize) -> Option<FileEntry> {
     let name = path.file_name().map_or_else(|| path.to_str(), |name| name.to_str())?;
     if name.starts_with('.') && name.len() > 1 && name != ".." {

@@ -1,10 +1,10 @@
-//! The rules of who may ask: the right host and origin on every request, and a token where others can reach the port.
+//! The rules of access: the right host and origin on every request, and a token where others can reach the port.
 //!
-//! A page of somebody else may make a browser ask a server on this machine. So the `Host` must be one of ours (else
-//! a name that was bound anew to this machine would do), and the `Origin`, which scripts cannot change, must be the
-//! page's own. A server that listens on the machine alone needs no more; any other wants a token: it is in the
+//! A foreign page may make a browser ask a server on this machine. So the `Host` must be one of ours (otherwise a
+//! name rebound to this machine would do), and the `Origin`, which scripts cannot change, must be the page's own.
+//! This is enough for a server that listens only on the machine itself; any other requires a token: it is in the
 //! address's fragment, which is never sent, and the page exchanges it for a cookie that no script can read. Browsers
-//! send that cookie to the name that it was got under alone, so there any name of the machine will do.
+//! send that cookie only to the name under which they got it, so there any name of the machine will do.
 
 use axum::http::header::{COOKIE, HOST, ORIGIN};
 use axum::http::{HeaderMap, HeaderValue};
@@ -13,15 +13,15 @@ use std::net::{IpAddr, SocketAddr};
 /// The name of the cookie, followed by the port: cookies are shared by all ports of a host.
 const COOKIE_NAME: &str = "sidestep-studio-";
 
-/// The header in which browsers say whose page asks.
+/// The header in which browsers tell the origin of the asking page.
 const SEC_FETCH_SITE: &str = "sec-fetch-site";
 
 /// The reason why a request is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Refusal {
-    /// It was sent to another name than ours.
+    /// It was sent to a name that is not ours.
     Host,
-    /// A page of somebody else sent it.
+    /// A foreign page sent it.
     Origin,
     /// It does not know the token.
     Token,
@@ -31,13 +31,13 @@ pub(crate) enum Refusal {
 #[derive(Debug, Clone)]
 pub(crate) struct Guard {
     port: u16,
-    /// A name of this machine beside its numbers, if the server was told one.
+    /// A name of this machine besides its IP addresses, if the server was given one.
     name: Option<String>,
     token: Option<String>,
 }
 
 impl Guard {
-    /// Returns the rules of a server at an address; `name` is the host that its user named.
+    /// Returns the rules of a server at an address; `name` is the host that its user gave.
     ///
     /// # Errors
     /// When the system gives no random numbers for the token.
@@ -93,8 +93,8 @@ impl Guard {
         }
     }
 
-    /// Checks that a request for something that costs work comes from our own page, also where it has no `Origin`:
-    /// a page of somebody else may make a browser fetch an address, though it never sees what comes.
+    /// Checks that a request for something that costs work comes from our own page, even if it has no `Origin`:
+    /// a foreign page may make a browser fetch an address, though it never sees the answer.
     ///
     /// # Errors
     /// When it does not.
@@ -107,10 +107,10 @@ impl Guard {
         }
     }
 
-    /// Returns the cookie for somebody who knows the token.
+    /// Returns the cookie for a client that knows the token.
     ///
     /// # Errors
-    /// When it is another.
+    /// When the client's token is wrong.
     pub(crate) fn enter(&self, said: &str) -> Result<String, Refusal> {
         let token = self.token.as_deref().unwrap_or_default();
         match self.token.is_none() || is_same(said.trim(), token) {
@@ -126,8 +126,8 @@ impl Guard {
         format!("{COOKIE_NAME}{}", self.port)
     }
 
-    /// Returns whether a host may be this machine: a number, which nobody can bind anew, `localhost`, the name that was
-    /// given, or any name where a token is needed besides. Any port will do, as one may be forwarded.
+    /// Returns whether a host may be this machine: an IP address, which cannot be rebound, `localhost`, the name that
+    /// was given, or any name where a token is needed as well. Any port will do, because it may be forwarded.
     fn is_ours(&self, host: &str) -> bool {
         let name = match host.strip_prefix('[') {
             Some(rest) => rest.split(']').next().unwrap_or_default(),
@@ -139,14 +139,14 @@ impl Guard {
     }
 }
 
-/// Returns a header that is there once, as text.
+/// Returns a header that occurs exactly once, as text.
 fn only<'a>(headers: &'a HeaderMap, name: &axum::http::HeaderName) -> Option<&'a str> {
     let mut values = headers.get_all(name).iter();
     let value = values.next()?.to_str().ok()?;
     values.next().is_none().then_some(value)
 }
 
-/// Compares in a time that does not tell where two texts differ.
+/// Compares two texts in a time that does not depend on where they differ.
 fn is_same(said: &str, token: &str) -> bool {
     let differing = said.bytes().zip(token.bytes()).fold(0, |all, (a, b)| all | (a ^ b));
     said.len() == token.len() && differing == 0

@@ -10,11 +10,11 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 
-/// The number of sessions at a time, of all sockets.
+/// The largest number of sessions at a time, of all sockets.
 const MOST_SESSIONS: u32 = 12;
-/// The number of sockets at a time.
+/// The largest number of sockets at a time.
 const MOST_SOCKETS: usize = 16;
-/// The number of threads for what is done aside: one for each socket, and some for results.
+/// The number of threads for work done aside: one for each socket, and some for results.
 pub(crate) const MOST_ASIDES: usize = MOST_SOCKETS + 4;
 /// The time that sessions have to end with the server.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -23,7 +23,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 pub(crate) struct House {
     /// The means that sessions need to begin.
     pub(crate) means: Means,
-    /// The rules of who may ask.
+    /// The rules of access.
     pub(crate) guard: Guard,
     /// The place where results are made.
     pub(crate) workshop: Workshop,
@@ -56,7 +56,7 @@ impl House {
         }
     }
 
-    /// Returns what a page is told first.
+    /// Returns the first notice for a page.
     pub(crate) fn hello(&self) -> Notice {
         Notice::Hello {
             version: VERSION,
@@ -89,7 +89,7 @@ impl House {
         self.sockets.available_permits() == 0
     }
 
-    /// Returns what tells that the server ends.
+    /// Returns the receiver that signals the end of the server.
     pub(crate) fn ending(&self) -> watch::Receiver<bool> {
         self.ending.clone()
     }

@@ -16,12 +16,13 @@ use std::time::Duration;
 
 /// Longest body of a request that is no socket: a token.
 const MOST_BODY_BYTES: usize = 256;
-/// The time for a token to come.
+/// The longest time for a token to arrive.
 const LONGEST_ENTRANCE: Duration = Duration::from_secs(10);
 /// Longest message of a socket. Longer ones than a request may be are answered; beyond this the socket is closed.
 const MOST_MESSAGE_BYTES: usize = MOST_REQUEST_BYTES + (8 << 20);
 
-/// Headers of every answer that has none of its own: the page loads nothing from elsewhere, and is shown in no other page.
+/// Headers of every answer, unless it has its own: the page loads nothing from elsewhere, and is shown in no other
+/// page.
 const HEADERS: [(HeaderName, &str); 6] = [
     (
         header::CONTENT_SECURITY_POLICY,
@@ -34,7 +35,7 @@ const HEADERS: [(HeaderName, &str); 6] = [
     (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
 ];
 
-/// Returns the routes: the page, its socket, and the way in for who has the token.
+/// Returns the routes: the page, its socket, and the entrance for holders of the token.
 pub(crate) fn routes(house: Arc<House>) -> Router {
     Router::new()
         .route("/socket", get(upgrade))
@@ -47,20 +48,20 @@ pub(crate) fn routes(house: Arc<House>) -> Router {
         .with_state(house)
 }
 
-/// Lets through what comes from our own page, and adds the headers of every answer.
+/// Lets requests of our own page through, and adds the headers of every answer.
 async fn guarded(State(house): State<Arc<House>>, request: Request, next: Next) -> Response {
     let mut response = match house.guard.admit(request.headers()) {
         Ok(()) => next.run(request).await,
         Err(refusal) => refusal.into_response(),
     };
     for (name, value) in HEADERS {
-        // A report may do something else than the page.
+        // A report has rights different from the page's.
         response.headers_mut().entry(name).or_insert(HeaderValue::from_static(value));
     }
     response
 }
 
-/// Gives up a request whose body does not come.
+/// Gives up a request if its body does not come.
 async fn hurried(request: Request, next: Next) -> Response {
     let answer = tokio::time::timeout(LONGEST_ENTRANCE, next.run(request)).await;
     answer.unwrap_or_else(|_| StatusCode::REQUEST_TIMEOUT.into_response())
@@ -79,14 +80,14 @@ async fn upgrade(
     upgrade.on_upgrade(move |socket| socket::serve(socket, house, seat))
 }
 
-/// Refuses another page.
+/// Refuses a further page.
 fn full() -> Response {
     let words =
         "So many pages are open that there is no place for another one: close one of them.\n";
     (StatusCode::SERVICE_UNAVAILABLE, words).into_response()
 }
 
-/// Tells whether the browser has the cookie, and whether there is a place for its page.
+/// Answers whether the browser has the cookie, and whether there is a place for its page.
 async fn trusted(State(house): State<Arc<House>>, headers: HeaderMap) -> Response {
     match house.guard.trust(&headers) {
         Ok(()) if house.is_full() => full(),
@@ -95,7 +96,7 @@ async fn trusted(State(house): State<Arc<House>>, headers: HeaderMap) -> Respons
     }
 }
 
-/// Gives the cookie to who knows the token.
+/// Gives the cookie to a client that knows the token.
 async fn enter(State(house): State<Arc<House>>, said: String) -> Response {
     match house.guard.enter(&said) {
         Ok(cookie) => (StatusCode::NO_CONTENT, [(header::SET_COOKIE, cookie)]).into_response(),

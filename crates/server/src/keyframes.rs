@@ -1,6 +1,6 @@
 //! Checkpoints that are kept as a run goes on, so that any earlier cycle is near one of them.
 //!
-//! They are kept by the time that computing took, not by cycles: what lies between two of them takes about as long
+//! They are spaced by computing time, not by cycles: the stretch between two of them takes about as long
 //! everywhere. Beyond the bound of memory every second one goes, and the next ones are twice as far apart.
 
 use sidestep::kernel::Cycle;
@@ -11,7 +11,7 @@ use std::time::Duration;
 
 /// The least time of computing between two keyframes, before any thinning.
 const SPACING: Duration = Duration::from_millis(20);
-/// Making a keyframe takes at most one part in so many of the time.
+/// The least ratio of computing time to the time spent on keyframes.
 const COST: u32 = 50;
 
 /// The memory for the keyframes of all runs, which share it evenly.
@@ -24,7 +24,7 @@ pub(crate) struct Budget {
 }
 
 impl Budget {
-    /// Returns a budget of so many bytes in all, and at most so many for one run.
+    /// Returns a budget of `most` bytes in all, and at most `most_of_one` for one run.
     pub(crate) fn new(most: usize, most_of_one: usize) -> Self {
         Self { used: AtomicUsize::new(0), runs: AtomicUsize::new(0), most, most_of_one }
     }
@@ -42,7 +42,7 @@ pub(crate) struct Keyframes {
     bytes: usize,
     budget: Arc<Budget>,
     spacing: Duration,
-    /// The time that computing took since the last keyframe.
+    /// The computing time since the last keyframe.
     computed: Duration,
     /// The time that the last keyframe took.
     took: Duration,
@@ -58,7 +58,7 @@ impl Keyframes {
 
     /// Notes that computing up to a cycle took a time; returns whether a keyframe of that cycle is wanted.
     pub(crate) fn is_due(&mut self, cycle: Cycle, took: Duration) -> bool {
-        // What was computed before is kept already.
+        // Cycles computed before are kept already.
         if self.kept.last_key_value().is_some_and(|(&last, _)| cycle <= last) {
             return false;
         }
@@ -71,21 +71,21 @@ impl Keyframes {
         (self.computed, self.took) = (Duration::ZERO, took);
         self.kept.insert(cycle, checkpoint);
         self.count();
-        // Others may have more than their part for a while: what is missing then is missing here.
+        // Others may have more than their part for a while: the memory missing then is missing here.
         while self.budget.used.load(Relaxed) > self.budget.most && self.kept.len() > 1 {
             self.thin();
         }
         self.fit();
     }
 
-    /// Drops what is more than the run's part, which is less whenever another run begins.
+    /// Drops keyframes beyond the run's part, which shrinks whenever another run begins.
     pub(crate) fn fit(&mut self) {
         while self.bytes > self.budget.share() && self.kept.len() > 1 {
             self.thin();
         }
     }
 
-    /// Notes how much is kept.
+    /// Notes the number of bytes kept.
     fn count(&mut self) {
         let bytes = self.kept.values().map(Vec::len).sum();
         self.budget.used.fetch_add(bytes, Relaxed);

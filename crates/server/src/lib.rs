@@ -1,19 +1,20 @@
-//! The studio's server: any world's runs, watched and steered by a page, over one WebSocket.
+//! The studio's server: runs of any world, watched and steered by a page, over one WebSocket.
 //!
 //! ```text
-//! listen.rs    the port              http.rs      routes and headers      guard.rs   who may ask
-//! page.rs      files of the page     socket.rs    one page                house.rs   what all pages share
-//! request.rs   text -> requests      protocol/    all words and frames    outbox.rs  what waits to be sent
+//! listen.rs    the port              http.rs      routes and headers      guard.rs   rules of access
+//! page.rs      files of the page     socket.rs    one page                house.rs   shared state
+//! request.rs   text -> requests      protocol/    all words and frames    outbox.rs  mail to be sent
 //! session/     one thread per run    keyframes.rs checkpoints for seeking
-//! serve.rs     connections           doors.rs     how many of them
+//! serve.rs     connections           doors.rs     limits of these
 //! encode/      frames as bytes       samples.rs   metrics against time    chronicle.rs   events
-//! files.rs     what may be read      write.rs     what may be written     beside.rs      what a text can name
+//! files.rs     readable files        write.rs     writable files          beside.rs      files a text can name
 //! results/     reports, exports      zip.rs       answers made small
 //! screen.rs    fleets that fly elsewhere
 //! ```
 //! A session is a thread that owns a `Simulation`. Sockets pass requests to it by a channel and take replies, states
-//! and frames from an outbox into which sessions put without waiting. So nothing that a page does or leaves undone
-//! reaches a result, and a slow page loses frames, never the run. Whoever starts the server hands the worlds in.
+//! and frames from an outbox into which sessions put without waiting. So no action or omission of a page affects a
+//! result, and a slow page loses frames, never the run. The worlds are passed in by the program that starts the
+//! server.
 
 mod beside;
 mod chronicle;
@@ -61,7 +62,7 @@ use std::time::Duration;
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::watch;
 
-/// The largest number of frames that a session makes in a second.
+/// The largest number of frames made by a session in a second.
 pub const FRAMES_PER_S: u32 = 30;
 /// The bound of memory for the keyframes of a session.
 pub const KEYFRAME_BYTES: usize = 256 << 20;
@@ -81,19 +82,19 @@ pub struct Options {
     pub named: Vec<PathBuf>,
     /// The address to listen at.
     pub host: String,
-    /// The port; 0 for any free one, `None` for the first free one of some.
+    /// The port; 0 for any free one, `None` for the first free one of a range.
     pub port: Option<u16>,
     /// Whether texts of pages are refused, and nothing is written.
     pub read_only: bool,
     /// The number of worker threads of each session.
     pub workers: usize,
-    /// The settled address at which viewers of Foxglove's protocol watch the session that was opened last.
+    /// The configured address at which viewers of Foxglove's protocol watch the session that was opened last.
     pub foxglove: Option<ViewersAt>,
     /// Fleets that fly elsewhere, which are opened and only watched.
     pub screens: Vec<Arc<Screen>>,
 }
 
-/// A server that runs, until it is ended or dropped.
+/// A running server, until it is ended or dropped.
 pub struct Studio {
     address: SocketAddr,
     token: Option<String>,
@@ -102,10 +103,10 @@ pub struct Studio {
 }
 
 impl Studio {
-    /// Starts a server in a thread of its own.
+    /// Starts a server in its own thread.
     ///
     /// # Errors
-    /// When something that was named is not there, or the port cannot be had.
+    /// When something that was named is not there, or the port cannot be taken.
     pub fn start(options: Options) -> Result<Self, Error> {
         let (folders, mut open) = divided(&options.named);
         open.extend(
@@ -154,18 +155,18 @@ impl Studio {
         format!("http://{host}:{}/{token}", self.address.port())
     }
 
-    /// Returns the number by which it is reached; `None` where it listens at all of them and none is known.
+    /// Returns the IP address by which it is reached; `None` where it listens at all of them and none is known.
     fn ip(&self) -> Option<IpAddr> {
         let ip = self.address.ip();
         if ip.is_unspecified() { listen::own_address(ip) } else { Some(ip) }
     }
 
-    /// Returns whether its address names this machine in a way that others cannot use.
+    /// Returns whether its address names this machine in a way that other machines cannot use.
     pub fn is_named_for_itself(&self) -> bool {
         self.ip().is_none_or(|ip| ip.is_loopback())
     }
 
-    /// Returns whether others than this machine can reach it.
+    /// Returns whether other machines can reach it.
     pub fn is_open_to_others(&self) -> bool {
         self.token.is_some()
     }
@@ -177,7 +178,7 @@ impl Studio {
 }
 
 impl Drop for Studio {
-    /// Ends all sessions, and waits for that.
+    /// Ends all sessions, and waits for them.
     fn drop(&mut self) {
         self.ending.send_replace(true);
         if let Some(thread) = self.thread.take() {
@@ -189,7 +190,7 @@ impl Drop for Studio {
 /// Answers requests until the server is ended.
 fn run(runtime: Runtime, listener: TcpListener, house: &Arc<House>) {
     runtime.block_on(async {
-        // Nothing that is bound and not blocking is refused.
+        // A bound, nonblocking listener is never refused.
         let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
         let (routes, ending) = (http::routes(house.clone()), house.ending());
         serve::serve(listener, routes, ending, Patience::default()).await;
@@ -198,7 +199,7 @@ fn run(runtime: Runtime, listener: TcpListener, house: &Arc<House>) {
     runtime.shutdown_timeout(Duration::from_millis(100));
 }
 
-/// Returns the folders that may be read, and what is to be opened.
+/// Returns the folders that may be read, and the things to open.
 fn divided(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<Named>) {
     let (mut folders, mut open): (Vec<PathBuf>, Vec<Named>) = Default::default();
     for path in named {
@@ -213,7 +214,7 @@ fn divided(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<Named>) {
             };
             open.push(Named { kind: kind.into(), path: path.display().to_string() });
         }
-        // What a scenario names lies beside it.
+        // The files that a scenario names lie beside it.
         let folder = match (path.is_dir() || !path.exists(), path.parent()) {
             (false, Some(parent)) if parent != Path::new("") => parent.to_path_buf(),
             (false, _) => ".".into(),

@@ -5,15 +5,15 @@ use sidestep_session::next_free;
 use std::io;
 use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs, UdpSocket};
 
-/// The first port that is tried where none is asked for.
+/// The first port that is tried where none is given.
 const FIRST_PORT: u16 = 7800;
 /// The number of ports that are tried.
 const PORTS: u16 = 100;
 
-/// Binds the port that is asked for; the first free one of some where none is.
+/// Binds the given port, or the first free one of a range.
 ///
 /// # Errors
-/// When the address is not one of this machine, or the port is in use; then with the next free one.
+/// When the address is not one of this machine, or the port is in use; the error then names the next free one.
 pub(crate) fn bind(host: &str, port: Option<u16>) -> Result<TcpListener, InputError> {
     let ip = resolve(host)?;
     let at = |port: u16| TcpListener::bind(SocketAddr::new(ip, port));
@@ -50,10 +50,10 @@ fn unusable(host: &str, error: &io::Error) -> InputError {
     InputError::new(format!("--addr {host}"), error.to_string(), remedy)
 }
 
-/// Returns the address by which others reach this machine, if it has one: that from which it would send to them.
-/// Nothing is sent for it.
+/// Returns the address by which others reach this machine, if it has one: the one from which it would send to them.
+/// Nothing is sent to find it.
 pub(crate) fn own_address(ip: IpAddr) -> Option<IpAddr> {
-    // Addresses of documentation, which lead nowhere, but by the way that all others take.
+    // Addresses reserved for documentation: they lead nowhere, but take the route of all others.
     let far: SocketAddr = match ip {
         IpAddr::V4(_) => ([192, 0, 2, 1], 9).into(),
         IpAddr::V6(_) => ([0x2001, 0xdb8, 0, 0, 0, 0, 0, 1], 9).into(),

@@ -1,4 +1,4 @@
-//! Messages that wait to be sent to one socket: of texts all, of frames and states the newest only.
+//! Messages that wait to be sent to one socket: all texts, but only the newest frames and states.
 //!
 //! Sessions put things here from their threads and never wait; the socket takes them when it can.
 
@@ -35,7 +35,7 @@ struct Waiting {
     last: SessionId,
 }
 
-/// The newest of one session.
+/// The newest frame and state of one session.
 #[derive(Debug, Default)]
 struct Newest {
     status: Option<String>,
@@ -43,14 +43,14 @@ struct Newest {
     frame: Option<Vec<u8>>,
 }
 
-/// Returns a text of ours, in which nothing can fail.
+/// Returns one of our messages as JSON, which cannot fail.
 fn json(value: &impl serde::Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }
 
 impl Outbox {
     fn waiting(&self) -> MutexGuard<'_, Waiting> {
-        // What waits is whole after every step, also if a thread panicked between two of them.
+        // The mail is consistent after every step, even if a thread panicked between two of them.
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -65,7 +65,7 @@ impl Outbox {
         waiting.open_requests + waiting.texts.len()
     }
 
-    /// Notes that the request that was taken in is a long one.
+    /// Notes that the request just taken in is a long one.
     pub(crate) fn note_long(&self, id: u32, bytes: usize) {
         self.waiting().long.push((id, bytes));
     }
@@ -88,22 +88,22 @@ impl Outbox {
         self.ready.notify_one();
     }
 
-    /// Sends a notice: all of them, in their order.
+    /// Sends a notice; all of them go out, in their order.
     pub(crate) fn notice(&self, notice: &Notice) {
         let text = json(notice);
         self.waiting().texts.push_back(text);
         self.ready.notify_one();
     }
 
-    /// Sends the state of a session, unless a newer one comes before it was sent.
+    /// Sends the state of a session, unless a newer one comes before it has been sent.
     pub(crate) fn status(&self, session: SessionId, status: &Notice) {
         let text = json(status);
         self.waiting().newest.entry(session).or_default().status = Some(text);
         self.ready.notify_one();
     }
 
-    /// Sends a frame, and the cast that it begins, unless a newer one comes before it was sent. Returns whether it
-    /// takes the place of one that was not sent.
+    /// Sends a frame, and the cast that it begins, unless a newer one comes before it has been sent. Returns whether
+    /// it replaces one that was not sent.
     pub(crate) fn frame(&self, session: SessionId, cast: Option<&Notice>, frame: Vec<u8>) -> bool {
         let cast = cast.map(json);
         let mut waiting = self.waiting();
@@ -123,7 +123,7 @@ impl Outbox {
         newest.is_some_and(|newest| newest.frame.is_some())
     }
 
-    /// Returns what is to be sent next: texts first, then in turn what the sessions have.
+    /// Returns the next message to send: texts first, then the mail of the sessions in turn.
     pub(crate) fn next(&self) -> Option<Mail> {
         let mut waiting = self.waiting();
         if let Some(text) = waiting.texts.pop_front() {

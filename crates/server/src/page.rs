@@ -29,7 +29,7 @@ static ZIPPED: LazyLock<BTreeMap<&str, Vec<u8>>> = LazyLock::new(|| {
     smaller.map(|(asset, zipped)| (asset.path, zipped)).collect()
 });
 
-/// Files in this folder have a digest in their names: what has been loaded once stays right.
+/// Files in this folder have a digest in their names: a loaded file stays right.
 const LASTING: &str = "assets/";
 
 /// Returns the file at a path. A path without a dot is the page itself, so that its own addresses can be opened.
@@ -43,7 +43,7 @@ pub(crate) fn answer(path: &str, headers: &HeaderMap) -> Response {
     let is_lasting = asset.path.starts_with(LASTING);
     let cache = if is_lasting { "public, max-age=31536000, immutable" } else { "no-cache" };
     let zipped = ZIPPED.get(asset.path).filter(|_| zip::is_taken(headers));
-    // What is another sequence of bytes has another tag.
+    // A different sequence of bytes needs a different tag.
     let tag = match zipped {
         Some(_) => asset.tag.trim_end_matches('"').to_string() + "-gzip\"",
         None => asset.tag.to_string(),

@@ -1,4 +1,4 @@
-//! Reads requests: whatever a page sends, there is an answer.
+//! Reading of requests: every message of a page gets an answer.
 
 use crate::protocol::{Call, Problem, Request, SessionId};
 use serde::Deserialize;
@@ -7,7 +7,7 @@ use serde::Deserialize;
 /// it replaces, both as JSON.
 pub const MOST_REQUEST_BYTES: usize = 40 << 20;
 
-/// A request of which nothing but its number can be read.
+/// A request of which only the number can be read.
 #[derive(Deserialize)]
 struct Numbered {
     id: u32,
@@ -16,7 +16,7 @@ struct Numbered {
 /// Returns the request in a text.
 ///
 /// # Errors
-/// With the number of the request, 0 if it cannot be found, and what is wrong.
+/// With the number of the request, 0 if it cannot be found, and the problem.
 pub fn decode(text: &str) -> Result<Request, Box<(u32, Problem)>> {
     if text.len() > MOST_REQUEST_BYTES {
         let cause = format!("it has more than {MOST_REQUEST_BYTES} bytes");
@@ -36,7 +36,7 @@ fn number(text: &str) -> u32 {
 }
 
 impl Call {
-    /// Returns the session that is asked, if it is one.
+    /// Returns the session asked, if it is a question to one.
     pub(crate) fn session(&self) -> Option<SessionId> {
         match *self {
             Self::Files { .. } | Self::Open { .. } | Self::Runs { .. } | Self::Schema { .. } => {

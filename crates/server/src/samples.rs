@@ -6,13 +6,13 @@ use sidestep::kernel::Cycle;
 use sidestep::scenario::{Meaning, Told, told};
 use std::time::Duration;
 
-/// Samples beyond this number are thinned by half.
+/// The largest number of samples; beyond it they are thinned by half.
 const MOST_SAMPLES: usize = 2048;
-/// Metrics beyond this number are left out.
+/// The largest number of metrics; further ones are left out.
 const MOST_METRICS: usize = 400;
 /// The least time between two samples, before any thinning.
 const SPACING: Duration = Duration::from_millis(100);
-/// Sampling takes at most one part in so many of the time.
+/// The least ratio of total time to the time spent on sampling.
 const COST: u32 = 100;
 
 /// The samples of one run.
@@ -41,7 +41,7 @@ impl Samples {
         }
     }
 
-    /// Returns whether a sample of a cycle is wanted so long after the last one.
+    /// Returns whether a sample of a cycle is wanted, a given time after the last one.
     pub(crate) fn is_due(&self, cycle: Cycle, since: Duration) -> bool {
         let Some(&last) = self.cycles.last() else { return true };
         cycle > last && since >= self.spacing.max(self.took.saturating_mul(COST))
@@ -52,7 +52,7 @@ impl Samples {
         self.cycles.last().is_none_or(|&last| cycle > last)
     }
 
-    /// Keeps the metrics of a cycle, which took a time to be told.
+    /// Keeps the metrics of a cycle, and the time that it took to get them.
     pub(crate) fn keep(&mut self, cycle: Cycle, metrics: &Value, took: Duration) {
         self.took = took;
         let mut found = Vec::new();
@@ -106,7 +106,7 @@ impl Samples {
     }
 }
 
-/// Collects the numbers of a tree, named by the way to them; lists are no metrics.
+/// Collects the numbers of a tree, named by the path to them; lists are no metrics.
 fn numbers(tree: &Value, path: &str, found: &mut Vec<(String, f64)>) {
     match tree {
         Value::Number(number) => {

@@ -1,13 +1,13 @@
-//! Screens: what is heard of fleets that fly elsewhere, for the sessions that show it.
+//! Screens: views of fleets that fly elsewhere, for the sessions that show them.
 //!
-//! Whoever hears a fleet puts the newest view here and never waits; sessions take it when they can.
+//! The thread that hears a fleet puts the newest view here and never waits; sessions take it when they can.
 
 use crate::protocol::{Fleet, Node, Problem, Who};
 use sidestep_session::fleet::{FleetNow, NodeNow, Seen, Staged};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// A fleet as it is heard.
+/// A fleet as heard from its server.
 #[derive(Debug)]
 pub struct Screen {
     /// The endpoint by which it is named.
@@ -18,11 +18,11 @@ pub struct Screen {
 /// The newest view, and whether it is the last.
 #[derive(Debug, Clone)]
 pub(crate) struct Shown {
-    /// The part that stays as it is while one fleet flies.
+    /// The part that stays the same while one fleet flies.
     pub(crate) staged: Arc<Staged>,
     pub(crate) seen: Option<Arc<Seen>>,
     pub(crate) heard: Instant,
-    /// The reason why nothing more is seen.
+    /// The reason why no more views come.
     pub(crate) lost: Option<Problem>,
 }
 
@@ -32,7 +32,7 @@ impl Screen {
         Self { endpoint, shown: Mutex::new(Shown::of(staged)) }
     }
 
-    /// Begins to show another fleet that flies there, or the same one once more: nothing of it yet.
+    /// Begins to show another fleet at the endpoint, or the same one once more, without a view yet.
     pub fn begin(&self, staged: Staged) {
         *self.lock() = Shown::of(staged);
     }
@@ -41,13 +41,13 @@ impl Screen {
         self.shown.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Shows a view in the place of the one before.
+    /// Shows a view in place of the one before.
     pub fn show(&self, seen: Seen) {
         let mut shown = self.lock();
         (shown.seen, shown.heard) = (Some(Arc::new(seen)), Instant::now());
     }
 
-    /// Tells why nothing more is seen of a fleet that has not come to its end.
+    /// Notes why no more views come of a fleet that has not come to its end.
     pub fn lose(&self, cause: &str, remedy: &str) {
         let mut shown = self.lock();
         if shown.seen.as_ref().is_none_or(|seen| !seen.is_over) {
@@ -55,7 +55,7 @@ impl Screen {
         }
     }
 
-    /// Returns what is shown now.
+    /// Returns the present view.
     pub(crate) fn now(&self) -> Shown {
         self.lock().clone()
     }
@@ -67,7 +67,7 @@ impl Shown {
     }
 }
 
-/// Returns a fleet as a page is told, which was heard some seconds ago.
+/// Returns a fleet, last heard some seconds ago, in the words of the protocol.
 pub(crate) fn told(now: &FleetNow, silent_s: f64) -> Fleet {
     Fleet {
         has_begun: now.has_begun,

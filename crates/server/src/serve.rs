@@ -1,4 +1,4 @@
-//! Connections: taken, served for a time, and ended. None that says nothing keeps its place.
+//! Connections: taken, served for a time, and ended. No silent one keeps its place.
 
 use crate::doors::{Doors, Place};
 use axum::Router;
@@ -33,16 +33,16 @@ impl Default for Patience {
     }
 }
 
-/// The time for an answer that is under way when a connection ends.
+/// The time that an answer under way has when a connection ends.
 const GRACE: Duration = Duration::from_secs(1);
-/// The wait where the system gives no connections, as there are too many files.
+/// The wait where the system gives no connections, because too many files are open.
 const PAUSE: Duration = Duration::from_millis(500);
-/// The number of connections that are told at a time that there are too many.
+/// The number of connections refused with an answer at a time.
 const MOST_TOLD: usize = 32;
 const TOO_MANY: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\ncontent-type: text/plain; charset=utf-8\r\n\
     connection: close\r\ncontent-length: 63\r\n\r\nThere are too many connections: close pages, and try it again.\n";
 
-/// Answers requests until the server ends, as `ending` tells.
+/// Answers requests until the server ends, as `ending` signals.
 pub(crate) async fn serve(
     listener: TcpListener,
     routes: Router,
@@ -59,7 +59,7 @@ pub(crate) async fn serve(
             sleep(PAUSE).await;
             continue;
         };
-        // Frames are sent at once. Without it they are only late.
+        // With it frames are sent at once; without it they are only late.
         let _ = stream.set_nodelay(true);
         match (doors.enter(address.ip()), told.clone().try_acquire_owned()) {
             (Some(place), _) => {
@@ -110,7 +110,7 @@ async fn converse(
     let _ = timeout(GRACE, served).await;
 }
 
-/// The instant since which a peer takes nothing of what is written, while it does not.
+/// The instant since which a peer has taken none of the written bytes, as long as it takes none.
 #[derive(Debug, Clone, Default)]
 struct Stuck(Arc<Mutex<Option<Instant>>>);
 
@@ -121,7 +121,7 @@ impl Stuck {
         *since = if waits { since.or_else(|| Some(Instant::now())) } else { None };
     }
 
-    /// Waits until the peer has taken nothing for so long.
+    /// Waits until the peer has taken nothing for the given time.
     async fn lasts(&self, longest: Duration) {
         loop {
             let since = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -135,7 +135,7 @@ impl Stuck {
 
 /// Waits until the server ends.
 pub(crate) async fn ended(mut ending: watch::Receiver<bool>) {
-    // Whoever could end it otherwise is gone: then it ends, too.
+    // An error means that its owner is gone: then it ends, too.
     let _ = ending.wait_for(|ends| *ends).await;
 }
 
@@ -143,7 +143,7 @@ pub(crate) async fn ended(mut ending: watch::Receiver<bool>) {
 async fn turn_away(mut stream: TcpStream) -> io::Result<()> {
     stream.write_all(TOO_MANY).await?;
     stream.shutdown().await?;
-    // What it said must be read, or the system may throw away what it is told.
+    // Its request must be read, or the system may discard our answer.
     let mut said = [0; 1024];
     while stream.read(&mut said).await? > 0 {}
     Ok(())
@@ -192,7 +192,7 @@ mod tests {
     use axum::routing::get;
     use std::io::{Read, Write};
 
-    /// A server of one word, with little patience; returns its address, and what ends it.
+    /// A server of one word, with little patience; returns its address, and the sender that ends it.
     fn impatient(longest: Duration) -> (std::net::SocketAddr, watch::Sender<bool>) {
         let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
         let address = listener.local_addr().expect("bound");
@@ -223,7 +223,7 @@ mod tests {
         stream
     }
 
-    /// The words that are said until the connection ends; a cut one has said nothing more.
+    /// The words received until the connection ends, however it ends.
     fn heard(mut stream: std::net::TcpStream) -> String {
         let mut said = Vec::new();
         let _ = stream.read_to_end(&mut said);
@@ -303,7 +303,7 @@ mod tests {
         let mut told = String::new();
         let mut inside: Vec<std::net::TcpStream> = Vec::new();
         while !told.starts_with("HTTP/1.1 503") {
-            // They keep their places for a while, and are ended then.
+            // They keep their places for a while, and are then ended.
             inside.clear();
             inside.extend((0..128).map(|_| connect(address)));
             told = ask(connect(address));

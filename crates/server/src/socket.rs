@@ -1,4 +1,4 @@
-//! One page's socket: requests to sessions, and what they have to say.
+//! One page's socket: requests to sessions, and their messages.
 
 use crate::house::House;
 use crate::outbox::{Mail, Outbox};
@@ -16,21 +16,21 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::task::spawn_blocking;
 use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
-/// The number of sessions of a socket.
+/// The largest number of sessions of a socket.
 const MOST_SESSIONS: usize = 4;
-/// Requests and replies beyond this number wait in the network.
+/// The largest number of open requests and unsent replies; further ones wait in the network.
 const MOST_BACKLOG: usize = 64;
-/// Requests of more bytes are long.
+/// The size in bytes above which a request is long.
 const LONG_BYTES: usize = 1 << 20;
-/// While long requests of so many bytes are not answered, others wait in the network.
+/// The bytes of unanswered long requests beyond which others wait in the network.
 const MOST_LONG_BYTES: usize = 64 << 20;
-/// Requests per second, over a while.
+/// Sustained number of requests per second.
 const REQUESTS_PER_S: f64 = 300.0;
-/// Requests that may come at once.
+/// The number of requests that may come at once.
 const REQUESTS_AT_ONCE: f64 = 600.0;
-/// A page is asked for a sign of life so often.
+/// The time between two requests for a sign of life.
 const PING: Duration = Duration::from_secs(30);
-/// A page that takes nothing and says nothing for so long is gone.
+/// The silence after which a page counts as gone.
 const SILENCE: Duration = Duration::from_secs(600);
 
 /// Serves a page until it leaves or the server ends. Its sessions end with it.
@@ -43,7 +43,7 @@ pub(crate) async fn serve(mut socket: WebSocket, house: Arc<House>, _seat: Owned
         () = house.ended() => {}
         () = talk(&mut socket, desk, &outbox) => {}
     }
-    // A page that reads is told that this is the end; any other need not be waited for.
+    // A page that reads learns that this is the end; there is no need to wait for any other.
     let _ = timeout(Duration::from_millis(200), socket.send(Message::Close(None))).await;
 }
 
@@ -101,7 +101,7 @@ struct Allowance {
 }
 
 impl Allowance {
-    /// Takes one request; waits where there were too many.
+    /// Takes one request; waits if there were too many.
     async fn spend(&mut self) {
         let now = Instant::now();
         let more = now.duration_since(self.at).as_secs_f64() * REQUESTS_PER_S;
@@ -117,13 +117,13 @@ struct Desk {
     house: Arc<House>,
     outbox: Arc<Outbox>,
     sessions: BTreeMap<SessionId, Session>,
-    /// One thread for what reads files, so that a page that asks for much of it keeps no other page waiting.
+    /// One thread for work that reads files, so that a page with many such requests keeps no other page waiting.
     aside: Arc<Semaphore>,
 }
 
 impl Drop for Desk {
     fn drop(&mut self) {
-        // What waits for its turn is wanted no more.
+        // Work that waits for its turn is no longer wanted.
         self.aside.close();
     }
 }
@@ -154,7 +154,7 @@ impl Desk {
         refuse(&self.outbox, 0, problem);
     }
 
-    /// Passes a request on; returns the answer to one that nobody else answers.
+    /// Passes a request on; returns the answer to one that is not answered elsewhere.
     fn dispatch(&mut self, id: u32, call: Call) -> Option<Result<Answer, Problem>> {
         match call {
             Call::Files { folder } => {
@@ -231,12 +231,12 @@ impl Desk {
         None
     }
 
-    /// Answers a request in another thread, one after the other, as it may read files.
+    /// Answers a request in another thread, one after the other, because it may read files.
     fn aside(&self, id: u32, work: impl FnOnce() -> Result<Answer, Problem> + Send + 'static) {
         let (outbox, aside) = (self.outbox.clone(), self.aside.clone());
         tokio::spawn(async move {
             let Ok(_turn) = aside.acquire().await else { return };
-            // It cannot panic: what it does is guarded.
+            // It cannot panic: its work is guarded.
             let _ = spawn_blocking(move || guarded(&outbox, id, || Some(work()))).await;
         });
     }
@@ -254,7 +254,7 @@ fn schema(worlds: Worlds, world: &str) -> Result<Answer, Problem> {
     Ok(Answer::Schema { schema })
 }
 
-/// Answers a request with what `work` returns, if it returns anything, and with a problem if it panics.
+/// Answers a request with the result of `work`, if there is one, and with a problem if it panics.
 fn guarded(outbox: &Outbox, id: u32, work: impl FnOnce() -> Option<Result<Answer, Problem>>) {
     let done = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
         let cause = "this is a bug in sidestep";

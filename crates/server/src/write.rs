@@ -8,7 +8,7 @@ use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Larger files are not replaced.
+/// The size of the largest file that is replaced.
 const MOST_BYTES: u64 = 16 << 20;
 const GZIP_MAGIC: &[u8] = &[0x1f, 0x8b];
 const BYTE_ORDER_MARK: &str = "\u{feff}";
@@ -16,7 +16,7 @@ const BYTE_ORDER_MARK: &str = "\u{feff}";
 /// A file that a page may write.
 #[derive(Debug)]
 pub(crate) struct Target {
-    /// Its path as it was named.
+    /// Its path as named.
     pub(crate) path: PathBuf,
     /// Its path without links.
     pub(crate) real: PathBuf,
@@ -40,7 +40,7 @@ impl Files {
             Err(Problem::new(path, cause, remedy))
         };
         let named = PathBuf::from(path);
-        // A folder that is not there and one that may not be read are told alike.
+        // A missing folder and a forbidden one are reported alike.
         let real = real(&named).unwrap_or_default();
         let Some(below) = self.below_root(&real) else {
             return refuse("is in no folder below those that were named at start");
@@ -60,7 +60,7 @@ impl Files {
     }
 }
 
-/// Returns the path without links of a file that is there, or that can be made.
+/// Returns the path without links of a file that exists, or that can be created.
 fn real(path: &Path) -> Option<PathBuf> {
     // A link to nowhere could be made to lead anywhere.
     if path.is_symlink() || path.exists() {
@@ -71,10 +71,10 @@ fn real(path: &Path) -> Option<PathBuf> {
     Some(folder.join(path.file_name()?))
 }
 
-/// Replaces a file by a text, or makes it, if what it holds may be replaced. Otherwise returns what it holds.
+/// Replaces a file by a text, or makes it, if its content may be replaced. Otherwise returns its content.
 ///
 /// # Errors
-/// When it cannot be written, or is another's and no scenario; then it is as it was.
+/// When it cannot be written, or is a foreign file and no scenario; then it stays as it was.
 pub(crate) fn replaced(
     target: &Target,
     text: &str,
@@ -91,7 +91,7 @@ pub(crate) fn replaced(
     }
     let growing = Growing::new(target).and_then(|growing| growing.filled(text, old.as_ref()));
     let growing = growing.map_err(|error| unwritten(target, &error))?;
-    // It took a while to write it.
+    // Writing took a while.
     let again = read(target)?;
     match again
         .filter(|again| Some(again.text.as_str()) != found && !may_replace(Some(&again.text)))
@@ -133,7 +133,7 @@ fn try_read(path: &Path) -> io::Result<(Vec<u8>, Permissions)> {
     Ok((bytes, permissions))
 }
 
-/// Refuses what is not replaced even where a page insists.
+/// Refuses files that are not replaced even where a page insists.
 fn check(target: &Target, old: &Old, is_own: bool) -> Result<(), Problem> {
     let place = target.path.display().to_string();
     if old.permissions.readonly() {
@@ -165,7 +165,7 @@ fn unwritten(target: &Target, error: &io::Error) -> Problem {
     Problem::new(target.path.display().to_string(), cause, remedy)
 }
 
-/// A file that is written beside the one that it will replace, and taken away if it does not.
+/// A file that is written beside the one that it will replace, and removed if it does not.
 struct Growing {
     path: PathBuf,
     file: File,
@@ -195,7 +195,7 @@ impl Growing {
     fn finish(mut self, target: &Target) -> io::Result<()> {
         fs::rename(&self.path, &target.real)?;
         self.is_done = true;
-        // The file is replaced by now, and either text is whole whatever happens. Not all file systems sync folders.
+        // The file is replaced by now, and either text is whole in any case. Not all file systems sync folders.
         let _ = sync_folder(&target.real);
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! Answers made small on their way: gzip, for browsers that take it, which are all of today's.
+//! Compression of answers: gzip, for browsers that take it, which all of today's do.
 
 use axum::http::HeaderMap;
 use axum::http::header::ACCEPT_ENCODING;

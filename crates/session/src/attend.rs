@@ -1,4 +1,4 @@
-//! Work that a caller attends: on a thread of its own, while the caller looks up again and again.
+//! Work that a caller attends: it runs on a thread of its own, while the caller checks for signals again and again.
 
 use std::panic::resume_unwind;
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -8,14 +8,14 @@ use std::time::Duration;
 /// Time between two looks.
 const EVERY: Duration = Duration::from_millis(20);
 
-/// Does `work` on a thread of its own and calls `look` on this one every 20 ms until it is done: for callers whose
-/// thread alone hears of signals.
+/// Does `work` on a thread of its own and calls `look` on this one every 20 ms until it is done: for callers on the
+/// only thread that hears of signals.
 pub fn attended<T: Send>(work: impl FnOnce() -> T + Send, mut look: impl FnMut()) -> T {
     thread::scope(|scope| {
         let (done, wait) = channel();
         let worker = scope.spawn(move || {
             let result = work();
-            // Whoever waits sees the end of the work at once; if nobody does, nothing is lost.
+            // A waiting caller sees the end of the work at once; without one, nothing is lost.
             let _ = done.send(());
             result
         });

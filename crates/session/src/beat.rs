@@ -3,7 +3,7 @@
 use sidestep::kernel::Cycle;
 use std::time::{Duration, Instant};
 
-/// A run that is so late does not hurry to catch up.
+/// The delay beyond which a run does not rush to catch up.
 const LATE: Duration = Duration::from_millis(250);
 
 /// The clock of a run that is played at a speed.
@@ -15,12 +15,12 @@ pub struct Beat {
 }
 
 impl Beat {
-    /// Returns the clock of a run that stands at a cycle.
+    /// Returns the clock of a run that is at a cycle.
     pub fn new(cycles_per_s: f64, now: Instant, from: Cycle) -> Self {
         Self { start: now, from, cycles_per_s }
     }
 
-    /// Returns the cycle at which a run should be that is now at `cycle`; one that is too late is waited for.
+    /// Returns the cycle at which a run that is now at `cycle` should be; the clock waits for one that is too late.
     pub fn target(&mut self, now: Instant, cycle: Cycle) -> Cycle {
         let due = self.due(now);
         let late = due.saturating_sub(cycle) as f64 / self.cycles_per_s;
@@ -33,14 +33,14 @@ impl Beat {
 
     fn due(&self, now: Instant) -> Cycle {
         let passed_s = now.saturating_duration_since(self.start).as_secs_f64();
-        // A little more, so that a wait until a cycle is due ends when it is.
+        // A little more, so that a wait for a cycle ends with the cycle due.
         self.from + (passed_s * self.cycles_per_s + 1e-6) as u64
     }
 
-    /// Returns when the cycle after this one is due.
+    /// Returns the time at which the cycle after this one is due.
     pub fn next(&self, cycle: Cycle) -> Instant {
         let cycles = (cycle + 1).saturating_sub(self.from) as f64;
-        // No wait is longer than an hour; it is asked again then.
+        // No wait is longer than an hour; the caller asks again then.
         self.start + Duration::from_secs_f64((cycles / self.cycles_per_s).min(3600.0))
     }
 }

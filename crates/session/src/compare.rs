@@ -63,7 +63,7 @@ fn differs(cycle: u64, bodies: usize, (kind, number, part): &Who) -> Error {
     Error::stopped(cause, remedy)
 }
 
-/// Returns the bodies whose recorded rows differ from the present ones.
+/// Returns the bodies with recorded rows that differ from the present ones.
 fn differences<'a>(
     rows: &PlaceRows,
     table: &Table,
@@ -94,7 +94,7 @@ fn by_body<'a>(
     for row in 0..count {
         let number = word(rows.number, row).unwrap_or(u32::MAX);
         let of = (rows.kind, number, rows.part.and_then(|part| word(part, row)));
-        // A missing value has bits that no present value has.
+        // A missing value has bits that differ from those of every other value.
         let cells = columns.iter().flat_map(|values| match values {
             Some(values) if !values.is_missing(row) => [1, bits(values, row)],
             _ => [0, 0],

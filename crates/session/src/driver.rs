@@ -39,7 +39,7 @@ impl std::ops::AddAssign for Effort {
 pub struct Sinks<'a> {
     /// Rows and checkpoints.
     pub recording: Option<&'a mut Recording>,
-    /// Rows alone, for who keeps them in memory; they are handed over once, so there is no recording then.
+    /// Rows alone, for callers that keep them in memory; they are handed over once, so there is no recording then.
     pub rows: Option<&'a mut dyn Recorder>,
     /// The recording or animation that takes frames.
     pub film: Option<&'a mut dyn Film>,
@@ -62,11 +62,10 @@ pub fn drive(
     heeding(run, watcher, |run| slices(run, until, sinks, watcher))
 }
 
-/// Lets a run work in a way in which the watcher can interrupt it within a cycle.
+/// Lets a run work so that the watcher can interrupt it within a cycle.
 ///
 /// # Errors
-/// Those of `work`; [`Error::WithinACycle`] when the watcher's interrupt was raised, and then the run
-/// is of no more use.
+/// Those of `work`; [`Error::WithinACycle`] when the watcher's interrupt was raised, and the run is useless then.
 pub(crate) fn heeding<T>(
     run: &mut dyn Simulation,
     watcher: &dyn Watcher,

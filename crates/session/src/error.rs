@@ -17,7 +17,7 @@ pub enum Error {
     /// A picture could not be drawn.
     #[error("the picture cannot be drawn: {0}")]
     Draw(#[from] DrawError),
-    /// The watcher asked to stop before there was anything to keep.
+    /// The watcher asked to stop before there was a result to keep.
     #[error("interrupted; nothing was written")]
     Interrupted,
     /// The watcher interrupted a run within a cycle that took too long to wait for. The number of

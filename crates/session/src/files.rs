@@ -5,13 +5,13 @@ use std::fs::File;
 use std::io::{BufWriter, Result, Write};
 use std::path::{Path, PathBuf};
 
-/// Returns a path for programs and people to read. One that is no text is told with marks in place of what is none: JSON
-/// has no other words for it, and a result must not be lost for its name.
+/// Returns a path for programs and people to read. One that is not valid text is shown with marks in place of the
+/// invalid parts: JSON cannot express it otherwise, and a result must not be lost because of its name.
 pub fn shown(path: impl AsRef<Path>) -> String {
     path.as_ref().display().to_string()
 }
 
-/// Returns where a path leads, links resolved as far as it is there: two ways to one place are equal.
+/// Returns the target of a path, links resolved as far as it exists: two paths to one place are equal.
 pub(crate) fn whereabouts_of(path: &Path) -> PathBuf {
     let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let real = |above: &Path| {
@@ -40,7 +40,7 @@ pub fn replace(
         .map_err(|e| Error::write(path, &e))
 }
 
-/// Fills a file, in a folder that is made if there is none.
+/// Fills a file, in a folder that is created if there is none.
 fn fill(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -> Result<()> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;

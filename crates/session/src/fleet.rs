@@ -1,8 +1,8 @@
-//! The language in which a command asks the program `sidestep-link` to fly a fleet, and that one answers.
+//! The language in which a command asks the program `sidestep-link` to fly a fleet, and in which that answers.
 //!
 //! One line of JSON goes in, a [`Job`]; lines of JSON come out, [`Told`]. The program ends in good order when its
-//! standard input ends: whoever started it is gone, or wants it to end. So no process is left over, however
-//! the one before it has ended.
+//! standard input ends: the process that started it is gone, or wants it to end. So no process is left over, however
+//! its parent has ended.
 
 use serde::{Deserialize, Serialize};
 use sidestep::kernel::view::{Frame, Scenery};
@@ -26,7 +26,7 @@ pub enum Job {
     Watch(WatchJob),
 }
 
-/// The name of an agent, as people give it.
+/// The name of an agent, in the form used by people.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AgentName {
@@ -50,7 +50,7 @@ impl AgentName {
         }
     }
 
-    /// Returns the number of what is seen of it, and which part of that it is where it is one.
+    /// Returns the number of its visible body, and the part of the body that it is, if it is a part.
     pub fn body(self) -> (EntityId, Option<u32>) {
         match self {
             Self::Airplane(id) => (id, None),
@@ -84,20 +84,20 @@ pub struct Flown {
     pub build: String,
 }
 
-/// Settings that a server and its nodes have alike.
+/// Settings that a server and its nodes share.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Common {
     /// The scenario.
     pub flown: Flown,
-    /// Certificates, where links are encrypted and both ends prove who they are.
+    /// Certificates, where links are encrypted and both ends prove their identity.
     pub tls: Option<Tls>,
-    /// Time in seconds after which a party that is not heard is taken to be gone.
+    /// Time in seconds after which a party that is not heard counts as gone.
     pub lease_s: f64,
-    /// The address at which it tells its metrics, as `HOST:PORT`.
+    /// The address at which it serves its metrics, as `HOST:PORT`.
     pub metrics: Option<String>,
     /// Whether logs are JSON.
     pub json_log: bool,
-    /// The least severe log lines that are told, e.g. `info`.
+    /// The least severe log lines that are written, e.g. `info`.
     pub log: String,
 }
 
@@ -129,7 +129,7 @@ pub struct NodeJob {
     pub common: Common,
     /// Its agent.
     pub agent: AgentName,
-    /// Endpoints at one of which the server is.
+    /// Endpoints, at one of which the server listens.
     pub connect: Vec<String>,
     /// Endpoints at which other nodes reach it, in a mesh.
     pub listen: Vec<String>,
@@ -137,16 +137,16 @@ pub struct NodeJob {
     pub patience_s: f64,
 }
 
-/// Somebody who watches a fleet and takes no part in it.
+/// A watcher of a fleet, which takes no part in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WatchJob {
-    /// The build that asks: others may show something else.
+    /// The build that asks: others may show it differently.
     pub build: String,
-    /// Endpoints at one of which the server is.
+    /// Endpoints, at one of which the server listens.
     pub connect: Vec<String>,
     /// Certificates, where links are encrypted.
     pub tls: Option<Tls>,
-    /// Time in seconds that it waits for the server; after as long a silence the server is taken to be gone.
+    /// Time in seconds that it waits for the server; after a silence of this length the server counts as gone.
     pub patience_s: f64,
 }
 
@@ -167,13 +167,13 @@ pub enum Clock {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Topology {
-    /// Every node listens, and each is connected with each.
+    /// Every node listens, and every two are connected.
     Mesh,
     /// Through the server.
     Star,
 }
 
-/// Certificates with which both ends of a link prove who they are; files in the format PEM.
+/// Certificates with which both ends of a link prove their identity; files in the format PEM.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Tls {
     /// Certificate of the authority that signs those of all parties.
@@ -190,33 +190,33 @@ pub struct Tls {
 pub enum Told {
     /// It listens at these endpoints.
     Listens(Vec<String>),
-    /// The fleet as it is now.
+    /// The present state of the fleet.
     Fleet(FleetNow),
-    /// The scenery for watchers: all that stays as it is.
+    /// The scenery for watchers: everything that stays the same.
     Scene(Box<Staged>),
-    /// The world and the fleet as they are now, for watchers.
+    /// The present state of the world and of the fleet, for watchers.
     Seen(Box<Seen>),
     /// The fleet has come to its end, or was stopped.
     Ended {
-        /// The summary of the run, as `summary.json` has it.
+        /// The summary of the run, as in `summary.json`.
         summary: serde_json::Value,
         /// The world's own results as text.
         outcome: Lines,
-        /// The fleet as it was at the end.
+        /// The state of the fleet at the end.
         fleet: FleetNow,
     },
-    /// It could not do what it was asked.
+    /// It could not do its job.
     Failed(Failed),
 }
 
-/// The reason why the program could not do what it was asked, and the remedy.
+/// The reason why the program could not do its job, and the remedy.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Failed {
     /// Whether an option, a file or another party's input is wrong: then nothing was started.
     pub is_input: bool,
-    /// Whether somebody asked it to stop.
+    /// Whether it was asked to stop.
     pub is_interrupted: bool,
-    /// The place of what is wrong.
+    /// The place of the error.
     pub place: String,
     /// The reason.
     pub cause: String,
@@ -224,7 +224,7 @@ pub struct Failed {
     pub remedy: String,
 }
 
-/// All of a fleet that stays as it is, for its watchers.
+/// Everything of a fleet that stays the same, for its watchers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Staged {
     /// The build of its server.
@@ -272,7 +272,7 @@ pub struct FleetNow {
     pub talk_p99_ms: Option<f64>,
     /// The noun for an agent, e.g. `airplane`.
     pub noun: String,
-    /// Names of those for whom all wait, because nothing is heard of their nodes.
+    /// Names of the agents for which all wait, because their nodes are not heard.
     pub waits_for: Vec<String>,
     /// The nodes, by rising id.
     pub nodes: Vec<NodeNow>,
@@ -281,15 +281,15 @@ pub struct FleetNow {
 /// A node at one moment.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct NodeNow {
-    /// Its agent, by its id on the network,
+    /// Its agent, by its id on the network.
     pub agent: EntityId,
-    /// and by its name, e.g. `3`, or `0.3` of connector 3 of chain 0.
+    /// The name of its agent, e.g. `3`, or `0.3` for connector 3 of chain 0.
     pub name: String,
-    /// The number of what is seen of it: of the airplane, or of the chain,
+    /// The number of its agent's visible body: of the airplane, or of the chain.
     pub number: EntityId,
-    /// and which part of that it is, where it is one: which connector.
+    /// The part of that body that the agent is, if it is a part: the number of the connector.
     pub part: Option<u32>,
-    /// A word for its state: `awaited`, `joined`, `gone`, `silent` of one that was not heard for a second, or its part in
+    /// A word for its state: `awaited`, `joined`, `gone`, `silent` if it was not heard for a second, or its part in
     /// the cycle.
     pub state: String,
     /// The process of the node, where it has one.
@@ -310,13 +310,13 @@ pub struct NodeNow {
     pub lives: u64,
     /// Packets that it has sent.
     pub packets: u64,
-    /// Bytes of those.
+    /// Bytes of these packets.
     pub bytes: u64,
     /// Packets that it sends in a second.
     pub packets_per_s: f64,
     /// Bytes that it sends in a second.
     pub bytes_per_s: f64,
-    /// Seconds since it was heard last.
+    /// Seconds since it was last heard.
     pub silent_s: Option<f64>,
 }
 

@@ -13,7 +13,7 @@ pub fn build() -> &'static str {
     OWN.get().map_or(BUILD, String::as_str)
 }
 
-/// Declares that this program adds code from which results follow, known by a digest of it. The first
+/// Declares that this program adds code that affects results, identified by a digest of it. The first
 /// digest stays.
 pub fn adds_code(digest: &str) {
     OWN.get_or_init(|| format!("{BUILD}.own-{}", &digest[..digest.len().min(12)]));
@@ -30,8 +30,8 @@ pub(crate) struct Maker {
 
 impl Maker {
     /// Refuses the work of another build, or of another version if no build is recorded, because
-    /// results may change between them. `what` was made, at `place`; `remedy` gets the maker's
-    /// name.
+    /// results may change between them. The noun `what` names the work, at `place`; `remedy` gets
+    /// the maker's name.
     ///
     ///  # Errors
     /// When the makers differ.

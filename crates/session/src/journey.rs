@@ -39,7 +39,7 @@ pub struct Journey {
     told: Option<Foreign>,
     /// Its cost so far.
     effort: Effort,
-    /// The cycle for which [`Self::order`] ordered something last.
+    /// The last cycle for which [`Self::order`] gave an order.
     ordered_at: Option<Cycle>,
 }
 
@@ -62,7 +62,7 @@ impl Keep<'_> {
     /// Refuses places that may not be used, before anything is created.
     ///
     /// # Errors
-    /// When the MCAP file exists already and may not be replaced, or stands where the folder is to be.
+    /// When the MCAP file exists already and may not be replaced, or is at the path of the folder.
     fn check(&self) -> Result<(), InputError> {
         let Some((file, _)) = self.mcap else { return Ok(()) };
         if let Some(folder) = self.folder
@@ -75,10 +75,11 @@ impl Keep<'_> {
         McapRecorder::check_vacant(file, self.existing())
     }
 
-    /// Makes the places. The file comes first: one that cannot be made must leave no folder of a run that never was.
+    /// Creates the places. The file comes first: if it cannot be created, no folder of a run that never existed may
+    /// be left.
     ///
     /// # Errors
-    /// When one cannot be made; then none is left, but for a folder that the file was to be in.
+    /// When one cannot be created; then none is left, except a folder that the file was to be in.
     fn begin(
         &self,
         resolved: &Resolved,
@@ -137,8 +138,8 @@ impl Journey {
         Ok(Self::new(run, recording, film, workers).told(told))
     }
 
-    /// Returns a stopped run at the point where its folder can continue, to go on to its end or to
-    /// cycle `until`.
+    /// Returns a stopped run at the point from which its folder can continue, to go on to its end
+    /// or to cycle `until`.
     ///
     /// # Errors
     /// When the folder holds no run of one of `worlds` that this build can continue, or the run
@@ -205,7 +206,7 @@ impl Journey {
     /// Shows the run to viewers while it goes on.
     ///
     /// # Errors
-    /// When the address cannot be had.
+    /// When the address cannot be taken.
     pub fn show(&mut self, at: &ViewersAt) -> Result<(), Error> {
         self.viewers = Some(Steered::start(at, self.run.as_mut())?);
         Ok(())
@@ -219,7 +220,8 @@ impl Journey {
     /// Keeps rows, and frames where they are wanted, in memory from now on.
     ///
     /// # Errors
-    /// When a table is none of the run's, rows are kept already, or go to a folder: they are handed over once.
+    /// When a table does not belong to the run, or rows are already kept or go to a folder: they are handed over only
+    /// once.
     pub fn keep_rows(&mut self, wanted: &Wanted) -> Result<(), InputError> {
         if let Some(recording) = &self.recording {
             let folder = recording.folder().path().display();
@@ -251,7 +253,7 @@ impl Journey {
         self.rows.is_some()
     }
 
-    /// Takes the rows that were kept in memory so far, by table; none if they are not kept.
+    /// Takes the rows that were kept in memory so far, by table; none if rows are not kept.
     ///
     /// # Errors
     /// When the last ones cannot be handed over.
@@ -273,13 +275,13 @@ impl Journey {
     }
 
     /// Drives the run to cycle `until`, or until the watcher asks to stop; [`Self::finish`] stores the rest.
-    /// Frames for viewers start anew with every call.
+    /// Frames for viewers start again with every call.
     ///
     /// # Errors
     /// When something cannot be stored; a bug of the simulation.
     pub fn advance_to(&mut self, until: Cycle, watcher: &dyn Watcher) -> Result<(), Error> {
         let Self { run, recording, film, rows, frames, viewers, effort, .. } = self;
-        // Only a caller who keeps rows keeps frames, and such a run has no other film.
+        // Only a caller that keeps rows keeps frames, and such a run has no other film.
         let frames = frames.as_mut().map(|frames| frames as &mut dyn Film);
         let sinks = Sinks {
             recording: recording.as_mut(),
@@ -322,7 +324,7 @@ impl Journey {
     }
 }
 
-/// Refuses to go on with a run whose agents had orders: nobody would give them any.
+/// Refuses to go on with a run of agents that had orders: they would get no more orders.
 fn refuse_without_orders(run: &dyn Simulation, folder: &Path) -> Result<(), InputError> {
     if !has_orders(folder)? {
         return Ok(());
@@ -388,7 +390,7 @@ fn store(
     Ok(())
 }
 
-/// Drives the run; the error of a bug describes how to replay it.
+/// Drives the run; the error of a bug contains the facts to replay it.
 fn drive_guarded(
     run: &mut dyn Simulation,
     until: Cycle,
@@ -399,7 +401,7 @@ fn drive_guarded(
     driven.unwrap_or_else(|_| Err(bug(run)))
 }
 
-/// Adds how to continue the run, if something could not be stored.
+/// Adds words for continuing the run, if something could not be stored.
 fn broken_by(error: Error, run: &dyn Simulation, recording: Option<&Recording>) -> Error {
     match error {
         Error::Record(error) => broken(run, recording, &error),
@@ -407,7 +409,7 @@ fn broken_by(error: Error, run: &dyn Simulation, recording: Option<&Recording>) 
     }
 }
 
-/// Returns how to replay a run up to the cycle at which it failed.
+/// Returns the facts for replaying a run up to the cycle at which it failed.
 fn whereabouts(run: &dyn Simulation) -> String {
     let plan = run.plan();
     let (cycle, version) = (run.cycle(), VERSION);
@@ -415,7 +417,7 @@ fn whereabouts(run: &dyn Simulation) -> String {
     format!("at cycle {cycle} of {cycles} of `{name}`, seed {seed}, sidestep {version}")
 }
 
-/// Returns the error of a recording that failed, with how to continue the run.
+/// Returns the error of a recording that failed, with words for continuing the run.
 fn broken(run: &dyn Simulation, recording: Option<&Recording>, error: &RecordError) -> Error {
     let remedy = match recording.map(|r| r.folder().path().display()) {
         Some(folder) => format!("make room, then continue with: sidestep resume {folder}"),

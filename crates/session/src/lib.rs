@@ -11,7 +11,7 @@
 //! export/       recorded runs in other formats         report/       folders -> documents
 //! sweep/        many runs of one scenario              summary.rs    the results of a run
 //! live/         viewers that watch and steer           beat.rs       when a cycle is due
-//! watcher.rs    progress, and whether to go on         identity.rs   the build that made a run
+//! watcher.rs    progress, and requests to stop         identity.rs   the build that made a run
 //! attend.rs     work that its caller looks after       rows.rs       rows that are kept in memory
 //! fleet.rs      the job of agents as processes
 //! ```

@@ -6,10 +6,10 @@ use sidestep::kernel::{InputError, Simulation};
 use sidestep_record::{for_each_block, tables};
 use std::path::Path;
 
-/// Lets a run follow the orders and the controls that its folder has, so that it comes out as it was recorded.
+/// Lets a run follow the orders and the controls in its folder, so that it comes out as recorded.
 ///
 /// # Errors
-/// When they cannot be read, or no longer be obeyed.
+/// When they cannot be read, or can no longer be obeyed.
 pub(crate) fn follow_recorded(run: &mut dyn Simulation, folder: &Path) -> Result<(), InputError> {
     let mut orders = OrderReader::default();
     if read(folder, OrderReader::TABLE, |schema, columns| orders.read(schema, columns))? {
@@ -26,7 +26,7 @@ pub(crate) fn follow_recorded(run: &mut dyn Simulation, folder: &Path) -> Result
     Ok(())
 }
 
-/// Reads a table of a folder block by block. Returns whether it is there.
+/// Reads a table of a folder block by block. Returns whether the table exists.
 fn read(
     folder: &Path,
     table: &str,
@@ -64,7 +64,7 @@ pub(crate) fn has_orders(folder: &Path) -> Result<bool, InputError> {
     }
 }
 
-/// The reason why rows are read no further.
+/// The reason to stop reading rows.
 enum Stop {
     Found,
     Damaged(InputError),

@@ -35,7 +35,7 @@ pub(crate) fn trails(
     Ok(trails)
 }
 
-/// Returns the table `name` of the run in `folder`, which records it with `record.calibration =
+/// Returns the table `name` of the run in `folder`; runs record it with `record.calibration =
 /// true`.
 ///
 /// # Errors
@@ -74,7 +74,7 @@ pub(crate) fn has_rows(folder: &Path, table: &str) -> bool {
     })
 }
 
-/// Returns the content of `summary.json`, which a run writes at its end, if it is there.
+/// Returns the content of `summary.json`, which a run writes at its end, if it exists.
 ///
 /// # Errors
 /// Text that is not JSON.

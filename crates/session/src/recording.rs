@@ -140,7 +140,7 @@ pub(crate) fn write_inputs(folder: &Path, files: &[(String, Vec<u8>)]) -> Result
     Ok(())
 }
 
-/// Sets a run to the point at which its folder can continue.
+/// Sets a run to the point from which its folder can continue.
 ///
 /// # Errors
 /// When the checkpoint is damaged or belongs to another version or scenario.

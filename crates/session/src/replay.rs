@@ -47,7 +47,7 @@ pub fn replay_all(
     Ok(Replayed { run, effort, compared_poses: 0 })
 }
 
-/// Computes the state at the start of a cycle, and compares it with the poses that are recorded of
+/// Computes the state at the start of a cycle, and compares it with the poses recorded for
 /// that cycle.
 ///
 /// # Errors

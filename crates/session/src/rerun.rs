@@ -13,7 +13,7 @@ use sidestep::scenario::{Source, Worlds};
 use sidestep_record::{McapRun, ResumePoint, RunView, Status, is_mcap, tables};
 use std::path::{Path, PathBuf};
 
-/// A recorded run, whatever it was recorded to.
+/// A recorded run, in a folder or a file.
 pub struct Recorded {
     /// The folder or file.
     pub path: PathBuf,
@@ -103,7 +103,7 @@ impl Recorded {
         Ok(Resolved { text: self.source.text.clone(), files })
     }
 
-    /// Returns the names of the recorded tables; none of a recording for viewers.
+    /// Returns the names of the recorded tables; none for a recording for viewers.
     ///
     /// # Errors
     /// When the folder can no longer be read.
@@ -129,7 +129,7 @@ impl Recorded {
         Ok(run)
     }
 
-    /// Refuses a recording that says to have more cycles than its scenario: it would be computed for as long.
+    /// Refuses a recording that claims more cycles than its scenario has: its computation would take that long.
     fn check_end(&self, planned: Cycle) -> Result<(), InputError> {
         let done = self.cycles_done;
         if done <= planned {
@@ -146,7 +146,7 @@ impl Recorded {
         other.then(|| self.maker.build.as_deref().unwrap_or(&self.maker.version))
     }
 
-    /// Returns the run at its start, to be watched: computed again, or from its own tables or messages where another
+    /// Returns the run at its start, for watching: computed again, or from its own tables or messages if another
     /// build made it.
     ///
     /// # Errors

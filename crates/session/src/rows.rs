@@ -1,32 +1,33 @@
-//! Rows of a run that are kept in memory: of all tables, or of some.
+//! Rows of a run kept in memory: of all tables, or of some.
 
 use sidestep::kernel::ports::{MemoryRecorder, RecordError, Recorder, TableSchema, Values};
 use sidestep::kernel::{Cycle, Digest, InputError};
 use std::collections::BTreeMap;
 
-/// The rows that are kept in memory.
+/// The rows to keep in memory.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Wanted {
-    /// Names of tables; all where `None`.
+    /// Names of tables; all if `None`.
     pub tables: Option<Vec<String>>,
-    /// Cycles between two frames, whose bodies are kept as the table `frames`; no frames where `None`.
+    /// Cycles between two frames, with bodies kept as the table `frames`; no frames if `None`.
     pub frames: Option<Cycle>,
 }
 
-/// A checkpoint by which rows are known: its cycle and its digest.
+/// The mark of a checkpoint that identifies rows: its cycle and its digest.
 type Mark = (Cycle, [u8; 16]);
 
 /// Rows that come with a checkpoint, each block with the number of its table.
 type Ahead = Vec<(usize, Vec<Values>)>;
 
-/// Rows of tables that are wanted, of one past; those of other tables are dropped as they come.
+/// Rows of the wanted tables, of one past; those of other tables are dropped as they come.
 pub(crate) struct Rows {
     tables: MemoryRecorder,
-    /// The place of each of the run's tables among those that are kept.
+    /// The place of each of the run's tables among the kept ones.
     places: Vec<Option<usize>>,
-    /// The cycle from which on rows are kept: those of earlier ones were taken, or there never were any.
+    /// The cycle from which on rows are kept: earlier rows were taken, or never existed.
     begin: Cycle,
-    /// The checkpoints of this past, with the rows of the cycle that each begins with: of orders that waited then.
+    /// The checkpoints of this past, with the rows of the cycle that each begins with: those of orders that were
+    /// waiting then.
     known: BTreeMap<Mark, Ahead>,
 }
 
@@ -34,7 +35,7 @@ impl Rows {
     /// Returns the place for rows of a run with these tables, from cycle `begin` on.
     ///
     /// # Errors
-    /// When one that is wanted is none of them.
+    /// When a wanted table is not among them.
     pub(crate) fn new(
         schemas: &[TableSchema],
         wanted: Option<&[String]>,
@@ -67,18 +68,18 @@ impl Rows {
         self.begin
     }
 
-    /// Takes all rows out, by table, of a run that stands at cycle `now`. What comes then may have another past, and
-    /// rows of orders that were handed over come no second time: no checkpoint need be known any more.
+    /// Takes out all rows, by table, of a run that is at cycle `now`. Later rows may have another past, and rows of
+    /// orders that were handed over do not come again: checkpoints need not be known any longer.
     pub(crate) fn take(&mut self, now: Cycle) -> Vec<(TableSchema, Vec<Values>)> {
         self.begin = now;
         self.known.clear();
         self.tables.take()
     }
 
-    /// Notes a checkpoint of cycle `now`, the present one. Rows of this cycle that are there already come back with it.
+    /// Notes a checkpoint of cycle `now`, the present one. Existing rows of this cycle come back with it.
     pub(crate) fn note(&mut self, checkpoint: &[u8], now: Cycle) {
         let ahead = |(table, (schema, columns)): (usize, (&TableSchema, &[Values]))| {
-            // Rows of the present cycle come after all others, whatever the order of those.
+            // Rows of the present cycle come after all others, in whichever order those are.
             let cycles = cycles_of(schema, columns)?;
             let count = cycles.iter().rev().take_while(|&&cycle| cycle >= now).count();
             let rows: Vec<_> = (cycles.len() - count..cycles.len()).collect();
@@ -89,14 +90,14 @@ impl Rows {
         self.known.insert(mark_of(checkpoint, now), ahead);
     }
 
-    /// Returns whether all rows that stay are of the past of this checkpoint of cycle `of`, where the run stands at
+    /// Returns whether all remaining rows belong to the past of this checkpoint of cycle `of`, for a run at
     /// cycle `now`.
     pub(crate) fn fits(&self, checkpoint: &[u8], of: Cycle, now: Cycle) -> bool {
         let none_stay = of <= self.begin || now == self.begin;
         none_stay || self.known.contains_key(&mark_of(checkpoint, of))
     }
 
-    /// Drops the rows of cycle `now` and of later ones, but for those that came before this checkpoint of `now`, which
+    /// Drops the rows of cycle `now` and of later ones, except those that came before this checkpoint of `now`, which
     /// [fits](Self::fits); returns whether there are such rows.
     ///
     /// # Errors
@@ -110,7 +111,7 @@ impl Rows {
             let cycles = cycles_of(schema, columns)?;
             Some(cycles.iter().map(|cycle| kept.contains(cycle)).collect())
         });
-        // Later ones are of a past that is left now.
+        // Later ones belong to an abandoned past.
         self.known.retain(|(cycle, _), _| *cycle <= now);
         let ahead = self.known.get(&mark).map(Vec::as_slice).unwrap_or_default();
         ahead.iter().try_for_each(|(table, block)| self.tables.append(*table, block))?;
@@ -190,7 +191,7 @@ mod tests {
         for number in 0..100_u8 {
             let now = Cycle::from(number);
             append(&mut rows, 2, &[now]);
-            // A state that is saved twice is known by one checkpoint.
+            // A state that is saved twice has one checkpoint.
             (0..2).for_each(|_| rows.note(&[number], now));
         }
         assert_eq!(rows.known.len(), 100);

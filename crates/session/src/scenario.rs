@@ -23,7 +23,7 @@ pub fn read(
     Err(if is_made { of_made_text(file, &source, told) } else { told })
 }
 
-/// Returns an error in a text that was made from a file of another program without a position: nobody has
+/// Returns an error in a text that was made from a file of another program, without its position: users do not see
 /// the lines of that text.
 fn of_made_text(file: &Path, source: &Source, error: InputError) -> InputError {
     if ![source.place.as_str(), source.file_place()].contains(&error.place()) {
@@ -40,9 +40,9 @@ fn keyed(error: InputError, key: Option<&str>) -> InputError {
     }
 }
 
-/// Returns all that is wrong with a scenario and its overrides, see [`sidestep::problems`]; none of one
-/// that is right. An error that an override causes names it. Of a file of another program only the first
-/// is told: its author can mend no text that was made from it, and what else is wrong may follow.
+/// Returns all problems of a scenario and its overrides, see [`sidestep::problems`]; none if it is right. An error
+/// that an override causes names it. For a file of another program only the first is reported: its author cannot edit
+/// the text made from it, and the other problems may follow from the first.
 ///
 /// # Errors
 /// When the scenario cannot be read, or an override does not fit.
@@ -77,13 +77,13 @@ pub fn problems(
     Ok(told.into_iter().map(explained).collect())
 }
 
-/// Returns an error with the override that causes it as its place.
+/// Returns an error with the override that caused it as its place.
 fn caused(file: &Path, override_text: &str, error: &InputError) -> InputError {
     let place = format!("{} with --set {override_text}", file.display());
     keyed(InputError::new(place, error.cause(), error.remedy()), error.key())
 }
 
-/// Returns the scenario in a file, or the one that a file of another format stands for, with
+/// Returns the scenario in a file, or the one that a file of another format represents, with
 /// overrides.
 ///
 /// # Errors
@@ -96,7 +96,7 @@ pub(crate) fn source_of(
     Ok(made_or_read(worlds, file, overrides)?.0)
 }
 
-/// Returns the same, and whether its text was made from a file of another format.
+/// Returns the same scenario, and whether its text was made from a file of another format.
 fn made_or_read(
     worlds: Worlds,
     file: &Path,
@@ -109,8 +109,8 @@ fn made_or_read(
     Ok((source.with(overrides)?, true))
 }
 
-/// Returns the same error with its position in the file, or with the override that causes it: the
-/// lines of the text that overrides have edited are nobody's.
+/// Returns the same error with its position in the file, or with the override that caused it: users
+/// do not see the lines of the text that overrides have edited.
 fn explained(worlds: Worlds, file: &Path, overrides: &[String], error: InputError) -> InputError {
     let with = |count: usize| {
         let source = source_of(worlds, file, &overrides[..count]).ok()?;

@@ -82,7 +82,7 @@ pub struct Summary {
     pub outcome: Lines,
 }
 
-/// Writes a path as [`shown`]: serde's own way fails at a name that is no text, at the end of a run.
+/// Writes a path as [`shown`]: serde's own way would fail on a name that is no text, at the end of a run.
 fn as_shown<S: Serializer>(path: &Option<PathBuf>, to: S) -> Result<S::Ok, S::Error> {
     path.as_ref().map(shown).serialize(to)
 }

@@ -50,7 +50,7 @@ pub trait Watcher: Sync {
     }
 
     /// Returns the interrupt at which a run looks within its cycles. A watcher raises it when the
-    /// run has not come to its next slice some time after it was asked to stop.
+    /// run has not reached its next slice some time after it was asked to stop.
     fn interrupt(&self) -> Interrupt {
         Interrupt::default()
     }

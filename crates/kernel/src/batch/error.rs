@@ -31,13 +31,13 @@ pub enum BatchError {
         /// The reason.
         error: InputError,
     },
-    /// A world whose agents observe, or are ordered, otherwise than those of the first.
+    /// A world with agents that observe, or are ordered, differently from those of the first.
     #[error("world {world} has other teams than world 0; a batch is of worlds of one shape")]
     Shape {
         /// Its index.
         world: usize,
     },
-    /// An order that cannot be obeyed; no world was ordered anything.
+    /// An order that cannot be obeyed; no world got an order.
     #[error("world {world}: {error}")]
     Order {
         /// Index of the world.
@@ -45,7 +45,7 @@ pub enum BatchError {
         /// The reason.
         error: OrderError,
     },
-    /// A team that is not there, or room of another shape.
+    /// A missing team, or room of another shape.
     #[error(transparent)]
     Room(#[from] OrderError),
     /// A world that broke off: it has no state until it is restarted.

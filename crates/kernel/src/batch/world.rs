@@ -11,7 +11,7 @@ pub(super) struct World {
     pub(super) seed: u64,
     /// `None` for one that broke off, or never started.
     pub(super) run: Option<Box<dyn Simulation>>,
-    /// Its error, until the caller is told.
+    /// Its error, until it is returned to the caller.
     pub(super) error: Option<BatchError>,
     /// Observations of its agents, for the caller to take.
     room: Vec<Cells>,
@@ -59,7 +59,7 @@ impl World {
         }
     }
 
-    /// Starts the world anew; it stays as it is where that fails.
+    /// Starts the world again; it stays the same if that fails.
     pub(super) fn restart(
         &mut self,
         index: usize,
@@ -83,7 +83,7 @@ impl World {
                 BatchError::Broken { world: index, seed, cycle, cause }
             }
         };
-        // Of one that is broken the older reason is what restarting it did not mend.
+        // For a broken world this replaces the older reason, which the restart did not fix.
         self.error = Some(refused);
     }
 
@@ -98,7 +98,7 @@ impl World {
         (self.room, self.has_observed) = (room, true);
     }
 
-    /// Copies what it has observed into its part of the caller's room.
+    /// Copies its observations into its part of the caller's room.
     pub(super) fn hand_over(&mut self, parts: &mut [CellsMut<'_>]) {
         if !std::mem::take(&mut self.has_observed) {
             return;

@@ -1,4 +1,4 @@
-//! Orders that were given, as rows of a table, and orders that are to be given again.
+//! Orders that were given, as rows of a table, and orders to be given again.
 
 use super::team::Orders;
 use crate::ports::Table;
@@ -8,7 +8,7 @@ use std::ops::Range;
 /// Name of the table of orders.
 pub(super) const ORDERS: &str = "orders";
 
-/// One value of an order, as it is recorded.
+/// One value of an order, as recorded.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OrderRow {
     pub(crate) cycle: Cycle,
@@ -49,7 +49,7 @@ struct Entry {
 }
 
 impl OrderBook {
-    /// Notes orders that are given before a cycle, behind those of the same cycle.
+    /// Notes orders that are given before a cycle, after those of the same cycle.
     pub fn note(&mut self, cycle: Cycle, orders: &Orders<'_>) {
         let (agents, values) = (self.agents.len(), self.values.len());
         self.agents.extend_from_slice(orders.agents);
@@ -66,7 +66,7 @@ impl OrderBook {
         self.entries.insert(at, Entry { cycle, order: orders.order.into(), agents, values });
     }
 
-    /// Returns whether it has no orders.
+    /// Returns whether the book has no orders.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
@@ -101,7 +101,7 @@ impl OrderBook {
 }
 
 impl Entry {
-    /// Returns whether further orders can be joined with it: the same one, with as many values an agent.
+    /// Returns whether further orders can be joined to the entry: the same order, with as many values per agent.
     fn goes_on_with(&self, cycle: Cycle, orders: &Orders<'_>) -> bool {
         let width = |agents: usize, values: usize| values.checked_div(agents);
         let (agents, values) = (self.agents.len(), self.values.len());

@@ -6,14 +6,14 @@ use crate::units::EntityId;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OrderError {
-    /// The agent is not there, or the body is no agent.
+    /// The agent does not exist, or the body is no agent.
     #[error("there is no {who} that can be ordered; {}", known(noun, *last))]
     NoAgent {
         /// The agent.
         who: String,
         /// The noun for an agent.
         noun: &'static str,
-        /// The last agent that is there.
+        /// The last existing agent.
         last: Option<EntityId>,
     },
     /// The agent decides for itself.
@@ -53,13 +53,13 @@ pub enum OrderError {
         who: String,
         /// The value.
         value: f64,
-        /// The values that there may be.
+        /// The allowed values.
         expected: String,
     },
-    /// Controls were handed over to a run whose agents decide in it.
+    /// Controls were handed over to a run with agents that decide within it.
     #[error("in this run nobody decides outside: {cause}")]
     NobodyOutside {
-        /// The reason, and what would help.
+        /// The reason, and the remedy.
         cause: String,
     },
     /// The control of an agent is refused.
@@ -67,7 +67,7 @@ pub enum OrderError {
     Control {
         /// The agent.
         who: String,
-        /// The reason, and what would be right.
+        /// The reason, and the remedy.
         cause: String,
     },
     /// An order that makes no sense to the world.
@@ -77,10 +77,10 @@ pub enum OrderError {
         order: String,
         /// The agent.
         who: String,
-        /// The world's reason, and what would be right.
+        /// The world's reason, and the remedy.
         cause: String,
     },
-    /// A team that is not there.
+    /// A missing team.
     #[error("there is no team {team}; the scenario has {teams}, from 0")]
     NoTeam {
         /// Its number.

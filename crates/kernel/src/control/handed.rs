@@ -1,4 +1,4 @@
-//! Controls that were handed over, as rows of a table, and controls that are to be handed over again.
+//! Controls that were handed over, as rows of a table, and controls to be handed over again.
 
 use crate::ports::{MemoryRecorder, Table, TableSchema, Values};
 use crate::units::{Cycle, EntityId};
@@ -9,8 +9,8 @@ const CONTROLS: &str = "controls";
 /// Number of bytes in a row.
 const ROW_BYTES: usize = 8;
 
-/// A part of a control, as it is recorded. A cycle that was decided outside begins with a row of no agent, so that
-/// one in which nobody has said anything is told from one that was not.
+/// A part of a control, as recorded. A cycle that was decided outside begins with a row of no agent, so that one
+/// without any control is distinguished from one that was not decided outside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ControlRow {
     cycle: Cycle,
@@ -55,17 +55,17 @@ pub struct ControlBook {
 }
 
 impl ControlBook {
-    /// Notes what agents do in a cycle, behind what was noted of it.
+    /// Notes the controls of agents in a cycle, after those already noted for it.
     pub fn note(&mut self, cycle: Cycle, controls: impl IntoIterator<Item = (EntityId, Vec<u8>)>) {
         self.cycles.entry(cycle).or_default().extend(controls);
     }
 
-    /// Returns whether no cycle in it was decided outside.
+    /// Returns whether the book has no cycle that was decided outside.
     pub fn is_empty(&self) -> bool {
         self.cycles.is_empty()
     }
 
-    /// Returns what agents do in a cycle, if it was decided outside.
+    /// Returns the controls of agents in a cycle, if it was decided outside.
     pub fn of(&self, cycle: Cycle) -> Option<&[(EntityId, Vec<u8>)]> {
         self.cycles.get(&cycle).map(Vec::as_slice)
     }
@@ -94,7 +94,7 @@ impl ControlReader {
     /// Name of the table that it reads.
     pub const TABLE: &'static str = CONTROLS;
 
-    /// Reads the rows that come next. `None` if they are not those of controls.
+    /// Reads the next rows. `None` if they are not those of controls.
     pub fn read(&mut self, schema: &TableSchema, columns: &[Values]) -> Option<()> {
         let column =
             |name: &str| columns.get(schema.columns.iter().position(|column| column.name == name)?);

@@ -1,18 +1,18 @@
-//! Decisions from outside: what agents observe, and the orders that a caller gives them.
+//! Decisions from outside: the observations of agents, and the orders that a caller gives them.
 //!
 //! ```text
-//! teams() ──> Space, Space, ...           what goes in and out, of all agents that are alike
+//! teams() ──> Space, Space, ...           inputs and outputs of all agents that are alike
 //! observe(team) ──> one array per space   of the frozen state, before a cycle
 //! order(agents, values)                   checked, noted in the state, recorded in the table `orders`
 //! follow(OrderBook)                       the same orders again, each before its cycle
 //! ```
 //!
-//! Or agents decide elsewhere altogether, each with a program of its own; what they then do in a cycle is a message
-//! that only their world understands:
+//! Alternatively, agents decide elsewhere altogether, each with a program of its own; their action in a cycle is then
+//! a message that only their world understands:
 //!
 //! ```text
 //! hand_over(agents, bytes)                checked, noted in the state, recorded in the table `controls`
-//! retrace(ControlBook)                    the same again, each before its cycle
+//! retrace(ControlBook)                    the same controls again, each before its cycle
 //! ```
 //!
 //! An order is part of the state as soon as it is given: a checkpoint has it, and so has the digest. A run

@@ -5,14 +5,14 @@ use super::team::Orders;
 use crate::ports::{MemoryRecorder, TableSchema, Values};
 use crate::units::{Cycle, EntityId};
 
-/// Reads the orders of the table `orders`, block after block: its rows have a value each.
+/// Reads the orders of the table `orders`, block after block: each row has one value.
 #[derive(Debug, Default)]
 pub struct OrderReader {
     book: OrderBook,
     pending: Option<Pending>,
 }
 
-/// An order whose values are being read.
+/// An order with values that are still being read.
 #[derive(Debug)]
 struct Pending {
     cycle: Cycle,
@@ -25,7 +25,7 @@ impl OrderReader {
     /// Name of the table that it reads.
     pub const TABLE: &'static str = ORDERS;
 
-    /// Reads the rows that come next. `None` if the columns are not those of orders.
+    /// Reads the next rows. `None` if the columns are not those of orders.
     pub fn read(&mut self, schema: &TableSchema, columns: &[Values]) -> Option<()> {
         let at = |name: &str| schema.columns.iter().position(|column| column.name == name);
         let column = |name: &str| columns.get(at(name)?);

@@ -1,16 +1,16 @@
-//! The meaning of the numbers that go in and out.
+//! The meaning of the numbers in observations and orders.
 
 use crate::ports::table::split_unit;
 
-/// One quantity of every agent of a team: its name, the shape of one agent's share of it, and what
-/// its values may be.
+/// One quantity of every agent of a team: its name, the shape of one agent's share of it, and its
+/// allowed values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Space {
     /// Name; ends in the unit where the quantity has one.
     pub name: String,
     /// Shape of one agent's share; empty for a single number.
     pub shape: Vec<usize>,
-    /// The values that there may be.
+    /// The allowed values.
     pub bounds: Bounds,
     /// One sentence for the reader.
     pub meaning: String,
@@ -38,7 +38,7 @@ pub enum Bounds {
 }
 
 impl Space {
-    /// The greatest whole number in an order: up to it, no two of them become one as a float.
+    /// The greatest whole number in an order: up to it, no two of them become the same float.
     pub const MOST_WHOLE: i64 = (1 << 53) - 1;
 
     /// Creates a space of single numbers.
@@ -67,10 +67,10 @@ impl Space {
         split_unit(&self.name).1
     }
 
-    /// Returns whether a value may stand in it.
+    /// Returns whether a value is allowed in it.
     pub fn holds(&self, value: f64) -> bool {
         let between = |least: f64, most: f64| least <= value && value <= most;
-        // By a conversion, since looking at the fraction is a call of a library where processors of any age are built for.
+        // By a conversion, because taking the fraction is a library call in builds for processors of any age.
         let is_whole = || value as i64 as f64 == value;
         match &self.bounds {
             Bounds::Choice(names) => between(0.0, names.len() as f64 - 1.0) && is_whole(),
@@ -122,7 +122,7 @@ impl CellsMut<'_> {
         self.len() == 0
     }
 
-    /// Writes a whole number; nothing into room for real ones, since a space has one sort of values.
+    /// Writes a whole number; does nothing with room for real ones, because a space has one kind of values.
     #[inline]
     pub fn whole(&mut self, at: usize, value: i64) {
         if let Self::Whole(room) = self {
@@ -130,7 +130,7 @@ impl CellsMut<'_> {
         }
     }
 
-    /// Writes a real number; nothing into room for whole ones, since a space has one sort of values.
+    /// Writes a real number; does nothing with room for whole ones, because a space has one kind of values.
     #[inline]
     pub fn real(&mut self, at: usize, value: f64) {
         if let Self::Real(room) = self {

@@ -5,7 +5,7 @@ use super::space::{CellsMut, Space};
 use crate::units::EntityId;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Agents that observe, and are ordered, alike.
+/// Agents with the same observations and orders.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Team {
     /// Name, by which a caller knows it: the kind of its agents, and a number where there are several.
@@ -29,7 +29,7 @@ pub struct Orders<'a> {
     pub values: &'a [f64],
 }
 
-/// One order to one agent, found right by its space.
+/// One order to one agent, checked against its space.
 #[derive(Debug, Clone, Copy)]
 pub struct Order<'a> {
     /// Number of the team.
@@ -42,11 +42,11 @@ pub struct Order<'a> {
     pub values: &'a [f64],
 }
 
-/// The teams of a world, and who is in which.
+/// The teams of a world, and their members.
 #[derive(Debug, Clone, Default)]
 pub struct Teams {
     all: Vec<Team>,
-    /// Number of each entity's team, by id; [`NONE`] for those that are in none.
+    /// Number of each entity's team, by id; [`NONE`] for those in none.
     team_of: Vec<u32>,
     /// The noun for an agent.
     noun: &'static str,
@@ -58,7 +58,7 @@ pub struct Teams {
 const NONE: u32 = u32::MAX;
 
 impl Teams {
-    /// Returns these teams; nobody is in two of them. `noun` is that for an agent. A name that comes again
+    /// Returns these teams; no agent is in two of them. `noun` is the noun for an agent. A repeated name
     /// gets a number: `robot`, `robot 2`.
     pub fn new(mut all: Vec<Team>, noun: &'static str) -> Self {
         give_names(&mut all);
@@ -86,7 +86,7 @@ impl Teams {
         self.noun
     }
 
-    /// Returns whether anybody takes orders.
+    /// Returns whether any agent takes orders.
     pub(crate) fn take_orders(&self) -> bool {
         self.all.iter().any(|team| !team.ordered.is_empty())
     }
@@ -102,7 +102,7 @@ impl Teams {
     }
 
     /// Hands over the orders to single agents, one after the other, as far as they have the shape and the bounds
-    /// of their spaces; checked, they do not have to be kept.
+    /// of their spaces; orders checked this way do not have to be kept.
     ///
     /// # Errors
     /// The first one that is wrong, or that `take` returns.
@@ -113,7 +113,7 @@ impl Teams {
     ) -> Result<(), OrderError> {
         let &Orders { order, agents, values } = orders;
         let Some(&first) = agents.first() else { return nobody(orders) };
-        // Mostly all are of one team, whose space is looked up once.
+        // Usually all are of one team, so its space is looked up once.
         let mut of_team = self.space(order, first)?;
         let width = of_team.2.width();
         if values.len() != agents.len() * width {
@@ -159,7 +159,7 @@ impl Teams {
         Ok((team, number, &ordered[number]))
     }
 
-    /// Checks that there is room for exactly what a team observes.
+    /// Checks that there is exactly the room that a team's observations need.
     pub(crate) fn check_room(&self, team: usize, room: &[CellsMut<'_>]) -> Result<(), OrderError> {
         let Some(Team { agents, observed, .. }) = self.all.get(team) else {
             return Err(OrderError::NoTeam { team, teams: self.all.len() });
@@ -179,7 +179,7 @@ impl Teams {
     }
 }
 
-/// An order to nobody is right if it has no values.
+/// Checks an order to no agents: it is right if it has no values.
 fn nobody(orders: &Orders<'_>) -> Result<(), OrderError> {
     match orders.values {
         [] => Ok(()),
@@ -190,10 +190,10 @@ fn nobody(orders: &Orders<'_>) -> Result<(), OrderError> {
     }
 }
 
-/// Gives a number to each name that comes again.
+/// Gives a number to each repeated name.
 fn give_names(teams: &mut [Team]) {
     let mut taken = BTreeSet::new();
-    // The next number to try of each name, since thousands of teams may have one.
+    // The next number to try for each name, because thousands of teams may share one.
     let mut next: BTreeMap<String, u32> = BTreeMap::new();
     for team in teams {
         let plain = team.name.clone();

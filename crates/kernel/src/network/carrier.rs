@@ -1,4 +1,4 @@
-//! A network with faults: it can lose and delay messages, cut links, and reach no farther than some way.
+//! A network with faults: it can lose and delay messages, cut links, and have a limited range.
 //!
 //! A message takes one tick, or more when it is large or delayed. Every draw depends on sender, receiver,
 //! tick and number, never on the order in which agents are visited.
@@ -16,22 +16,22 @@ pub trait Apart {
     fn apart_m(&self, link: [EntityId; 2]) -> f64;
 }
 
-/// A transport, some of whose links may be cut, for the talks of one cycle.
+/// A transport for the talks of one cycle, on which some links may be cut.
 pub struct Carrier<'a, T> {
     inner: T,
     network: Option<&'a Network>,
     draws: FaultStreams,
-    /// Places of the agents; without them, all reach all.
+    /// Places of the agents; without them, every agent reaches every other.
     places: Option<&'a dyn Apart>,
     /// First tick of each talk, and its time in seconds after the start of the run, both rising.
     talks: &'a [(u64, f64)],
-    /// Tick from which on each way of a link is free, where messages of some size take time.
+    /// Tick from which on each way of a link is free, where messages take time by their size.
     pub(super) free_at: BTreeMap<[EntityId; 2], f64>,
 }
 
 impl<'a> Carrier<'a, MemoryTransport> {
-    /// Returns a network in memory with some faults; without any it loses nothing. The talks of the cycle are
-    /// given by their first ticks and the times of those in seconds after the start of the run, at least one.
+    /// Returns a network in memory with some faults; without any it loses nothing. The talks of the cycle, at least
+    /// one, are given by their first ticks and the times of those in seconds after the start of the run.
     pub fn in_memory(
         (network, draws): (Option<&'a Network>, FaultStreams),
         places: Option<&'a dyn Apart>,
@@ -67,8 +67,8 @@ impl<T: Transport> Carrier<'_, T> {
         !(Chance::new(bursts.loss).happens(words[0]) && bursts.is_on(&self.draws, link, at_s))
     }
 
-    /// Returns the tick in which all of a message is on its way: its link carries one after the
-    /// other.
+    /// Returns the tick in which all of a message is on its way: its link carries one message after
+    /// the other.
     fn is_out_at(&mut self, envelope: &Envelope) -> u64 {
         let bits_per_tick = self.network.map_or(f64::INFINITY, Network::bits_per_tick);
         if bits_per_tick == f64::INFINITY {
@@ -84,7 +84,7 @@ impl<T: Transport> Carrier<'_, T> {
 impl<T: Transport> Transport for Carrier<'_, T> {
     fn send(&mut self, mut envelope: Envelope) {
         let is_carried = self.lets_through(&envelope);
-        // What is lost on the way takes its time on the link all the same.
+        // A message lost on the way occupies the link all the same.
         envelope.cycle = self.is_out_at(&envelope);
         if is_carried {
             self.inner.send(envelope);

@@ -1,6 +1,6 @@
-//! The faults that happen to what one agent sends, where each is a process of its own.
+//! The faults of the packets of one agent, where each agent is a process of its own.
 //!
-//! They are drawn as those of a network in memory are, so that a packet of the same number in the same tick
+//! They are drawn like those of a network in memory, so that a packet of the same number in the same tick
 //! of the same cycle meets the same faults, wherever its sender runs.
 
 use super::{Carrier, FaultStreams, Network};
@@ -24,15 +24,15 @@ impl Ether {
         Self { network, draws, talks: vec![(0, 0.0)], free_at: BTreeMap::new() }
     }
 
-    /// Begins a cycle: all links are free. Its talks are given by their first ticks and the times of those, in
-    /// seconds after the start of the run, rising; at least one.
+    /// Begins a cycle: all links are free. Its talks, at least one, are given by their first ticks and the times of
+    /// those in seconds after the start of the run, rising.
     pub fn begin(&mut self, talks: Vec<(u64, f64)>) {
         (self.talks, self.free_at) = (talks, BTreeMap::new());
     }
 
-    /// Returns the arrivals of a packet at its receiver: none if it is lost, two if it is doubled. Of each the tick in
-    /// which all of it is on its way, and the tick in which it arrives. Its `cycle` is the tick in which it is sent.
-    /// Distances do not matter here.
+    /// Returns the arrivals of a packet at its receiver: none if it is lost, two if it is doubled. An arrival is the
+    /// tick in which all of the packet is on its way, and the tick in which it arrives. Its `cycle` is the tick in
+    /// which it is sent. Distances do not matter here.
     pub fn arrivals(&mut self, packet: Envelope) -> Vec<(u64, u64)> {
         let faults = (Some(&self.network), self.draws);
         let mut carrier = Carrier::in_memory(faults, None, &self.talks);

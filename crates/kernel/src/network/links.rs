@@ -41,7 +41,7 @@ pub struct Partition {
 pub struct OneWay {
     /// Id of the agent that is heard by the other.
     pub sender: EntityId,
-    /// Id of the agent whose messages do not reach the other.
+    /// Id of the agent that does not reach the other with its messages.
     pub receiver: EntityId,
     /// The while.
     pub during: While,
@@ -76,14 +76,14 @@ impl While {
     /// The time from the start of the run on.
     pub const ALWAYS: Self = Self { from_s: 0.0, until_s: f64::INFINITY };
 
-    /// Returns whether a time is in it.
+    /// Returns whether a time is within the while.
     pub fn is_on(&self, at_s: f64) -> bool {
         self.from_s <= at_s && at_s < self.until_s
     }
 }
 
 impl Partition {
-    /// Returns whether it keeps two agents apart at a time.
+    /// Returns whether the partition separates two agents at a time.
     pub(super) fn cuts(&self, [a, b]: [EntityId; 2], at_s: f64) -> bool {
         let side = |id: EntityId| self.sides.iter().position(|side| side.contains(&id));
         self.during.is_on(at_s) && side(a).zip(side(b)).is_some_and(|(a, b)| a != b)
@@ -91,7 +91,7 @@ impl Partition {
 }
 
 impl OneWay {
-    /// Returns whether it stops a message at a time.
+    /// Returns whether the fault stops a message at a time.
     pub(super) fn stops(&self, sender: EntityId, receiver: EntityId, at_s: f64) -> bool {
         self.during.is_on(at_s) && (self.receiver, self.sender) == (sender, receiver)
     }
@@ -100,9 +100,9 @@ impl OneWay {
 impl Bursts {
     /// Returns whether a link is in a burst at a time.
     ///
-    /// In each step of the chain its state is drawn anew with a certain probability, and else stays
-    /// as it is. That is the chain with the given mean times, and its state at any time follows from
-    /// the draws of a few steps before it.
+    /// In each step of the chain its state is drawn anew with a certain probability, and otherwise
+    /// stays the same. That is the chain with the given mean times, and its state at any time
+    /// follows from the draws of a few steps before it.
     pub(super) fn is_on(&self, draws: &FaultStreams, link: [EntityId; 2], at_s: f64) -> bool {
         let step_s = self.lasts_s.min(self.every_s) / STEPS_PER_MEAN;
         let renewed = Chance::new(step_s / self.lasts_s + step_s / self.every_s);

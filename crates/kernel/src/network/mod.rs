@@ -1,13 +1,13 @@
-//! A network of agents: its faults, its packets, and how long agents wait for each other over it.
+//! A network of agents: its faults, its packets, and the time that agents wait for each other over it.
 //!
 //! ```text
 //! links.rs      which links carry messages at a time, and which are in a burst of losses
 //! carrier.rs    a transport with the faults of a network
-//! ether.rs      the same for what one agent sends, in a process of its own
-//! packet.rs     what goes over the network, around every message
+//! ether.rs      the same for the packets of one agent, in a process of its own
+//! packet.rs     packets: the envelope of every message
 //! ```
 //!
-//! Agents are known by their ids on the network; what these are is up to the world.
+//! Agents are known by their ids on the network; their meaning is up to the world.
 
 mod carrier;
 mod ether;
@@ -24,9 +24,9 @@ pub use packet::{
     Draft, HEADER_BYTES, Refusal, Refused, Seal, TalkId, Topic, digest, fingerprint, open,
 };
 
-/// Chance of giving up one that is in touch.
+/// Chance of giving up an agent that is in touch.
 const GIVEN_UP: f64 = 1e-9;
-/// The same for one that was not heard in the talk before: a miss is no worse than that one was.
+/// The same for an agent that was not heard in the talk before: another miss is no worse than that one.
 const MISSED: f64 = 0.1;
 
 /// A network that may lose, delay and repeat messages.
@@ -89,23 +89,23 @@ impl Network {
         self.ticks(self.deadline_s)
     }
 
-    /// Returns how long an agent waits before it asks, and how often it asks.
+    /// Returns the time that an agent waits before it asks, and the number of questions.
     pub fn patience(&self) -> Patience {
         let (tries, first_tries) = (self.tries(GIVEN_UP), self.tries(MISSED));
         let bits_per_tick = self.bits_per_tick();
         Patience { ticks: self.ticks(self.patience_s), bits_per_tick, tries, first_tries }
     }
 
-    /// Returns the same for talks of many steps: one that has fallen silent is given up in a quarter
-    /// of the time at the latest, so that enough is left to go on without it.
+    /// Returns the same for talks of many steps: an agent that has fallen silent is given up in a
+    /// quarter of the time at the latest, so that enough is left to go on without it.
     pub fn short_patience(&self) -> Patience {
         let most = (self.deadline_s / (4.0 * self.patience_s)).max(2.0) as u32;
         let long = self.patience();
         Patience { tries: long.tries.min(most), first_tries: long.first_tries.min(most), ..long }
     }
 
-    /// Returns the number of questions after which the chance is at most `chance` that one that is
-    /// in touch has not answered any: each question or its answer was lost, or fell into a burst.
+    /// Returns the number of questions after which the chance is at most `chance` that an agent in
+    /// touch has answered none: each question or its answer was lost, or fell into a burst.
     fn tries(&self, chance: f64) -> u32 {
         let unanswered = 1.0 - (1.0 - self.loss) * (1.0 - self.loss);
         let burst_s = self.bursts.map_or(0.0, |bursts| bursts.lasts_s * -math::ln(chance));
@@ -134,18 +134,18 @@ pub struct Patience {
     pub bits_per_tick: f64,
     /// Number of questions to another before it is given up.
     pub tries: u32,
-    /// The same for one that was not heard in the talk before.
+    /// The same for an agent that was not heard in the talk before.
     pub first_tries: u32,
 }
 
 impl Patience {
-    /// Returns whether anybody ever asks, as nobody does on a network that loses nothing.
+    /// Returns whether agents ever ask, which they do not on a network that loses nothing.
     pub fn asks(&self) -> bool {
         self.ticks < u64::MAX
     }
 
-    /// Returns the number of ticks after which it asks where messages are of this size: those that
-    /// a message and its answer take on the way come on top.
+    /// Returns the number of ticks after which an agent asks where messages are of this size: the
+    /// ticks that a message and its answer take on the way are added.
     pub fn ticks_for(&self, bytes: usize) -> u64 {
         let on_way = (2.0 * 8.0 * bytes as f64 / self.bits_per_tick).ceil();
         self.ticks.saturating_add(on_way as u64)

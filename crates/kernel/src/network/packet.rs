@@ -1,4 +1,4 @@
-//! Packets: what goes over the network, around every message.
+//! Packets: the bytes that go over the network, around every message.
 //!
 //! ```text
 //! magic  version  topic  fingerprint  cycle  members  sender  sequence  checksum  message ...
@@ -7,8 +7,7 @@
 //!
 //! Bytes from a network may be anything. [`open`] lets through only those that another agent of the same
 //! scenario and build has sent in this form, for a talk; the message itself is checked by the agent that
-//! takes it. The checksum finds what was damaged on the way, not
-//! what was forged: who may send at all is the business of the network below.
+//! takes it. The checksum detects damage on the way, not forgery: the network below has to control access.
 
 use crate::units::{Cycle, EntityId};
 use serde::{Deserialize, Serialize};
@@ -31,14 +30,14 @@ pub trait Topic: Copy + Ord {
     fn of_number(number: u8) -> Option<Self>;
 }
 
-/// The identity of a talk: what is said in one is meant for no other.
+/// The identity of a talk: messages of one are not meant for any other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct TalkId<T> {
-    /// The cycle for which is decided.
+    /// The cycle that is decided.
     pub cycle: Cycle,
     /// The subject.
     pub topic: T,
-    /// A digest of the ids of all who take part: whoever takes others to be in the group is in another
+    /// A digest of the ids of all members: an agent that assumes a different group is in another
     /// talk.
     pub members: u64,
 }
@@ -50,13 +49,13 @@ impl<T: Topic> TalkId<T> {
         Self { cycle, topic, members: digest([&bytes, &[]]) }
     }
 
-    /// Returns whether it comes before another one, whoever takes part in that.
+    /// Returns whether it comes before another one, regardless of its members.
     pub fn is_before(&self, other: &Self) -> bool {
         (self.cycle, self.topic) < (other.cycle, other.topic)
     }
 }
 
-/// A message in its serialized form, with room before it for what makes it a packet.
+/// A message in its serialized form, with room before it for the header of a packet.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Draft(Vec<u8>);
 
@@ -68,7 +67,7 @@ impl Draft {
         Self(postcard::to_extend(message, room).expect("messages are plain data"))
     }
 
-    /// Returns a message that is serialized already.
+    /// Returns an already serialized message.
     pub fn of_bytes(message: &[u8]) -> Self {
         Self([&[0; HEADER_BYTES], message].concat())
     }
@@ -104,7 +103,7 @@ impl Draft {
 /// The statements of a packet about its message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Seal<T> {
-    /// Digest of scenario and build: agents of others are not understood.
+    /// Digest of scenario and build: agents with any other are not understood.
     pub fingerprint: u64,
     /// The talk.
     pub talk: TalkId<T>,
@@ -143,10 +142,10 @@ impl<T: Topic> Seal<T> {
     }
 }
 
-/// Returns what a packet says, and its message.
+/// Returns the seal of a packet, and its message.
 ///
 /// # Errors
-/// When the bytes are none of a packet of `fingerprint`, or were damaged.
+/// When the bytes are no packet of `fingerprint`, or were damaged.
 pub fn open<T: Topic>(bytes: &[u8], fingerprint: u64) -> Result<(Seal<T>, &[u8]), Refusal> {
     let Some((head, message)) = bytes.split_at_checked(HEADER_BYTES) else {
         return Err(Refusal::NoPacket);
@@ -175,7 +174,7 @@ pub enum Refusal {
     Fingerprint,
     /// Larger than any message of its talk.
     TooLarge,
-    /// The sender is not in the group, or gives another one's name.
+    /// The sender is not in the group, or gives the name of another agent.
     Sender,
     /// The talk is over for all.
     Stale,
@@ -185,7 +184,7 @@ pub enum Refusal {
     NoRoom,
     /// Its message cannot be read.
     Unreadable,
-    /// Its message can be read, and says what cannot be.
+    /// Its message can be read, but its content is impossible.
     Unsound,
 }
 
@@ -244,7 +243,7 @@ impl Refused {
     }
 }
 
-/// Returns a digest of two pieces of bytes, one after the other: fast, and no defense against forgery.
+/// Returns a digest of two pieces of bytes, one after the other: fast, but no defense against forgery.
 pub fn digest(pieces: [&[u8]; 2]) -> u64 {
     let add = |sum: u64, piece: &[u8]| mix(sum ^ digest_of(piece), FACTOR ^ piece.len() as u64);
     pieces.into_iter().fold(FACTOR, add)
@@ -302,7 +301,7 @@ mod tests {
         }
     }
 
-    /// Whichever bit of a packet is turned, wherever it ends: the checksum finds it.
+    /// Any flipped bit of a packet, and any cut: the checksum finds it.
     #[test]
     fn a_packet_of_which_a_bit_was_turned_is_damaged() {
         let talk = TalkId::new(7, Weather, &[1, 4, 9]);

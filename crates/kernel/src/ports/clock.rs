@@ -54,7 +54,7 @@ impl Clock for ManualClock {
     }
 }
 
-/// Checks the guarantees of a [`Clock`]; call it from the tests of a new one.
+/// Checks the guarantees of a [`Clock`]; call it from the tests of a new clock.
 ///
 /// # Panics
 /// When the clock runs backwards.

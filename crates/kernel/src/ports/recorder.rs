@@ -102,7 +102,7 @@ impl MemoryRecorder {
         self.schemas.iter().cloned().zip(tables).collect()
     }
 
-    /// Drops rows: `keep` tells for every row of a table whether it stays, or `None` where all do.
+    /// Drops rows: `keep` returns for every row of a table whether it stays, or `None` where all do.
     pub fn retain_rows(&mut self, keep: impl Fn(&TableSchema, &[Values]) -> Option<Vec<bool>>) {
         for (schema, columns) in self.schemas.iter().zip(&mut self.tables) {
             if let Some(kept) = keep(schema, columns).filter(|kept| kept.contains(&false)) {
@@ -151,7 +151,7 @@ pub fn check_block(schema: &TableSchema, block: &[Values]) -> Result<(), RecordE
     Ok(())
 }
 
-/// Returns the largest of the values that there are.
+/// Returns the largest of the values that are not missing.
 fn largest(indices: &Cells<u32>) -> Option<&u32> {
     match indices.valid() {
         None => indices.iter().max(),

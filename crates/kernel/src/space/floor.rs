@@ -1,7 +1,7 @@
 //! The occupants and claimants of the boxes of a grid: one word per box, and no lock.
 //!
 //! A box is free, a wall, or has a body standing in it. Bodies that may move into a free box write
-//! a *claim* into it, an ordinary store; where several do, the last writer stays. For perception a
+//! a *claim* into it, an ordinary store; where several do, the last write stays. For perception a
 //! claimed box is a free one. After a barrier every body reads its boxes again: the number of any
 //! other body, whether it stands there or claims the box, means a conflict with that body. All
 //! claimants of a box thus meet in its last writer, whichever that was, so the connected components
@@ -14,8 +14,8 @@ use crate::column::{Column, Word};
 use crate::units::Slot;
 use std::ops::BitAnd;
 
-/// The content of a box in one word. The highest bit says that nothing stands there, so the bitwise
-/// conjunction of several boxes is free when all are.
+/// The content of a box in one word. The highest bit means that nothing stands there, so the
+/// bitwise conjunction of several boxes is free when all are.
 pub trait BoxWord: Word + Eq + BitAnd<Output = Self> {
     /// Nothing stands here, and no body claims it.
     const FREE: Self;

@@ -16,7 +16,7 @@ pub const COLORS: [Color; 6] = [
 ];
 /// Color of walls and everything else that stands still.
 pub const WALL: Color = [0x3C, 0x3C, 0x3C];
-/// Color of boxes that nobody has mapped.
+/// Color of unmapped boxes.
 pub const UNKNOWN: Color = [0xED, 0xEB, 0xE6];
 /// Color of things that move but do not act.
 pub const MOBILE: Color = [0xA6, 0xA6, 0xA6];

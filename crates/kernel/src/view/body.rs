@@ -4,7 +4,7 @@ use super::pose::{Place, Pose};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// The name of a body: its kind, its number, and its part of things that have parts.
+/// The name of a body: its kind, its number, and, for things that have parts, its part.
 pub type Who = (Kind, u32, Option<u32>);
 
 /// Returns the name of a body, which it keeps during the run, such as `robot/3` or `connector/0/7`.
@@ -210,7 +210,7 @@ pub enum Shape {
         /// Its radius, in meters.
         radius_m: f64,
     },
-    /// A polyline; its points are in the frame of the world, whatever the pose.
+    /// A polyline; its points are in the frame of the world, regardless of the pose.
     Line {
         /// Its points, in meters.
         points_m: Vec<Place>,

@@ -77,27 +77,27 @@ pub struct Table {
 /// Something to draw over the scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mark {
-    /// Its part in what is told.
+    /// Its role in the inspection.
     pub role: Role,
     /// Words for it.
     pub label: String,
-    /// Likelihood or strength, from 0 to 1; 1 where that means nothing.
+    /// Likelihood or strength, from 0 to 1; 1 where that has no meaning.
     pub weight: f64,
     /// Its shape.
     pub shape: MarkShape,
 }
 
-/// The part of a mark in what is told.
+/// The role of a mark in an inspection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
-    /// The truth that is there to be perceived.
+    /// The truth to be perceived.
     True,
     /// The percept.
     Reported,
     /// The body's wish.
     Wish,
-    /// The deed that comes of it.
+    /// The resulting deed.
     Done,
     /// An obstacle to it, or a deed that is not done.
     Refused,
@@ -105,7 +105,7 @@ pub enum Role {
     Claim,
     /// The others with which it is in conflict.
     Group,
-    /// A future that may come.
+    /// A possible future.
     Predicted,
     /// The future that was chosen.
     Chosen,
@@ -146,7 +146,7 @@ pub enum MarkShape {
 }
 
 impl Inspection {
-    /// Creates an inspection that tells nothing yet.
+    /// Creates an empty inspection.
     pub fn new(who: Who, cycle: Cycle, title: impl Into<String>) -> Self {
         Self { who, cycle, title: title.into(), sections: Vec::new(), marks: Vec::new() }
     }
@@ -158,7 +158,7 @@ impl Inspection {
         }
     }
 
-    /// Adds a mark that is as strong as can be.
+    /// Adds a mark with full weight.
     pub fn mark(&mut self, role: Role, label: impl Into<String>, shape: MarkShape) {
         self.weigh(role, label, 1.0, shape);
     }
@@ -198,7 +198,7 @@ impl Section {
         self
     }
 
-    /// Adds a fact where there is one.
+    /// Adds a fact, if there is a value.
     #[must_use]
     pub fn fact_if(self, label: &str, value: Option<impl Into<Value>>) -> Self {
         match value {
@@ -239,7 +239,7 @@ impl Value {
         Self::Number { value, unit }
     }
 
-    /// Creates a number of meters; infinity is none.
+    /// Creates a number of meters; infinity becomes [`Value::None`].
     pub fn meters(value: f64) -> Self {
         if value.is_finite() { Self::number(value, "m") } else { Self::None }
     }

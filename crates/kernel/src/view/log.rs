@@ -15,9 +15,9 @@ pub struct Entry {
     pub level: Level,
     /// Its kind.
     pub kind: Happening,
-    /// The body it happened to.
+    /// The body that it happened to.
     pub who: Who,
-    /// The other body concerned, where there is one and the world knows which.
+    /// The other body concerned, if there is one and the world knows it.
     pub with: Option<Who>,
     /// The place, in meters.
     pub at_m: Option<Place>,
@@ -83,7 +83,7 @@ happenings! {
     DoorClosed = "door-closed",
     /// Two bodies are nearer to each other than they may be; the value is their distance.
     LossOfSeparation = "loss-of-separation",
-    /// A body has finished its way; the value is its delay.
+    /// A body has finished its route; the value is its delay.
     Arrival = "arrival",
     /// The shield has changed a wish; the value is the number of the wish that is followed instead.
     Override = "override",
@@ -95,17 +95,17 @@ happenings! {
     Heard = "heard",
     /// Time was up before a body had decided.
     Deadline = "deadline",
-    /// A body stays as it is because not all others have agreed to its wish.
+    /// A body keeps its course because not all others have agreed to its wish.
     HeldBack = "held-back",
     /// A group is too large to decide together; the value is the number of its bodies.
     GroupTooLarge = "group-too-large",
-    /// The errors of a body exceed the bounds that were allowed for; the value is how many times.
+    /// The errors of a body exceed the bounds that were allowed for; the value is the ratio of the two.
     BeyondBound = "beyond-bound",
-    /// A body can be reached by one that minds nobody; the value is their distance.
+    /// A body can be reached by one that avoids no other; the value is their distance.
     Intruder = "intruder",
-    /// A body stays on what is safe, because whoever decides for it has said nothing in time.
+    /// A body keeps to its safe plan, because no decision for it arrived in time.
     Absent = "absent",
-    /// A part has objected to a motion; the value is how far it could have gone.
+    /// A part has objected to a motion; the value is the distance that it could have gone.
     Veto = "veto",
     /// A part is inside something; the value is the depth.
     Penetration = "penetration",
@@ -113,7 +113,7 @@ happenings! {
     Clear = "clear",
     /// A part got out of the way of something; the value is the number of motions that it took.
     Escape = "escape",
-    /// A bumper touches something; the value is the way between the robot and its place.
+    /// A bumper touches something; the value is the distance between the robot and its place.
     Bumper = "bumper",
     /// A leader goes on in another direction after a veto; the value is the turn.
     Sideways = "sideways",
@@ -162,7 +162,7 @@ pub enum Level {
 pub struct Log<E> {
     events: Vec<E>,
     left_out: u64,
-    /// Whether events are kept, because somebody watches.
+    /// Whether events are kept, because there is a watcher.
     pub is_kept: bool,
 }
 
@@ -176,7 +176,7 @@ impl<E> Default for Log<E> {
 }
 
 impl<E> Log<E> {
-    /// Keeps an event, if somebody watches.
+    /// Keeps an event, if there is a watcher.
     pub fn push(&mut self, event: E) {
         if !self.is_kept {
             return;

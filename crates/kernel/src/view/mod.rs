@@ -1,6 +1,6 @@
-//! The visible part of a run, whatever its world: constant scenery, and frames of single moments.
+//! The visible part of a run of any world: constant scenery, and frames of single moments.
 //!
-//! Recordings for viewers, films and live pages draw from this and nothing else. A frame is
+//! Recordings for viewers, films and live pages draw from this alone. A frame is
 //! computed from the state on request; looking never changes a run. Lengths are meters, x runs
 //! east, y north and z up; angles are radians, counterclockwise.
 
@@ -21,7 +21,7 @@ pub use trails::{Axis, PlaceRows, Trail, corner};
 use crate::units::Cycle;
 use serde::{Deserialize, Serialize};
 
-/// Everything that stays as it is during a run.
+/// Everything that stays the same during a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scenery {
     /// The scenario's name.
@@ -69,7 +69,7 @@ pub enum Occupancy {
     Free,
     /// A wall.
     Wall,
-    /// Nobody has mapped it.
+    /// Not mapped.
     Unknown,
 }
 
@@ -97,7 +97,7 @@ pub struct Frame {
 /// The options of a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Look {
-    /// The bodies whose scans are wanted; reading sensors costs as much as simulating them.
+    /// The bodies of which scans are wanted; reading sensors costs as much as simulating them.
     pub scans: Scans,
 }
 
@@ -116,7 +116,7 @@ impl Look {
     }
 }
 
-/// The bodies whose scans a frame holds.
+/// The bodies of which a frame holds scans.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scans {
@@ -144,7 +144,7 @@ pub struct Scan {
     pub bearings_rad: Vec<f64>,
     /// Range of each beam in meters, from the pose; infinite where there is nothing in range.
     pub ranges_m: Vec<f64>,
-    /// Range of each beam if it erred in nothing; empty where the world does not tell.
+    /// Range of each beam without errors; empty where the world does not give it.
     #[serde(default)]
     pub true_m: Vec<f64>,
     /// The maximum range, in meters.

@@ -1,4 +1,4 @@
-//! The trails of bodies, and the recorded rows that they are made of.
+//! The trails of bodies, and the recorded rows from which they are made.
 
 use super::body::{Body, Kind, Shape, Who};
 use super::pose::{Place, Plane};
@@ -59,8 +59,8 @@ type Row = (Cycle, Place, Option<u32>);
 
 impl PlaceRows {
     /// Returns the trails of some bodies up to the moment of a frame, from the columns of the
-    /// table; `None` where it has other columns. A body whose rows end before that moment, though
-    /// it is still there, has no trail, because its trail would leap.
+    /// table; `None` where it has other columns. A body with rows that end before that moment,
+    /// though it is still there, has no trail, because its trail would jump.
     pub fn trails<'a>(
         &self,
         scenery: &Scenery,
@@ -90,7 +90,7 @@ impl PlaceRows {
             _ => None,
         };
         let numbers = words(self.number)?;
-        // A table that lacks a column asked for is another table.
+        // A table without one of the named columns is another table.
         let parts = self.part.map(|name| words(name).ok_or(())).transpose().ok()?;
         let ahead = self.ahead.map(|name| words(name).ok_or(())).transpose().ok()?;
         let axes = self.axes.iter().map(|axis| Some((axis, column(axis.column)?)));
@@ -120,7 +120,7 @@ impl PlaceRows {
         if here.is_some_and(|(now, _)| last + self.every < now) {
             return None;
         }
-        // A body that is gone has no shape in the frame, so that of its start is taken.
+        // A body that is gone has no shape in the frame, so the shape of its start is taken.
         let is_start = |body: &&Body| (body.kind, body.number) == (Kind::Start, number);
         let like = here.map(|(_, body)| body).or_else(|| scenery.bodies.iter().find(is_start));
         // The way from the corner to the center.
@@ -139,7 +139,7 @@ impl PlaceRows {
             let [x, y] = self.plane.as_ref().map_or([x, y], |plane| turn(plane, [x, y]));
             [x, y, z]
         };
-        // Ways have their corners along the axes of the columns.
+        // Trails have their corners along the axes of the columns.
         let now = here.map(|(now, body)| (now, turned(&Plane::point, body.pose.at_m), None));
         let rows = rows.into_iter().map(|(cycle, at, ahead)| (cycle, middle(at), ahead)).chain(now);
         let mut way: Vec<(Cycle, Place)> = Vec::new();
@@ -203,7 +203,7 @@ mod tests {
         }
     }
 
-    /// A robot of two boxes that slips north while it goes east, until a cycle.
+    /// The trails of a robot of two boxes that slips north while it goes east, until a cycle.
     fn trails(until: Cycle) -> Option<Vec<Trail>> {
         let size_m = [1.0, 1.0, 0.5];
         let robot =

@@ -1,4 +1,4 @@
-//! Workers that wait between calls, for callers whose calls take less than starting threads.
+//! Workers that wait between calls, for calls that take less time than starting threads.
 
 use super::Padded;
 use crate::interrupt::desert;
@@ -7,9 +7,9 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 /// Numbers in the largest chunk that a worker takes at once.
 const CHUNK: usize = 8;
-/// Times that a worker looks whether there is something for it before it sleeps: some 50 us. Falling asleep and being
-/// woken takes as long as a small call, and callers come with the next one at once; each look leaves the processor
-/// to whoever else wants it.
+/// Number of times that a worker looks for a call before it sleeps: some 50 us. Falling asleep and being woken takes
+/// as long as a small call, and callers come with the next one at once; each look yields the processor to any other
+/// thread.
 const LOOKS: usize = 100;
 
 /// A task that any worker does for some numbers.
@@ -24,7 +24,7 @@ pub struct Waiting {
     crew: Option<Crew>,
 }
 
-/// Threads of one process: a child of it that was forked has none of them.
+/// Threads of one process: a forked child of it has none of them.
 #[derive(Debug)]
 struct Crew {
     process: u32,
@@ -50,7 +50,7 @@ struct Shared {
 struct Call {
     number: u64,
     n: usize,
-    /// `None` when it is over; who comes later goes back to sleep.
+    /// `None` when it is over; a thread that comes later goes back to sleep.
     task: Option<Task>,
     is_last: bool,
 }
@@ -63,7 +63,7 @@ impl std::fmt::Debug for Call {
 }
 
 impl Waiting {
-    /// Returns `workers` workers (at least 1), of which one is the calling thread.
+    /// Returns `workers` workers (at least 1), one of which is the calling thread.
     pub fn new(workers: usize) -> Self {
         Self { workers: workers.max(1), crew: None }
     }
@@ -85,7 +85,7 @@ impl Waiting {
         }
         let shared = Arc::clone(&self.crew().shared);
         shared.begin(n, task);
-        // Also awaited where `own` unwinds, for the threads work with what the caller has lent them.
+        // Also awaited where `own` unwinds, because the threads work with data that the caller has lent them.
         let awaited = Awaited(&shared);
         shared.work(0, n, &mut own);
         drop(awaited);
@@ -172,12 +172,12 @@ impl Shared {
             drop(call);
             let _ended = Ended(self);
             self.work(index, n, &mut |k| task(k));
-            // Before the end is told: nobody holds a caller's data after it.
+            // Before the end is reported: after it no thread holds a caller's data.
             drop(task);
         }
     }
 
-    /// Does one worker's share, and then what is left of the others'.
+    /// Does one worker's share, and then the remaining parts of the others'.
     fn work(&self, index: usize, n: usize, task: &mut dyn FnMut(usize)) {
         let size = self.cursors.len();
         let chunk = (n / (size * 8)).clamp(1, CHUNK);
@@ -196,7 +196,7 @@ impl Shared {
     }
 }
 
-/// Looks some times whether something is so.
+/// Checks a condition a number of times.
 fn look_for(mut is_so: impl FnMut() -> bool) {
     for _ in 0..LOOKS {
         if is_so() {
@@ -206,7 +206,7 @@ fn look_for(mut is_so: impl FnMut() -> bool) {
     }
 }
 
-/// Tells that a thread has ended its part, also when it panicked.
+/// A guard that reports the end of a thread's part, also after a panic.
 struct Ended<'a>(&'a Shared);
 
 impl Drop for Ended<'_> {
@@ -222,12 +222,13 @@ impl Drop for Ended<'_> {
     }
 }
 
-/// Waits until all threads that have begun have ended their part.
+/// A guard that waits until all threads that have begun have ended their part.
 struct Awaited<'a>(&'a Shared);
 
 impl Drop for Awaited<'_> {
     fn drop(&mut self) {
-        // Nothing is left to do: whoever has not begun, because its processor has other work, is not waited for.
+        // Nothing is left to do: a thread that has not begun, because its processor has other work, is not waited
+        // for.
         self.0.call().task = None;
         let is_done = || self.0.working.load(Ordering::Acquire) == 0;
         look_for(is_done);

@@ -21,7 +21,7 @@ pub struct Asked {
 /// Asks the server whether a node may join, and meets it if so.
 ///
 /// # Errors
-/// When it may not, or nobody answers.
+/// When it may not, or no answer comes.
 pub fn join(mail: &mut Mail, asked: &Asked) -> Result<Welcome, NodeError> {
     let until = Instant::now() + asked.patience;
     while Instant::now() < until {

@@ -20,7 +20,7 @@ use turn::{Ends, Turn};
 /// Time between two reports of a node.
 const REPORT: Duration = Duration::from_millis(500);
 
-/// Time in which the other end of an open link answers nothing before the link is taken for deaf.
+/// Time without answers from the other end of an open link before the link is taken for deaf.
 const DEAF: Duration = Duration::from_secs(3);
 
 /// Time between two openings of links, at least.
@@ -32,7 +32,7 @@ const LOOK: Duration = Duration::from_millis(100);
 /// Most packets that are kept for a cycle that has not begun here: those beyond are lost.
 const MOST_EARLY: usize = 100_000;
 
-/// Most words that are taken before a node goes on, so that it gets to it however much it hears.
+/// Most words that are taken before a node goes on, so that it does go on however much it hears.
 const MOST_AT_ONCE: usize = 1_000;
 
 /// The end of a node before the fleet's.
@@ -55,7 +55,7 @@ pub enum NodeError {
     Percept(String),
 }
 
-/// A listener to the status of a node, told as often as the server is.
+/// A listener for the status of a node, called as often as the server is told.
 type Looks = Box<dyn FnMut(&Status)>;
 
 /// A node that has joined a fleet.
@@ -76,7 +76,7 @@ pub struct Node {
     /// The part of a cycle that was logged last.
     part: (Cycle, &'static str),
     report_at: Instant,
-    /// Time before which no link is opened anew.
+    /// Time before which no link is opened again.
     mend_at: Instant,
     /// Whether its links are closed, and could not be opened.
     is_cut_off: bool,
@@ -84,7 +84,7 @@ pub struct Node {
 }
 
 impl Node {
-    /// Returns a node of an agent that may join, with its program and the faults of what it sends.
+    /// Returns a node of an agent that may join, with its program and the faults of its packets.
     pub fn new(
         agent: EntityId,
         mail: Mail,
@@ -113,7 +113,7 @@ impl Node {
         }
     }
 
-    /// Tells somebody else, too, how the node is, twice a second.
+    /// Reports the status of the node to a listener as well, twice a second.
     #[must_use]
     pub fn watched(self, looks: impl FnMut(&Status) + 'static) -> Self {
         Self { looks: Box::new(looks), ..self }
@@ -122,7 +122,7 @@ impl Node {
     /// Takes part in the fleet until the server ends it.
     ///
     /// # Errors
-    /// When the server is gone, or says what makes no sense.
+    /// When the server is gone, or its words make no sense.
     pub fn run(mut self) -> Result<Status, NodeError> {
         loop {
             let wait = self.turn.as_ref().and_then(|turn| turn.wait(self.program.as_ref()));
@@ -133,14 +133,14 @@ impl Node {
             self.go_on();
             self.report();
             let silent = self.mail.silent_for(Party::Server);
-            // What has come while this process stood still is heard first.
+            // Words that came while this process stood still are heard first.
             if heard == 0 && silent.is_some_and(|silent| silent > self.lease) {
                 return Err(NodeError::Silence(self.lease.as_secs()));
             }
         }
     }
 
-    /// Says what is left to say, and waits a little until it has come.
+    /// Sends its remaining words, and waits a little until they have arrived.
     fn leave(&mut self) {
         if let Some(turn) = &mut self.turn {
             turn.hand_over_log(&mut self.mail);
@@ -154,8 +154,9 @@ impl Node {
         }
     }
 
-    /// Takes the words that have come, and waits for the first of them as long as is said. Nothing is answered before
-    /// all are taken: so there is less to do, and less to send. Returns their number; none when the fleet has ended.
+    /// Takes the words that have come, and waits for the first of them at most the given time. Nothing is answered
+    /// before all are taken: so there is less to do, and less to send. Returns their number; none when the fleet has
+    /// ended.
     fn hear_all(&mut self, within: Duration) -> Result<Option<usize>, NodeError> {
         let mut count = 0;
         let mut wait = within;
@@ -190,7 +191,7 @@ impl Node {
             (Party::Node(from), Word::Packets(packets)) => {
                 packets.into_iter().for_each(|packet| self.on_packet(from, packet));
             }
-            // `Hello` has come, which was all that it was for; others say only what is above.
+            // The arrival of `Hello` is its whole purpose; other parties send only the words above.
             _ => {}
         }
         Ok(false)
@@ -244,7 +245,7 @@ impl Node {
         }
     }
 
-    /// Does what can be done now.
+    /// Does everything that can be done now.
     fn go_on(&mut self) {
         if !self.is_ready && !self.members.is_empty() && self.mail.has_delivered() {
             self.is_ready = true;
@@ -261,7 +262,7 @@ impl Node {
         }
     }
 
-    /// Logs it when the agent has come to another part of a cycle.
+    /// Logs that the agent has come to another part of a cycle.
     fn log_part(&mut self) {
         let Doing { word, round, epoch } = self.program.doing();
         let (agent, cycle) = (self.agent, self.status.cycle);
@@ -270,7 +271,7 @@ impl Node {
         }
     }
 
-    /// Tells the server how this node is, now and then.
+    /// Tells the server the status of this node, now and then.
     fn report(&mut self) {
         let now = Instant::now();
         if now < self.report_at {
@@ -283,8 +284,8 @@ impl Node {
         self.mend_links(now);
     }
 
-    /// Opens the straight ways anew when one of them is deaf: alive at both ends, and nothing comes through. Zenoh leaves
-    /// such links behind where opening one took as long as it may, and on a busy machine that is not rare.
+    /// Opens the direct links again when one of them is deaf: alive at both ends, and nothing comes through. Zenoh
+    /// leaves such links behind where opening one took as long as it may, and on a busy machine that is not rare.
     fn mend_links(&mut self, now: Instant) {
         // Of two, the one with the higher id has opened the link.
         let mut before = self.members.iter().filter(|member| member.agent < self.agent);
@@ -298,7 +299,7 @@ impl Node {
         let opened = self.mail.reopen();
         self.is_cut_off = opened.is_err();
         if let Err(error) = opened {
-            // Until it can be done, all goes by the server.
+            // Until it can be done, everything goes by the server.
             tracing::warn!(agent, %error, "links cannot be opened yet");
         }
     }

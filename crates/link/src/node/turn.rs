@@ -1,4 +1,4 @@
-//! One cycle of an agent at its node: packets out and in, until its control is there.
+//! One cycle of an agent at its node: packets out and in, until its control is ready.
 
 use crate::mail::Mail;
 use crate::ports::{Arrival, Channel, Outgoing, Program, Sent};
@@ -11,15 +11,15 @@ use std::time::{Duration, Instant};
 /// The course of time within a cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Time {
-    /// None passes: packets arrive as they come, and nobody asks for any again.
+    /// None passes: packets arrive as they come, and none is requested again.
     Still,
     /// Ticks that the server counts.
     Counted,
-    /// A clock that runs so many times as fast as others.
+    /// A clock that runs this many times as fast as the real one.
     Running(f64),
 }
 
-/// The two ends of a turn: the agent's program, and the ways to others.
+/// The two ends of a turn: the agent's program, and the links to others.
 pub(super) struct Ends<'a> {
     pub(super) program: &'a mut dyn Program,
     pub(super) channel: Option<&'a mut (dyn Channel + 'static)>,
@@ -44,7 +44,7 @@ pub(super) struct Turn {
     taken: u64,
     /// The tick that it may go on to.
     granted: Option<Tick>,
-    /// Packets that are delayed: by the time at which they leave, and in their order.
+    /// Delayed packets, by the time at which they leave, and in their order.
     leaving: BTreeMap<(Instant, EntityId, u32), Packet>,
     /// Packets that leave at the end of the step, by receiver.
     outgoing: BTreeMap<EntityId, Vec<Packet>>,
@@ -64,7 +64,7 @@ pub(super) struct Sums {
 }
 
 impl Turn {
-    /// Returns the turn that begins now; `tick_s` is how long a tick of the network takes, if there is one.
+    /// Returns the turn that begins now; `tick_s` is the duration of a tick of the network, if there is one.
     pub(super) fn new(begin: Begin, clock: Clock, tick_s: Option<f64>, first_tick: u64) -> Self {
         let time = match clock {
             Clock::Lockstep if tick_s.is_some() => Time::Counted,
@@ -92,12 +92,12 @@ impl Turn {
         }
     }
 
-    /// Returns the turn, which keeps what it sends.
+    /// Returns the turn, set to keep a log of its packets.
     pub(super) fn logged(self) -> Self {
         Self { log: Some(Vec::new()), ..self }
     }
 
-    /// Hands over what was sent since the last call.
+    /// Hands over the packets sent since the last call.
     pub(super) fn hand_over_log(&mut self, mail: &mut Mail) {
         if let Some(log) = self.log.as_mut().filter(|log| !log.is_empty()) {
             mail.letter(Party::Server, Word::Log(std::mem::take(log)));
@@ -108,7 +108,7 @@ impl Turn {
         self.begin.cycle
     }
 
-    /// Takes the count of what was sent since the last call.
+    /// Takes the count of packets and bytes sent since the last call.
     pub(super) fn take_sent(&mut self) -> Sums {
         std::mem::take(&mut self.sent)
     }
@@ -127,7 +127,7 @@ impl Turn {
         self.arrived.entry(arrives).or_default().push((from, packet));
     }
 
-    /// Returns how long nothing is to do, unless something comes; none if that may be forever.
+    /// Returns the time that the node may wait, unless something comes; none if that may be forever.
     pub(super) fn wait(&self, program: &dyn Program) -> Option<Duration> {
         let Time::Running(speed) = self.time else { return None };
         let leaves = self.leaving.keys().next().map(|&(at, ..)| at);
@@ -145,11 +145,11 @@ impl Turn {
 
     fn tick_now(&self, speed: f64) -> u64 {
         let passed_s = self.began.elapsed().as_secs_f64() * speed;
-        // A little more, so that who waits for a tick is there when it ends.
+        // A little more, so that a wait for a tick ends with the tick reached.
         self.first_tick + (passed_s / self.tick_s + 1e-6) as u64
     }
 
-    /// Does what can be done now.
+    /// Does everything that can be done now.
     pub(super) fn go_on(&mut self, ends: &mut Ends<'_>) {
         match self.time {
             Time::Still => drop(self.step(u64::MAX, ends)),
@@ -161,7 +161,7 @@ impl Turn {
             }
         }
         self.post(ends.mail);
-        // Where time is counted, messages are, too: until nobody has any more to say.
+        // Where time is counted, messages are, too: until no agent has more to say.
         let may_tell = self.time != Time::Counted || self.is_closed;
         if may_tell
             && !self.has_told
@@ -197,19 +197,19 @@ impl Turn {
         ends.mail.letter(Party::Server, Word::Ticked(report));
     }
 
-    /// Takes the packets that have arrived by a tick, does what is due, and sends what comes of it. Returns the
-    /// receivers of what was sent, with the ticks of arrival.
+    /// Takes the packets that have arrived by a tick, does everything that is due, and sends the resulting packets.
+    /// Returns the receivers of those, with the ticks of arrival.
     fn step(&mut self, by: u64, ends: &mut Ends<'_>) -> Vec<(EntityId, u64)> {
         let later = by.checked_add(1).map(|next| self.arrived.split_off(&next));
         let due = std::mem::replace(&mut self.arrived, later.unwrap_or_default());
         let mut due: Vec<(EntityId, Packet)> = due.into_values().flatten().collect();
-        // As in one process, whatever the order in which they came.
+        // As in one process, regardless of the order in which they came.
         due.sort_by_key(|(from, packet)| (packet.left, *from, packet.sequence));
         self.taken += due.len() as u64;
         let mut sent = Vec::new();
         for (from, packet) in due {
-            // Where no time passes, each packet is answered for itself, however many have come at once: so there are as
-            // many of them as in one process.
+            // Where no time passes, each packet is answered by itself, however many have come at once: so there are
+            // as many of them as in one process.
             if self.time == Time::Still {
                 self.send_all(ends, &mut sent);
             }
@@ -222,7 +222,7 @@ impl Turn {
         sent
     }
 
-    /// Sends what the program has to say.
+    /// Sends the program's packets.
     fn send_all(&mut self, ends: &mut Ends<'_>, sent: &mut Vec<(EntityId, u64)>) {
         for packet in ends.program.take_packets() {
             self.send(packet, ends, sent);
@@ -232,7 +232,7 @@ impl Turn {
     /// Sends a packet to each of its receivers, with the faults that happen to it.
     fn send(&mut self, packet: Outgoing, ends: &mut Ends<'_>, sent: &mut Vec<(EntityId, u64)>) {
         let bytes = packet.payload.len();
-        // In real time the number is the sender's in the whole cycle, as all draws are for its first tick.
+        // In real time packets are numbered within the whole cycle, because all draws are for its first tick.
         let (tick, sequence) = match self.time {
             Time::Running(_) => (self.first_tick, self.sequence),
             _ => (self.tick, packet.sequence),
@@ -278,7 +278,7 @@ impl Turn {
 
     /// Lets a packet leave: at the end of the step, or after its delay.
     fn part(&mut self, to: EntityId, packet: Packet) {
-        // A tick is what the real network takes.
+        // One tick is the time of the real network.
         let delay = packet.arrives.saturating_sub(self.tick + 1);
         match self.time {
             Time::Running(speed) if delay > 0 => {
@@ -297,7 +297,7 @@ impl Turn {
         }
     }
 
-    /// Sends the packets of a step: one word to all who get the same.
+    /// Sends the packets of a step: one word to all that get the same packets.
     fn post(&mut self, mail: &mut Mail) {
         let mut words: Vec<(Vec<Packet>, Vec<Party>)> = Vec::new();
         for (to, packets) in std::mem::take(&mut self.outgoing) {
@@ -311,7 +311,7 @@ impl Turn {
             let word = Word::Packets(packets);
             match self.time {
                 Time::Running(_) => mail.notes(&to, &word),
-                // Nothing is lost here but what the scenario loses.
+                // Only packets lost by the scenario are lost here.
                 Time::Still | Time::Counted => mail.letters(&to, word),
             }
         }

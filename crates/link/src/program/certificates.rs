@@ -1,11 +1,11 @@
-//! Certificates, looked at before anything starts: what is wrong with one shows on a network as silence.
+//! Checks of certificates before anything starts, because a wrong one shows on a network only as silence.
 
 use sidestep::kernel::InputError;
 use sidestep_session::fleet::Tls;
 use std::path::Path;
 use x509_parser::pem::Pem;
 
-/// Checks certificates, and that endpoints are of the sort that goes with them.
+/// Checks certificates, and that endpoints are of the kind that goes with them.
 ///
 /// # Errors
 /// With the first thing that is wrong.
@@ -17,7 +17,7 @@ pub(super) fn check_all<'a>(
     check_endpoints(endpoints, tls)
 }
 
-/// Checks that the files are there, and are certificates that hold today.
+/// Checks that the files exist, and are certificates that are valid today.
 ///
 /// # Errors
 /// With the first that is not.

@@ -17,7 +17,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// Time after which a node that has ended is started again; twice as long after each time that it has not lasted.
 const AGAIN: Duration = Duration::from_millis(500);
 
-/// Longest time after which it is.
+/// Longest time before a node is started again.
 const LONGEST: Duration = Duration::from_secs(16);
 
 /// Time that a node must last to count as one that does.
@@ -32,9 +32,9 @@ struct Mate {
     job: NodeJob,
     child: Option<Child>,
     began: Instant,
-    /// Time at which it is started again, if it has ended,
+    /// Time at which it is started again, if it has ended.
     again_at: Option<Instant>,
-    /// and how long that takes.
+    /// The wait until then.
     wait: Duration,
 }
 
@@ -53,7 +53,7 @@ impl Mate {
         let program = std::env::current_exe().map_err(cannot)?;
         let mut command = Command::new(program);
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).env("ZENOH_RUNTIME", RUNTIME);
-        // Ctrl-C in a terminal is for who has started the fleet, who ends all in good order.
+        // Ctrl-C in a terminal is for the program that started the fleet, which ends all in good order.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command.spawn().map_err(cannot)?;
@@ -78,7 +78,7 @@ impl Mate {
     }
 }
 
-/// Returns what a node has told last: why it could not go on.
+/// Returns the last message of a node: why it could not go on.
 fn last_words(child: &mut Child) -> Option<String> {
     let out = BufReader::new(child.stdout.take()?);
     let told = out.lines().map_while(Result::ok).last()?;
@@ -93,7 +93,7 @@ fn words_of(status: ExitStatus) -> String {
 }
 
 impl Crew {
-    /// Starts a node for each job; where `restarts`, one that ends is started again.
+    /// Starts a node for each job; with `restarts`, one that ends is started again.
     ///
     /// # Errors
     /// When a process cannot be started.
@@ -109,7 +109,7 @@ impl Crew {
     }
 
     /// Looks after the processes. Returns the nodes that have ended since the last call, with the reasons. One that is
-    /// started again is reached where it was before, as `reached` says: there the others look for it.
+    /// started again is reached where it was before, as given by `reached`: there the others look for it.
     ///
     /// # Errors
     /// When one cannot be started again.

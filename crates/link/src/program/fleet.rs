@@ -76,7 +76,7 @@ pub(super) fn fly(job: &FleetJob, lifeline: &Lifeline) -> Result<(), Error> {
     done
 }
 
-/// Returns what stays as it is of a run that is watched.
+/// Returns the unchanging part of a run that is watched.
 fn staged(run: &dyn Simulation) -> Staged {
     Staged {
         build: sidestep_session::build().into(),
@@ -89,7 +89,7 @@ fn staged(run: &dyn Simulation) -> Staged {
 
 /// Returns the endpoints at which the server listens, each with a port.
 fn endpoints(listen: &[String]) -> Result<Vec<String>, WireError> {
-    // The ports are free again when the list is complete, and had at once.
+    // The ports are free again when the list is complete, and taken right away.
     let held = listen.iter().map(|endpoint| hold(endpoint)).collect::<Result<Vec<_>, _>>()?;
     Ok(held.into_iter().map(|held| held.endpoint).collect())
 }
@@ -101,7 +101,7 @@ fn node_jobs(
     world: &dyn Deployed,
 ) -> BTreeMap<EntityId, NodeJob> {
     let any = match job.topology {
-        // As the server's own: these are on its machine.
+        // As with the server's own: these nodes are on its machine.
         Topology::Mesh => vec![any_port(&connect[0])],
         Topology::Star => Vec::new(),
     };
@@ -127,7 +127,7 @@ fn any_port(endpoint: &str) -> String {
 /// Stores and tells the results.
 fn finish(journey: Journey, flown: Result<(), Broken>, fleet: FleetNow) -> Result<(), Error> {
     if let Err(Broken::World(error)) = flown {
-        // What could not be recorded before cannot be now.
+        // A record that failed before would fail again.
         return Err(error);
     }
     let summary = journey.finish(&Watched)?;
@@ -150,7 +150,8 @@ fn finish(journey: Journey, flown: Result<(), Broken>, fleet: FleetNow) -> Resul
     }
 }
 
-/// The program as a watcher of the run, which goes on cycle by cycle: who looks after the fleet says when to stop.
+/// The program as a watcher of the run, which goes on cycle by cycle: the attendant of the fleet decides when to
+/// stop.
 struct Watched;
 
 impl Watcher for Watched {
@@ -159,7 +160,7 @@ impl Watcher for Watched {
     }
 }
 
-/// Looks after nodes, and tells how the fleet is.
+/// The attendant of the fleet: looks after nodes, and tells the fleet's state.
 struct Captain<'a> {
     crew: Crew,
     lifeline: &'a Lifeline,
@@ -170,12 +171,12 @@ struct Captain<'a> {
     /// Time at which all nodes had joined.
     began: Option<Instant>,
     now: FleetNow,
-    /// Packets and bytes of each node at the last report, and when that was.
+    /// Packets and bytes of each node at the last report, and its time.
     before: BTreeMap<EntityId, (u64, u64)>,
     reported: Instant,
-    /// The table of all packets, if it is wanted,
+    /// The table of all packets, if it is wanted.
     packets: Option<Packets>,
-    /// and why it cannot be written.
+    /// The reason why it cannot be written.
     unwritten: Option<RecordError>,
 }
 
@@ -232,7 +233,7 @@ impl<'a> Captain<'a> {
         };
     }
 
-    /// Returns a node as it is now, so many seconds after the last look.
+    /// Returns the present state of a node, a number of seconds after the last look.
     fn node(
         &mut self,
         fleet: &Look<'_>,

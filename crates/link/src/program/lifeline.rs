@@ -1,6 +1,6 @@
-//! The lifeline: standard input, which ends when whoever started the program wants it to end, or is gone.
+//! The lifeline: standard input, which ends when the parent of the program wants it to end, or is gone.
 //!
-//! It holds for every way in which a process ends, and needs no system's own calls: a pipe is closed when nobody is
+//! It holds however the parent ends, and needs no calls of a particular system: a pipe is closed when no process is
 //! left to write to it.
 
 use std::io::Read;
@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Time that the program has to end in good order; then it ends as it is.
+/// Time that the program has to end in good order; then it is ended anyway.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Exit code of a program that was told to end.
@@ -32,7 +32,7 @@ impl Lifeline {
         Self(has_ended)
     }
 
-    /// Ends the process when standard input ends: for one that has nothing to lose.
+    /// Ends the process when standard input ends: for a process with nothing to lose.
     pub(super) fn end_with() {
         std::thread::spawn(|| {
             wait_for_end();
@@ -48,6 +48,6 @@ impl Lifeline {
 
 fn wait_for_end() {
     let mut bytes = [0; 64];
-    // Whatever else is said is nothing to the program.
+    // Anything else on standard input is ignored.
     while std::io::stdin().lock().read(&mut bytes).is_ok_and(|read| read > 0) {}
 }

@@ -6,7 +6,7 @@ use tracing_subscriber::filter::Targets;
 use tracing_subscriber::fmt;
 use tracing_subscriber::prelude::*;
 
-/// Starts to log from a level on, e.g. `info`. Of Zenoh only errors are told, and everything at `trace`.
+/// Starts to log from a level on, e.g. `info`. Of Zenoh only errors are logged, and everything at `trace`.
 ///
 /// # Errors
 /// When there is no such level.
@@ -18,14 +18,14 @@ pub(super) fn start(is_json: bool, level: &str) -> Result<(), InputError> {
     let mut targets = Targets::new().with_target("sidestep_link", wanted);
     targets = match wanted {
         LevelFilter::TRACE => targets.with_default(wanted),
-        // Zenoh warns of its scouting, which is off; of certificates it tells nowhere else.
+        // Zenoh warns of its scouting, which is off; it reports problems with certificates nowhere else.
         _ => targets
             .with_default(wanted.min(LevelFilter::ERROR))
             .with_target("zenoh_link_tls", wanted.min(LevelFilter::WARN)),
     };
     let lines = fmt::layer().with_writer(std::io::stderr).with_ansi(false).with_target(false);
     let told = tracing_subscriber::registry();
-    // Of one process there is one, and this is called once.
+    // A process has one logger, and this is called once.
     let _ = match is_json {
         true => told.with(lines.json().flatten_event(true).with_filter(targets)).try_init(),
         false => told.with(lines.with_timer(fmt::time::uptime()).with_filter(targets)).try_init(),

@@ -1,4 +1,4 @@
-//! Metrics in Prometheus' text format (version 0.0.4), for who asks at an address.
+//! Metrics in Prometheus' text format (version 0.0.4), served at an address.
 
 use crate::server::Look;
 use crate::server::tally::Histogram;
@@ -9,7 +9,7 @@ use sidestep_session::fleet::{AgentName, FleetNow, NodeNow};
 use std::fmt::Write;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The place where metrics are shown; nobody looks at one that has no address.
+/// The place where metrics are shown; without an address it shows none.
 #[derive(Debug, Default)]
 pub(super) struct Board(Option<Arc<Mutex<String>>>);
 
@@ -17,7 +17,7 @@ impl Board {
     /// Opens a board at an address, if one is given.
     ///
     /// # Errors
-    /// When the address cannot be had.
+    /// When the address cannot be taken.
     pub(super) fn open(address: Option<&str>) -> Result<Self, InputError> {
         let Some(address) = address else { return Ok(Self::default()) };
         let text = Arc::new(Mutex::new(String::new()));
@@ -28,7 +28,7 @@ impl Board {
         Ok(Self(Some(text)))
     }
 
-    /// Shows a text, which is made only if somebody could see it.
+    /// Shows a text, which is made only if there is an address.
     pub(super) fn show(&self, text: impl FnOnce() -> String) {
         if let Some(shown) = &self.0 {
             *shown.lock().unwrap_or_else(PoisonError::into_inner) = text();
@@ -61,7 +61,7 @@ impl Text {
         self.value(&format!("{name}_count"), "", histogram.count());
     }
 
-    /// Adds a metric with a value for each agent, which is named by a label.
+    /// Adds a metric with a value for each agent, named by a label.
     fn each(
         &mut self,
         name: &str,
@@ -172,7 +172,7 @@ fn label(name: &str, value: &str) -> String {
     format!("{name}=\"{value}\"")
 }
 
-/// Adds what nodes tell of their mail, by the labels of their agents.
+/// Adds the mail counts of nodes, by the labels of their agents.
 fn of_mail(text: &mut Text, statuses: &[(String, &Status)]) {
     let retries = statuses.iter().map(|(agent, status)| (agent.clone(), status.retries as f64));
     text.each("retries_total", "counter", "Letters that a node has sent again.", retries);

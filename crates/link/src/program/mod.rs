@@ -1,12 +1,12 @@
-//! The program: reads its job, does it, and tells what comes of it, a line of JSON each.
+//! The program: reads its job, does it, and reports the results, each as a line of JSON.
 //!
 //! ```text
 //! fleet.rs   the server of a world, and nodes that it starts    crew.rs     processes of nodes
-//! node.rs    one node                                           lifeline.rs whoever started it is gone
-//! told.rs    lines that are told                                metrics.rs  Prometheus' text
-//! log.rs     logs to standard error                             scenario.rs what server and nodes fly
+//! node.rs    one node                                           lifeline.rs the end of the parent process
+//! told.rs    lines for the parent process                       metrics.rs  Prometheus' text
+//! log.rs     logs to standard error                             scenario.rs the scenario they fly
 //! packets.rs the table of all packets                           certificates.rs whether they hold
-//! shown.rs   what is shown of a fleet                           watch.rs    who watches one
+//! shown.rs   the view of a fleet                                watch.rs    the watcher of one
 //! ```
 
 mod certificates;
@@ -29,7 +29,7 @@ use std::io::BufRead;
 use std::process::ExitCode;
 use told::tell;
 
-/// Words for who starts the program by hand.
+/// Words for a user who starts the program by hand.
 const USAGE: &str = "\
 sidestep-link runs the server and the nodes of a fleet. `sidestep fleet` and `sidestep node` start it
 and tell it, in a line of JSON, what to do: see `sidestep fleet --help`.";
@@ -78,7 +78,7 @@ fn do_job(job: Job) -> Result<(), Error> {
     }
 }
 
-/// Checks what server and nodes are given alike, and begins their log.
+/// Checks the options that server and nodes share, and begins their log.
 fn prepare<'a>(
     common: &Common,
     endpoints: impl IntoIterator<Item = &'a String>,
@@ -89,7 +89,7 @@ fn prepare<'a>(
     Ok(())
 }
 
-/// Refuses the job of another build: all that decide must be of one.
+/// Refuses the job of another build: all that decide must be of the same build.
 fn check_build(build: &str) -> Result<(), Error> {
     let own = sidestep_session::build();
     if build == own {

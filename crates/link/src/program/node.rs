@@ -55,7 +55,7 @@ pub(super) fn fly(job: &NodeJob) -> Result<(), Error> {
     node.run().map(drop).map_err(|e| failed(e, job))
 }
 
-/// Returns the error of a wire that there is not.
+/// Returns the error of a wire that could not be made.
 pub(super) fn wrong_endpoint(error: WireError) -> Error {
     let cause = error.to_string();
     match error {

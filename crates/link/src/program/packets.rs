@@ -10,7 +10,7 @@ use std::path::Path;
 /// Rows that are stored at once.
 const BLOCK: usize = 1 << 16;
 
-/// A row: the sender and what it has sent.
+/// A row: the sender and its packet.
 type Row = (EntityId, Logged);
 
 /// A packet's table in a run folder. Until it is finished it is called `packets.partial`.
@@ -57,12 +57,12 @@ impl Packets {
         Ok(Self { recorder, table, waiting: Vec::new() })
     }
 
-    /// Adds packets of cycles of which no more come.
+    /// Adds packets of cycles that will get no further ones.
     ///
     /// # Errors
     /// When they cannot be written.
     pub(super) fn add(&mut self, mut rows: Vec<Row>) -> Result<(), RecordError> {
-        // In whatever order nodes have told of them.
+        // Nodes may have reported them in any order.
         rows.sort_unstable_by_key(|(sender, packet)| (packet.cycle, *sender, *packet));
         self.waiting.append(&mut rows);
         if self.waiting.len() < BLOCK {

@@ -53,7 +53,7 @@ impl Scenario {
     }
 
     /// Returns the changes that a fleet needs: controls that are recorded, so that the run can be computed again, and in
-    /// real time a network on which nobody waits forever for one that is gone.
+    /// real time a network on which no agent waits forever for one that is gone.
     pub(super) fn needs(&self, clock: Clock, is_recorded: bool) -> Vec<String> {
         let mut needs = Vec::new();
         if is_recorded {

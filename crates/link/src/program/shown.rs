@@ -1,4 +1,4 @@
-//! The fleet as it is shown to those who watch it.
+//! The fleet as shown to its watchers.
 
 use crate::wire::window::Window;
 use sidestep::kernel::Cycle;
@@ -9,10 +9,10 @@ use std::time::Duration;
 /// Number of events that a view holds, the last ones.
 const MOST_EVENTS: usize = 200;
 
-/// Time that the last view waits at the end for those who watch.
+/// Time that the last view stays for its watchers at the end.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// The view of a fleet that is shown at a window.
+/// The view of a fleet, shown at a window.
 #[derive(Debug)]
 pub(super) struct Shown {
     window: Window,
@@ -27,7 +27,7 @@ impl Shown {
         Self { window, number: 0, frame: None, events: Vec::new() }
     }
 
-    /// Returns whether somebody watches who has no frame of this cycle.
+    /// Returns whether a watcher has no frame of this cycle yet.
     pub(super) fn wants_frame(&self, cycle: Cycle) -> bool {
         self.frame.as_ref().is_none_or(|frame| frame.cycle != cycle) && self.window.is_watched()
     }
@@ -50,12 +50,12 @@ impl Shown {
         self.window.show(self.number, json(&seen));
     }
 
-    /// Returns whether somebody watches.
+    /// Returns whether there is a watcher.
     pub(super) fn is_watched(&self) -> bool {
         self.window.is_watched()
     }
 
-    /// Leaves the last view for a while to those who watch.
+    /// Leaves the last view to its watchers for a while.
     pub(super) fn linger(&self) {
         self.window.linger(PATIENCE);
     }

@@ -1,9 +1,9 @@
-//! Lines that the program tells whoever started it.
+//! Lines that the program writes for its parent process.
 
 use sidestep_session::fleet::Told;
 use std::io::Write;
 
-/// Tells something. A reader that is gone has ended the program by that already.
+/// Writes a line. If the reader is gone, that has ended the program already.
 pub(super) fn tell(told: &Told) {
     let mut line = serde_json::to_string(told).expect("what is told is plain data");
     line.push('\n');

@@ -1,4 +1,4 @@
-//! Somebody who watches a fleet: asks for what is to be seen of it, and tells it on.
+//! The watcher of a fleet: asks for its views, and passes them on.
 
 use super::lifeline::Lifeline;
 use super::node::wrong_endpoint;
@@ -15,10 +15,10 @@ use std::time::{Duration, Instant};
 /// Time between two questions.
 const EVERY: Duration = Duration::from_millis(50);
 
-/// Watches a fleet until it is over, or whoever wanted to see it has seen enough.
+/// Watches a fleet until it is over, or the parent process has seen enough.
 ///
 /// # Errors
-/// When nobody answers, it is of another build, or it is not heard any more.
+/// When no answer comes, the fleet is of another build, or it has fallen silent.
 pub(super) fn watch(job: &WatchJob, lifeline: &Lifeline) -> Result<(), Error> {
     let patience = Duration::from_secs_f64(job.patience_s);
     let outlook = Outlook::new(&job.connect, job.tls.as_ref(), patience).map_err(wrong_endpoint)?;
@@ -50,7 +50,7 @@ struct Viewer<'a> {
 }
 
 impl Viewer<'_> {
-    /// Asks until there is an answer; `None` when nobody wants it any more.
+    /// Asks until there is an answer; `None` when it is no longer wanted.
     fn first(&mut self, ask: impl Fn() -> Option<String>) -> Result<Option<String>, Error> {
         while !self.lifeline.has_ended() {
             if let Some(text) = ask() {
@@ -62,7 +62,7 @@ impl Viewer<'_> {
                 let cause = format!("the fleet at {place} was not heard for {s} s");
                 return Err(Error::stopped(cause, "see whether it flies, and watch it again"));
             }
-            // No answer may come at once, where there is no link.
+            // Without a link, the lack of an answer may show at once.
             sleep(EVERY);
         }
         Ok(None)
@@ -77,7 +77,7 @@ fn read<T: DeserializeOwned>(text: &str, job: &WatchJob) -> Result<T, Error> {
     })
 }
 
-/// Refuses a fleet of another build, whose views may have another form.
+/// Refuses a fleet of another build, because its views may have another form.
 fn check_build(scene: &str, job: &WatchJob) -> Result<(), Error> {
     #[derive(Deserialize)]
     struct Made {

@@ -1,4 +1,4 @@
-//! Lockstep: the server waits for every control, so that a fleet comes out as one process does, bit for bit.
+//! Lockstep: the server waits for every control, so that a fleet gives the same results as one process, bit for bit.
 
 use super::rounds::Group;
 use super::{Broken, LOOK, Server};
@@ -8,10 +8,10 @@ impl Server<'_> {
     /// Makes a cycle.
     ///
     /// # Errors
-    /// When a node is gone without which the fleet does not go on, the world cannot go on, or somebody asks the fleet to
+    /// When a node that the fleet needs is gone, the world cannot go on, or the fleet is asked to
     /// end.
     pub(super) fn cycle_in_lockstep(&mut self) -> Result<(), Broken> {
-        // Time stands still while one is missing: the cycle under way when it was lost was made without it.
+        // Time stands still while a node is missing: only the cycle under way at its loss was made without it.
         self.wait_for_all()?;
         let began = Instant::now();
         loop {

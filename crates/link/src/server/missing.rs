@@ -1,4 +1,4 @@
-//! Nodes of which nothing is heard: gone ones, and silent ones, for which a fleet in lockstep waits.
+//! Nodes that are not heard: gone ones, and silent ones, for which a fleet in lockstep waits.
 
 use super::{Broken, LOOK, Server};
 use crate::wire::Party;
@@ -6,11 +6,11 @@ use crate::words::{Clock, Life, Refusal, Word};
 use sidestep::kernel::EntityId;
 use std::time::Duration;
 
-/// Time after which a node of which nothing is heard is silent: it says something twice a second.
+/// Time after which a node that is not heard counts as silent: it sends a status twice a second.
 pub const SILENT: Duration = Duration::from_secs(1);
 
 impl Server<'_> {
-    /// Returns whether nothing was heard of a node that is there for longer than some time.
+    /// Returns whether a node that has joined was not heard for longer than some time.
     pub(super) fn is_silent(&self, agent: EntityId, time: Duration) -> bool {
         self.mail.silent_for(Party::Node(agent)).is_some_and(|silent| silent > time)
     }
@@ -25,7 +25,7 @@ impl Server<'_> {
         self.terms.welcome.clock == Clock::Lockstep
     }
 
-    /// Returns whether the fleet goes on with a node that is back after all had begun.
+    /// Returns whether the fleet takes back a node that returns after the start.
     pub(super) fn takes_back(&self) -> bool {
         !self.is_in_lockstep() || self.stage.world().waits_for_lost()
     }
@@ -63,7 +63,7 @@ impl Server<'_> {
     /// Waits until all nodes are there and ready, also those that were gone.
     ///
     /// # Errors
-    /// When somebody asks the fleet to end.
+    /// When the fleet is asked to end.
     pub(super) fn wait_for_all(&mut self) -> Result<(), Broken> {
         while !self.seats.values().all(|seat| seat.is_ready && !seat.is_gone) {
             self.hear(LOOK)?;
@@ -71,7 +71,7 @@ impl Server<'_> {
         Ok(())
     }
 
-    /// Notes for whom a fleet in lockstep waits, and tells of those who are new.
+    /// Notes the agents for which a fleet in lockstep waits, and reports the new ones.
     pub(super) fn note_waits(&mut self) {
         if !self.is_in_lockstep() || !self.has_begun {
             return;

@@ -1,13 +1,13 @@
 //! The server of a fleet: it has the world, hands each node its percept, takes the controls, and lets the world go on.
 //!
 //! ```text
-//! muster.rs    who may join, until all are there     seat.rs      what is known of a node
+//! muster.rs    nodes join, until all are there       seat.rs      the known state of a node
 //! lockstep.rs  waits for every control               realtime.rs  each cycle is a deadline
-//! rounds.rs    sights out and controls in            missing.rs   who is not heard
+//! rounds.rs    sights out and controls in            missing.rs   nodes not heard
 //! ticks.rs     counted time, on a network with faults
 //! ```
 //!
-//! It names no socket: what it says and hears goes over [`Mail`].
+//! It names no socket: all its words go over [`Mail`].
 
 mod lockstep;
 mod missing;
@@ -43,24 +43,24 @@ pub struct Terms {
     pub scenario: Fingerprint,
     /// The build of the program.
     pub build: String,
-    /// The answer to those who may join.
+    /// The answer to nodes that may join.
     pub welcome: Welcome,
-    /// Time after which a node that is not heard is gone.
+    /// Time after which a node that is not heard counts as gone.
     pub lease: Duration,
     /// Whether packets may be lost, delayed or doubled, so that lockstep counts time in ticks.
     pub has_faults: bool,
 }
 
-/// The end of a fleet before the world's.
+/// The reason why a fleet ends before its world.
 #[derive(Debug, thiserror::Error)]
 pub enum Broken {
-    /// Somebody asked it to end.
+    /// It was asked to end.
     #[error("interrupted")]
     Stopped,
     /// A node is gone, and lockstep does not go on without it.
     #[error("the node of {agent} is gone in cycle {cycle}: {reason}")]
     Gone {
-        /// Its agent, as people call it.
+        /// Its agent, by its name for people.
         agent: String,
         /// The cycle.
         cycle: Cycle,
@@ -72,7 +72,7 @@ pub enum Broken {
     World(#[from] sidestep_session::Error),
 }
 
-/// The fleet as somebody sees it who looks in now and then.
+/// The fleet as seen by its [`Attendant`] now and then.
 pub struct Look<'a> {
     /// The seats.
     pub seats: &'a BTreeMap<EntityId, Seat>,
@@ -88,7 +88,7 @@ pub struct Look<'a> {
     pub waits_for: &'a [EntityId],
 }
 
-/// Somebody who looks after the fleet while the server waits.
+/// An attendant, which looks after the fleet while the server waits.
 pub trait Attendant {
     /// Looks at the fleet, 50 times a second or so. Returns the nodes that have ended, with the reason.
     ///
@@ -100,15 +100,15 @@ pub trait Attendant {
     /// with its sender.
     fn take_packets(&mut self, _: Vec<(EntityId, Logged)>) {}
 
-    /// Returns whether somebody watches who has no frame of this cycle yet.
+    /// Returns whether a watcher has no frame of this cycle yet.
     fn wants_frame(&self, _: Cycle) -> bool {
         false
     }
 
-    /// Takes a frame that was wanted.
+    /// Takes a frame that it wanted.
     fn take_frame(&mut self, _: Frame) {}
 
-    /// Looks at the fleet when all nodes have said what they had to say.
+    /// Looks at the fleet when all nodes have sent their last words.
     fn look_back(&mut self, _: &Look<'_>) {}
 }
 
@@ -117,9 +117,9 @@ pub trait Attendant {
 pub struct Tally {
     /// Time from the sights to the last control of a cycle.
     pub talked: Histogram,
-    /// Time in which the world went on by one cycle.
+    /// Time to advance the world by one cycle.
     pub advanced: Histogram,
-    /// Lateness of cycles: the time between when one was due and when it began, in real time.
+    /// Lateness of cycles: the delay between the due time and the start of one, in real time.
     pub late: Histogram,
     /// Number of cycles that began later than a tenth of their length.
     pub late_cycles: u64,
@@ -151,7 +151,7 @@ pub struct Server<'a> {
 }
 
 impl<'a> Server<'a> {
-    /// Returns a server to which nobody has joined yet.
+    /// Returns a server that no node has joined yet.
     pub fn new(
         mail: Mail,
         stage: &'a mut Stage,
@@ -200,7 +200,7 @@ impl<'a> Server<'a> {
         }
     }
 
-    /// Tells all nodes that the fleet has ended, and waits a little until they have said what they had to say.
+    /// Tells all nodes that the fleet has ended, and waits a little until they have sent their last words.
     fn end(&mut self) {
         let seated: Vec<EntityId> = self.seated().collect();
         seated.iter().for_each(|&agent| self.mail.letter(Party::Node(agent), Word::End));
@@ -218,12 +218,12 @@ impl<'a> Server<'a> {
         self.attendant.look_back(&Look { seats, tally, mail, stage, has_begun, waits_for });
     }
 
-    /// Agents whose nodes are there, rising.
+    /// Agents with nodes that are there, rising.
     fn seated(&self) -> impl Iterator<Item = EntityId> + '_ {
         self.seats.iter().filter(|(_, seat)| seat.life().is_some()).map(|(&agent, _)| agent)
     }
 
-    /// Hears what comes within some time, at most until the next look around.
+    /// Hears the words that come within some time, at most until the next look around.
     ///
     /// # Errors
     /// When the fleet is to end.
@@ -233,7 +233,7 @@ impl<'a> Server<'a> {
         }
         let now = Instant::now();
         if now >= self.look_at {
-            // What has come while this process stood still is heard before anybody is missed.
+            // Words that came while this process stood still are heard before any node counts as missing.
             while let Some(heard) = self.mail.receive(Duration::ZERO) {
                 self.take(heard);
             }
@@ -263,7 +263,7 @@ impl<'a> Server<'a> {
         Ok(())
     }
 
-    /// Shows the world to those who watch it.
+    /// Shows the world to its watchers.
     fn show(&mut self) {
         if self.attendant.wants_frame(self.stage.cycle()) {
             self.attendant.take_frame(self.stage.frame());
@@ -288,7 +288,7 @@ impl<'a> Server<'a> {
                 self.packets.extend(sent.into_iter().map(|logged| (agent, logged)));
             }
             Word::Left => seat.has_left = true,
-            // Of a node that says what only others say.
+            // From a node, a word that only other parties send.
             _ => {}
         }
     }

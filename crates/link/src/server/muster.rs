@@ -9,7 +9,7 @@ impl Server<'_> {
     /// Waits until all nodes are there and ready.
     ///
     /// # Errors
-    /// When somebody asks the fleet to end.
+    /// When the fleet is asked to end.
     pub(super) fn muster(&mut self) -> Result<(), Broken> {
         self.wait_for_all()?;
         tracing::info!(nodes = self.seats.len(), "all nodes are there");
@@ -41,7 +41,7 @@ impl Server<'_> {
         self.tell_roster();
     }
 
-    /// Tells all nodes who the others are, once all have joined.
+    /// Tells all nodes the list of members, once all have joined.
     fn tell_roster(&mut self) {
         let members = self.seats.values().map(|seat| seat.member.clone());
         let Some(members) = members.collect::<Option<Vec<Member>>>() else { return };
@@ -51,7 +51,7 @@ impl Server<'_> {
         }
     }
 
-    /// Returns why a node may not join, in a word and at length; none if it may.
+    /// Returns the reason why a node may not join, in one word and in detail; none if it may.
     fn refusal(&self, agent: EntityId, life: Life, join: &Join) -> Option<(&'static str, Refusal)> {
         let refused = |word, cause: String, remedy: &str| {
             Some((word, Refusal { cause, remedy: remedy.into() }))

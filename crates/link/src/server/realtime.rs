@@ -1,8 +1,8 @@
-//! Real time: every cycle is a deadline. A control that is not there by then is not flown, and its agent does what
-//! is safe.
+//! Real time: every cycle is a deadline. A control that is not there by then is not flown, and its agent does the
+//! safe thing.
 //!
-//! All times are the server's own, by its monotonic clock; each node measures how much time is left since it has
-//! heard of the cycle. Nobody compares clocks, so one that is wrong, or jumps, changes nothing.
+//! All times are the server's own, by its monotonic clock; each node measures the remaining time from the moment that
+//! it has heard of the cycle. Clocks are never compared, so one that is wrong, or jumps, changes nothing.
 
 use super::{Broken, Server};
 use std::time::{Duration, Instant};
@@ -10,21 +10,21 @@ use std::time::{Duration, Instant};
 /// Part of a cycle by which it may begin later than due without being counted as late.
 const LATE_PART: f64 = 0.1;
 
-/// The shortest cycle: below it nothing but lateness would be seen.
+/// The shortest cycle: below it only lateness would be seen.
 const SHORTEST: Duration = Duration::from_millis(1);
 
 impl Server<'_> {
-    /// Flies the world to its end, so many times as fast as in the scenario.
+    /// Flies the world to its end, `speed` times as fast as in the scenario.
     ///
     /// # Errors
-    /// When the world cannot go on, or somebody asks the fleet to end.
+    /// When the world cannot go on, or the fleet is asked to end.
     pub(super) fn fly_in_real_time(&mut self, speed: f64) -> Result<(), Broken> {
         let cycle = Duration::from_secs_f64(self.stage.world().cycle_s() / speed).max(SHORTEST);
         let mut due = Instant::now();
         while !self.stage.is_over() {
             self.note_lateness(due.elapsed(), cycle);
             let began = Instant::now();
-            // A server that was stopped for a while does not hurry to catch up.
+            // A server that was stopped for a while does not rush to catch up.
             due = (due + cycle).max(began + cycle / 2);
             self.talk_until(due)?;
             let left = || due.saturating_duration_since(Instant::now());
@@ -36,8 +36,8 @@ impl Server<'_> {
         Ok(())
     }
 
-    /// Lets all talk whose turn it is in a cycle, round after round. Each round has an equal part of the time that is left:
-    /// who is late costs those after it no more.
+    /// Lets the agents of a cycle talk, round after round. Each round has an equal part of the remaining time, so
+    /// that a late agent costs later rounds nothing more.
     fn talk_until(&mut self, due: Instant) -> Result<(), Broken> {
         let began = Instant::now();
         loop {

@@ -1,4 +1,5 @@
-//! Rounds of a cycle: percepts out to those whose turn it is, and controls in; after the last one the world goes on.
+//! Rounds of a cycle: percepts go out to the agents that decide next, and controls come in; after the last round the
+//! world goes on.
 
 use super::{Broken, Server};
 use crate::ports::{Absurd, Controls, Sight};
@@ -7,11 +8,11 @@ use crate::words::{Control, Word};
 use sidestep::kernel::EntityId;
 use std::time::Instant;
 
-/// Those who decide together.
+/// The agents that decide together.
 pub(super) type Group = Vec<EntityId>;
 
 impl Server<'_> {
-    /// Hands each agent whose turn it is its percept; returns the groups of those who decide together.
+    /// Hands each agent that decides next its percept; returns the groups of agents that decide together.
     pub(super) fn hand_out_sights(&mut self) -> Vec<Group> {
         self.seats.values_mut().for_each(|seat| seat.control = None);
         let mut groups = Vec::new();
@@ -81,7 +82,7 @@ impl Server<'_> {
         let absurd = self.stage.advance()?;
         self.note_absurd(absurd);
         self.tally.advanced.add(began.elapsed());
-        // A node may tell of a cycle until it hears of the next one.
+        // A node may report on a cycle until it hears of the next one.
         let past = self.packets.extract_if(.., |(_, packet)| packet.cycle < cycle).collect();
         self.attendant.take_packets(past);
         Ok(())
@@ -151,7 +152,7 @@ mod tests {
         }
     }
 
-    /// Returns what agents decide that perceive this, and hear all that others say.
+    /// Returns the decisions of agents with these percepts that hear each other completely.
     fn decided(stage: &Stage, sights: &[Sight]) -> Controls {
         let program = |sight: &Sight| {
             let mut program = stage.world().program(sight.agent, "test");
@@ -175,8 +176,8 @@ mod tests {
         agents.zip(programs.iter().map(|program| program.control().expect("it is done"))).collect()
     }
 
-    /// Makes a cycle in which all have decided, and the node of agent 1 is lost then. Returns how many controls of each
-    /// were flown, and how many were not.
+    /// Makes a cycle in which all have decided before the node of agent 1 is lost. Returns the numbers of controls
+    /// flown and not flown for each agent.
     fn with_a_loss(stage: &mut Stage) -> Vec<(u64, u64)> {
         let sights = stage.sights();
         let controls = decided(stage, &sights);

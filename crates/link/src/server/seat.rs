@@ -12,7 +12,7 @@ pub struct Seat {
     pub process: u32,
     /// Whether all other nodes have heard it.
     pub is_ready: bool,
-    /// The status that the node told last.
+    /// The last status reported by the node.
     pub status: Status,
     /// Whether its node is gone: it has ended, or was not heard for too long.
     pub is_gone: bool,

@@ -24,12 +24,12 @@ impl Histogram {
         self.sum_s += took_s;
     }
 
-    /// Returns how many were counted.
+    /// Returns the number of durations counted.
     pub fn count(&self) -> u64 {
         self.counts.iter().sum()
     }
 
-    /// Returns the bound in seconds below which so great a part of the durations is; `None` of no durations, and
+    /// Returns the bound in seconds below which the given part of the durations lies; `None` without durations, and
     /// infinity above the last bound.
     pub fn quantile(&self, part: f64) -> Option<f64> {
         let wanted = (part * self.count() as f64).ceil().max(1.0) as u64;
@@ -37,7 +37,7 @@ impl Histogram {
         (self.count() > 0).then(|| bound.map_or(f64::INFINITY, |(bound_s, _)| bound_s))
     }
 
-    /// Returns, for each bound, how many were at most that long.
+    /// Returns, for each bound, the number of durations at most that long.
     pub fn cumulative(&self) -> impl Iterator<Item = (f64, u64)> + '_ {
         BOUNDS_S.iter().zip(&self.counts).scan(0, |sum, (&bound, &count)| {
             *sum += count;

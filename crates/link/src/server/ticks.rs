@@ -1,9 +1,9 @@
 //! Counted time: lockstep on a network with faults.
 //!
-//! A packet takes a number of ticks, and an agent asks again after some. For the same faults as in one process, all
-//! nodes go through the same ticks: the server knows when each timer ends and each packet arrives, and lets those
-//! nodes go on for which something happens next. No node goes on to a tick before all packets that arrive by then
-//! are there: the server tells it how many they are.
+//! A packet takes a number of ticks, and an agent asks again after some. To have the same faults as in one process,
+//! all nodes go through the same ticks: the server knows when each timer ends and each packet arrives, and lets the
+//! nodes go on for which something happens next. No node goes on to a tick before all packets that arrive by then are
+//! there: the server tells it their number.
 
 use super::rounds::Group;
 use super::{Broken, LOOK, Server};
@@ -43,7 +43,7 @@ impl Course {
     }
 }
 
-/// The courses of the nodes of one group, whose ticks are those of nobody else.
+/// The courses of the nodes of one group, with ticks of its own.
 #[derive(Debug, Default)]
 struct Talk {
     courses: BTreeMap<EntityId, Course>,
@@ -69,7 +69,7 @@ impl Talk {
     }
 
     /// Returns the nodes that go on, with the packets that have arrived at each by then, and the tick; none before all
-    /// have reported. When all are done, or nothing can happen any more, the talk is over.
+    /// have reported. When all are done, or nothing more can happen, the talk is over.
     fn go_on(&mut self) -> Vec<(EntityId, u64, u64)> {
         if self.is_over || self.courses.values().any(|course| course.is_out) {
             return Vec::new();
@@ -90,7 +90,7 @@ impl Server<'_> {
     /// Lets nodes talk, tick by tick, until each of them has a control.
     ///
     /// # Errors
-    /// When a node is gone without which the fleet does not go on, or somebody asks the fleet to end.
+    /// When a node that the fleet needs is gone, or the fleet is asked to end.
     pub(super) fn count_ticks(&mut self, groups: &[Group]) -> Result<(), Broken> {
         let cycle = self.stage.cycle();
         let mut talks: Vec<Talk> = groups.iter().map(|group| Talk::new(group)).collect();

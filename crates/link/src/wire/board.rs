@@ -1,25 +1,25 @@
-//! A text that is shown to whoever asks for it by HTTP, at one address.
+//! A text that is served by HTTP at one address.
 
 use std::io::{self, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// Time that one who asks has for it.
+/// Time that a client has for its request.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Most bytes of a question that are read.
+/// Most bytes of a request that are read.
 const MOST_BYTES: usize = 4096;
 
-/// Shows a text at an address from now on, one question after the other.
+/// Shows a text at an address from now on, one request after the other.
 ///
 /// # Errors
-/// When the address cannot be had.
+/// When the address cannot be taken.
 pub fn serve(address: &str, text: Arc<Mutex<String>>) -> io::Result<()> {
     let listener = TcpListener::bind(address)?;
     std::thread::spawn(move || {
         for stream in listener.incoming().flatten() {
-            // Who asks in no proper way gets no answer.
+            // A malformed request gets no answer.
             let _ = answer(stream, &text);
         }
     });

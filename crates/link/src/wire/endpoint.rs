@@ -1,11 +1,11 @@
-//! Endpoints: how they are written, ports that are held, and reasons why there is no wire.
+//! Endpoints: their notation, ports that are held, and reasons why there is no wire.
 
 use std::net::{TcpListener, ToSocketAddrs};
 
 /// The reason why there is no wire.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum WireError {
-    /// An address cannot be listened at.
+    /// Listening at an address is impossible.
     #[error("cannot listen at {endpoint}: {reason}")]
     Taken {
         /// The address.
@@ -13,10 +13,10 @@ pub enum WireError {
         /// The reason.
         reason: String,
     },
-    /// An endpoint is not written as one.
+    /// A text is not in the form of an endpoint.
     #[error("`{0}` is no endpoint")]
     NoEndpoint(String),
-    /// Nobody answers.
+    /// There is no answer.
     #[error("nobody answers at {endpoint}: {reason}")]
     NoAnswer {
         /// The address.
@@ -24,7 +24,7 @@ pub enum WireError {
         /// The reason.
         reason: String,
     },
-    /// Somebody answers, and one of both does not take the other's certificate.
+    /// There is an answer, and one of the two ends does not take the other's certificate.
     #[error("{endpoint} and this party do not trust each other: {reason}")]
     Distrust {
         /// The address.
@@ -37,7 +37,7 @@ pub enum WireError {
 /// Returns an endpoint's host and port, e.g. of `tcp/127.0.0.1:7600`.
 ///
 /// # Errors
-/// When it is none.
+/// When the text is no endpoint.
 pub fn host_and_port(endpoint: &str) -> Result<(&str, u16), WireError> {
     let no_endpoint = || WireError::NoEndpoint(endpoint.into());
     let (protocol, address) = endpoint.split_once('/').ok_or_else(no_endpoint)?;
@@ -48,7 +48,7 @@ pub fn host_and_port(endpoint: &str) -> Result<(&str, u16), WireError> {
     Ok((host, port.parse().map_err(|_| no_endpoint())?))
 }
 
-/// Holds a port until somebody else may have it.
+/// A port held until another socket may have it.
 #[derive(Debug)]
 pub struct Held {
     /// The endpoint, with a port.
@@ -56,14 +56,14 @@ pub struct Held {
     _port: TcpListener,
 }
 
-/// Lowest port that is tried for who asks for any, and their number: below those that systems give to connections
-/// that go out, of which one could have it first.
+/// Lowest port that is tried where any will do, and their number: below those that systems give to outgoing
+/// connections, one of which could take it first.
 const PORTS: (u16, u16) = (20_000, 12_000);
 
 /// Holds the port of an endpoint; port 0 stands for any free one.
 ///
 /// # Errors
-/// When it cannot be had, or the endpoint is none.
+/// When it cannot be taken, or the text is no endpoint.
 pub fn hold(endpoint: &str) -> Result<Held, WireError> {
     let (host, port) = host_and_port(endpoint)?;
     let bare = host.trim_start_matches('[').trim_end_matches(']');
@@ -91,7 +91,7 @@ pub fn hold(endpoint: &str) -> Result<Held, WireError> {
     Err(taken(&[endpoint.into()], why))
 }
 
-/// Checks that an endpoint can be listened at.
+/// Checks that listening at an endpoint is possible.
 pub(super) fn vacant(endpoint: &str) -> Result<(), WireError> {
     hold(endpoint).map(drop)
 }

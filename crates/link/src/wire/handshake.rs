@@ -1,4 +1,4 @@
-//! Handshakes that only find out whether two parties take each other's certificates: Zenoh goes on trying, and tells
+//! Handshakes that only find out whether two parties take each other's certificates: Zenoh goes on trying, and gives
 //! no reason.
 
 use super::endpoint::host_and_port;
@@ -14,7 +14,7 @@ use std::time::Duration;
 /// Time that each step may take.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Returns why one of both ends does not take the other's certificate; none if they do, or nobody is there.
+/// Returns why one of the two ends does not take the other's certificate; none if both do, or no one is there.
 pub(super) fn distrust(endpoint: &str, tls: &Tls) -> Option<String> {
     let (host, port) = host_and_port(endpoint).ok()?;
     let bare = host.trim_start_matches('[').trim_end_matches(']');
@@ -27,7 +27,7 @@ pub(super) fn distrust(endpoint: &str, tls: &Tls) -> Option<String> {
         Ok(config) => ClientConnection::new(Arc::new(config), name).ok()?,
         Err(error) => return Some(format!("{}: {error}", tls.certificate.display())),
     };
-    // The other end looks at this one's certificate last: what it says of it is the first thing that comes.
+    // The other end checks this one's certificate last: its verdict is the first thing that comes.
     let heard = Stream::new(&mut connection, &mut stream).read(&mut [0]);
     words(heard.err()?, tls)
 }

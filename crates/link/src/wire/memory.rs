@@ -33,7 +33,7 @@ pub struct MemoryWire {
 impl Wire for MemoryWire {
     fn send(&mut self, to: &[Party], frame: &[u8]) {
         let others = self.exchange.lock();
-        // A frame to nobody is lost, as on any other wire.
+        // A frame to an absent party is lost, as on any other wire.
         for other in to.iter().filter_map(|party| others.get(party)) {
             let _ = other.send(frame.to_vec());
         }

@@ -1,11 +1,11 @@
-//! The wire: frames from one party of a fleet to another, of which some may be lost.
+//! The wire: frames from one party of a fleet to another, some of which may be lost.
 //!
 //! Everything that must arrive is numbered, acknowledged and repeated above it (`post.rs`).
 //!
 //! ```text
-//! zenoh.rs   between processes      handshake.rs  whose certificate is not taken, and why
-//! memory.rs  between threads        board.rs      a text for whoever asks, by HTTP
-//! endpoint.rs how endpoints are written, and ports that are held
+//! zenoh.rs   between processes      handshake.rs  why a certificate is not taken
+//! memory.rs  between threads        board.rs      a text served by HTTP
+//! endpoint.rs notation of endpoints, and ports that are held
 //! ```
 
 pub mod board;
@@ -21,32 +21,32 @@ pub use endpoint::WireError;
 use sidestep::kernel::EntityId;
 use std::time::Duration;
 
-/// Carries frames between parties. A frame may be lost, and nobody is told.
+/// Carries frames between parties. A frame may be lost without notice.
 pub trait Wire: Send {
-    /// Sends a frame to other parties, without waiting for them. More may hear it than those.
+    /// Sends a frame to other parties, without waiting for them. Further parties may hear it.
     fn send(&mut self, to: &[Party], frame: &[u8]);
 
-    /// Returns the next frame that has arrived; waits for one as long as is said. `None` when none came.
+    /// Returns the next frame that has arrived; waits for one at most the given time. `None` when none came.
     fn receive(&mut self, within: Duration) -> Option<Vec<u8>>;
 
-    /// Learns of all nodes of the fleet, and makes the straight ways from this one to the others, where there are any.
+    /// Learns of all nodes of the fleet, and makes the direct links from this one to the others, where there are any.
     ///
     /// # Errors
-    /// When an endpoint cannot be had.
+    /// When an endpoint cannot be taken.
     fn join(&mut self, _me: EntityId, _members: &[Member]) -> Result<(), WireError> {
         Ok(())
     }
 
-    /// Asks the other end of a straight way, and returns whether the way seems to be open and all questions have been left
-    /// unanswered for some time. Ends answer by themselves, however busy their nodes are.
+    /// Asks the other end of a direct link, and returns whether the link seems to be open and all questions have been
+    /// left unanswered for some time. Ends answer by themselves, however busy their nodes are.
     fn is_deaf_to(&mut self, _member: &Member, _within: Duration) -> bool {
         false
     }
 
-    /// Closes the straight ways to all other nodes, and opens them anew.
+    /// Closes the direct links to all other nodes, and opens them again.
     ///
     /// # Errors
-    /// When an endpoint cannot be had again: there are no straight ways then, and it can be tried once more.
+    /// When an endpoint cannot be taken again: there are no direct links then, and it can be tried once more.
     fn reopen(&mut self) -> Result<(), WireError> {
         Ok(())
     }

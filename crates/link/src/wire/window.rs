@@ -1,7 +1,7 @@
-//! The window of a fleet: what is to be seen of it, for who asks at its server by query and reply.
+//! The window of a fleet: views of it, which watchers fetch from its server by query and reply.
 //!
-//! Nobody is sent anything unasked, and each who watches has one question on the way: so whoever is slow, or has stopped,
-//! sees less and slows nobody. What is shown is made only while somebody asks.
+//! Nothing is sent unasked, and each watcher has one question on the way: so a watcher that is slow, or has stopped,
+//! sees less and slows none of the others. Views are made only while they are asked for.
 
 use super::endpoint::WireError;
 use super::zenoh::{ZenohWire, asking};
@@ -14,13 +14,13 @@ use zenoh::qos::CongestionControl;
 use zenoh::query::{Query, Queryable};
 use zenoh::{Session, Wait};
 
-/// The key of what stays as it is; no party has that name.
+/// The key of the unchanging part; no party has that name.
 const SCENE: &str = "sidestep/scene";
 
 /// The key of the newest view.
 const VIEW: &str = "sidestep/view";
 
-/// Time after a question in which its asker is taken to watch.
+/// Time after a question in which its asker counts as a watcher.
 const WATCHED: Duration = Duration::from_secs(3);
 
 /// Time between two looks at whether the last view was fetched.
@@ -29,7 +29,7 @@ const LOOK: Duration = Duration::from_millis(10);
 /// Time that an answer may take.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(1);
 
-/// The newest view, and who has it.
+/// The newest view, and the record of who has it.
 #[derive(Debug, Default)]
 struct Pane {
     text: String,
@@ -69,7 +69,7 @@ fn locked(pane: &Mutex<Pane>) -> MutexGuard<'_, Pane> {
 }
 
 impl Window {
-    /// Opens a window at a server's wire, with what stays as it is.
+    /// Opens a window at a server's wire, with the unchanging part.
     ///
     /// # Errors
     /// When the wire is closed.
@@ -90,18 +90,18 @@ impl Window {
         Ok(Self { pane, _answers: answers, _session: session })
     }
 
-    /// Returns whether somebody has asked a short while ago.
+    /// Returns whether a question came a short while ago.
     pub fn is_watched(&self) -> bool {
         locked(&self.pane).asked.is_some_and(|asked| asked.elapsed() < WATCHED)
     }
 
-    /// Shows a view; numbers rise.
+    /// Shows a view; its number is above all earlier ones.
     pub fn show(&self, number: u64, text: String) {
         let mut pane = locked(&self.pane);
         (pane.number, pane.text) = (number, text);
     }
 
-    /// Waits a little until somebody has fetched the last view, if anybody watches.
+    /// Waits a little until the last view has been fetched, if there is a watcher.
     pub fn linger(&self, within: Duration) {
         let until = Instant::now() + within;
         let is_fetched = || {
@@ -115,7 +115,7 @@ impl Window {
 }
 
 fn reply(query: &Query, text: String) {
-    // Who has gone meanwhile needs no answer.
+    // A watcher that has gone meanwhile needs no answer.
     let _ = query.reply(query.key_expr().clone(), text).wait();
 }
 
@@ -129,7 +129,7 @@ impl fmt::Debug for Outlook {
 }
 
 impl Outlook {
-    /// Connects with a fleet's server, at one of some endpoints.
+    /// Connects to a fleet's server, at one of some endpoints.
     ///
     /// # Errors
     /// When none of them answers within some time.
@@ -137,12 +137,12 @@ impl Outlook {
         asking(connect, tls, within).map(Self)
     }
 
-    /// Asks for what stays as it is; `None` when there is no answer.
+    /// Asks for the unchanging part; `None` when there is no answer.
     pub fn scene(&self) -> Option<String> {
         self.ask(SCENE)
     }
 
-    /// Asks for a view newer than one with a number: nothing where there is none. `None` when there is no answer.
+    /// Asks for a view newer than the one with a number: empty if there is none. `None` when there is no answer.
     pub fn view(&self, after: u64) -> Option<String> {
         self.ask(&format!("{VIEW}?after={after}"))
     }

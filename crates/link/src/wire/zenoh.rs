@@ -1,8 +1,8 @@
-//! The wire between processes and machines: Zenoh sessions on endpoints that are all named, with its scouting off.
+//! The wire between processes and machines: Zenoh sessions on explicitly named endpoints, with scouting off.
 //!
-//! A node has a session as a *client* of the server's, which relays (a *router* in Zenoh's words, for peers do not).
-//! In a mesh it has another one as a *peer*, connected with every other node: packets go the straight way there.
-//! A frame that cannot be sent soon is dropped rather than waited for, so that nobody who has stopped stops others.
+//! A node has a session as a *client* of the server's, which relays (a *router* in Zenoh's words, because peers do
+//! not). In a mesh it has another one as a *peer*, connected to every other node: packets go directly there. A frame
+//! that cannot be sent soon is dropped rather than waited for, so that a stopped party does not stop others.
 
 mod echo;
 
@@ -26,18 +26,18 @@ use zenoh::{Config, Session, Wait};
 /// Time without a sign of life after which Zenoh takes a link for broken, in milliseconds.
 const LEASE_MS: u64 = 2_000;
 
-/// Time that opening a link may take at either end, in milliseconds. Zenoh's own, ten seconds, is how long it
-/// takes to come back after a partition. It must not be short either: a link whose opening is broken off at the very
-/// end stays alive and deaf (`Wire::reopen`).
+/// Time that opening a link may take at either end, in milliseconds. With Zenoh's own limit, ten seconds, coming back
+/// after a partition takes as long. It must not be short either: a link with an opening that is broken off at the
+/// very end stays alive and deaf (`Wire::reopen`).
 const OPENED_WITHIN_MS: u64 = 3_000;
 
-/// Time in which the endpoints of a session that was closed can mostly be had again.
+/// Time in which the endpoints of a closed session can usually be taken again.
 const FREED_WITHIN: Duration = Duration::from_secs(1);
 
 /// Settings of a Zenoh session.
 #[derive(Debug, Clone, Default)]
 struct Settings<'a> {
-    /// Name of the session by which others know it; none for one that Zenoh makes up.
+    /// Name by which others know the session; none for one that Zenoh makes up.
     id: Option<String>,
     mode: &'a str,
     listen: &'a [String],
@@ -48,8 +48,8 @@ struct Settings<'a> {
 }
 
 impl Settings<'_> {
-    /// Returns the keys of Zenoh's configuration, as JSON. Its queues by priority stay, although each link has eight with
-    /// buffers of their own: without them (`transport/unicast/qos/enabled`) a session falls deaf now and then.
+    /// Returns the keys of Zenoh's configuration, as JSON. Its queues by priority stay, although each link has eight
+    /// of them with buffers: without them (`transport/unicast/qos/enabled`) a session turns deaf now and then.
     fn keys(&self) -> Vec<(&'static str, String)> {
         let list = |endpoints: &[String]| serde_json::json!(endpoints).to_string();
         let connected = self.connected_within.map_or(-1, |within| within.as_millis() as i64);
@@ -59,7 +59,7 @@ impl Settings<'_> {
             ("scouting/gossip/enabled", "false".into()),
             // A router sleeps that long before it is open, in order to be found.
             ("scouting/delay", "0".into()),
-            // A router would put the time of its wall clock on what it relays, which nobody reads.
+            // A router would stamp relayed frames with the time of its wall clock, which no code reads.
             ("timestamping/enabled", "false".into()),
             // Without the empty list a party that only connects would listen at every interface.
             ("listen/endpoints", list(self.listen)),
@@ -112,33 +112,33 @@ pub struct ZenohWire {
     arrives: Sender<Vec<u8>>,
     /// The session with the server, or the server's own.
     hub: Line,
-    /// The session with all other nodes, in a mesh,
+    /// The session with all other nodes, in a mesh.
     mesh: Option<Line>,
-    /// the endpoints at which they reach this one, none in a star,
+    /// The endpoints at which they reach this one, none in a star.
     listens: Vec<String>,
-    /// and their ports, until it listens.
+    /// The ports of those, until it listens.
     ports: Vec<Held>,
     tls: Option<Tls>,
     /// All other nodes, rising.
     others: Vec<Party>,
-    /// Those of them that this one opens links to,
+    /// The endpoints to which this one opens links.
     connect: Vec<String>,
-    /// itself as they know it,
+    /// The name by which they know this one.
     me_there: u128,
-    /// and how often it has opened them.
+    /// Number of times that it has opened them.
     opened: u32,
     /// Questions to the other ends of the mesh.
     echoes: Echoes,
 }
 
-/// A session, and who is sent to over it.
+/// A session, and the receivers reached over it.
 struct Line {
     keys: BTreeMap<Party, KeyExpr<'static>>,
     _heard: Vec<Subscriber<()>>,
     session: Session,
 }
 
-/// The bits of a session's name that tell whose it is: the others count how often that one has opened it.
+/// The bits of a session's name that identify its node: the other bits count the times that that node has opened it.
 const NAME: u128 = u128::MAX >> 32;
 
 /// Returns the name of a node in its present life.
@@ -181,8 +181,8 @@ impl Line {
             };
             session.declare_subscriber(key).callback(took).wait().map_err(|e| e.to_string())
         };
-        // Others see them in this order: whoever can reach this party reaches it with what is for most, too. Nothing
-        // that is for most nodes is for the server.
+        // Others see them in this order: a party that can reach this one reaches it with frames for most, too. No
+        // frame for most nodes is for the server.
         let for_most = (me != Party::Server).then(|| ALL.to_string());
         let heard = for_most
             .into_iter()
@@ -199,7 +199,7 @@ impl Line {
         put(&self.session, key, frame, None);
     }
 
-    /// Returns whether there is a link to another node that shows signs of life, whatever else comes through.
+    /// Returns whether there is a link to another node that shows signs of life, even if nothing else comes through.
     fn is_open_to(&self, member: &Member) -> bool {
         let is_it = |id: zenoh::session::ZenohId| {
             u128::from_le_bytes(id.to_le_bytes()) & NAME == name(member)
@@ -207,14 +207,14 @@ impl Line {
         self.session.info().peers_zid().wait().any(is_it)
     }
 
-    /// Sends a frame to all who hear this session but for itself.
+    /// Sends a frame to all that hear this session except itself.
     fn send_to_all(&self, frame: &[u8]) {
         let key = KeyExpr::try_from(ALL).expect("a path of letters is a key");
         put(&self.session, &key, frame, None);
     }
 }
 
-/// Sends a frame; what is no mail has a mark.
+/// Sends a frame; one that is no mail has a mark.
 fn put(session: &Session, key: &KeyExpr<'_>, frame: &[u8], mark: Option<&'static [u8]>) {
     // Not by a publisher: the first thing that one does in a client is to wait for the other end.
     let put = session.put(key, frame).attachment(mark).allowed_destination(Locality::Remote);
@@ -226,7 +226,7 @@ impl ZenohWire {
     /// Returns the server's wire, which listens at endpoints.
     ///
     /// # Errors
-    /// When one of them cannot be had.
+    /// When one of them cannot be taken.
     pub fn server(listen: &[String], tls: Option<&Tls>) -> Result<Self, WireError> {
         listen.iter().try_for_each(|endpoint| vacant(endpoint))?;
         let settings = Settings { mode: "router", listen, tls, ..Settings::default() };
@@ -281,9 +281,9 @@ impl ZenohWire {
     }
 
     fn open_mesh(&mut self) -> Result<(), WireError> {
-        // Held until now, so that nobody else has them.
+        // Held until now, so that no other program takes them.
         self.ports.clear();
-        // A name of its own each time: others may not have noticed yet that the one before is gone.
+        // A name of its own each time: others may not have noticed yet that the session before is gone.
         self.opened += 1;
         let id = Some(format!("{:x}", u128::from(self.opened) << 96 | self.me_there));
         let (listen, connect, tls) = (&self.listens, &self.connect, self.tls.as_ref());
@@ -296,13 +296,13 @@ impl ZenohWire {
 }
 
 impl ZenohWire {
-    /// Returns the server's session, for what is asked of it by others than nodes.
+    /// Returns the server's session, for questions of others than nodes.
     pub(super) fn session(&self) -> &Session {
         &self.hub.session
     }
 }
 
-/// Returns a session with a fleet's server, of somebody who is no node and only asks.
+/// Returns a session with a fleet's server for a watcher, which is no node and only asks.
 ///
 /// # Errors
 /// When none of some endpoints answers within some time.
@@ -344,11 +344,11 @@ impl Wire for ZenohWire {
         let others = members.iter().map(|member| Party::Node(member.agent));
         self.others = others.filter(|&party| party != self.me).collect();
         self.others.sort_unstable();
-        // The session finds those again that were away.
+        // The session reconnects to returning nodes by itself.
         if self.listens.is_empty() || self.mesh.is_some() {
             return Ok(());
         }
-        // One connection for each two: of the one with the higher id.
+        // One connection for each pair: opened by the node with the higher id.
         let before = members.iter().filter(|member| member.agent < me);
         self.connect = before.flat_map(|member| member.listens.clone()).collect();
         self.me_there = members.iter().find(|member| member.agent == me).map_or(0, name);
@@ -362,7 +362,7 @@ impl Wire for ZenohWire {
 
     fn reopen(&mut self) -> Result<(), WireError> {
         if let Some(mesh) = self.mesh.take() {
-            // Unsent frames are lost, as frames in transit are.
+            // Unsent frames are lost, like frames in transit.
             let _ = mesh.session.close().wait();
         }
         self.echoes.forget();
@@ -379,7 +379,7 @@ impl Wire for ZenohWire {
     }
 }
 
-/// Finds out whether certificates are the reason why no endpoint can be reached: Zenoh tells none.
+/// Finds out whether certificates are the reason why no endpoint can be reached: Zenoh gives none.
 fn trusted(connect: &[String], tls: Option<&Tls>) -> Result<(), WireError> {
     let Some(tls) = tls else { return Ok(()) };
     let mut first = Ok(());

@@ -1,4 +1,5 @@
-//! Chains whose connectors are nodes: they come out as in one process, and stand while one of them is missing.
+//! Chains of connectors that are nodes: they give the same results as in one process, and stand still while one of
+//! them is missing.
 
 use crate::input::refused;
 use crate::processes::{Program, folder, job, signal};
@@ -109,7 +110,7 @@ fn events(out: &Path, kind: &str) -> Vec<(u64, u64)> {
     rows.map(|row| (number("cycle", row), number("connector", row))).collect()
 }
 
-/// Ends a fleet that would fly on, and lets its run go on to the end in one process; it is replayed then.
+/// Ends a fleet that would fly on, and lets its run go on to the end in one process; then replays it.
 fn resumed(mut program: Program, out: &Path) {
     drop(program.stdin.take());
     assert_eq!(program.end().0, Some(130));
@@ -120,14 +121,14 @@ fn resumed(mut program: Program, out: &Path) {
     replay_all(&recorded, 1, &Unwatched).expect("computed again, to the same digest");
 }
 
-/// Checks that a fleet has waited for a node, said so, and gone on once it was there in another life.
+/// Checks that a fleet has waited for a node, said so, and gone on once it was back in another life.
 fn waits_and_goes_on(program: &Program, again: impl FnOnce()) {
     let waits = program.fleet("it is missed", |now| now.waits_for == ["0.2"]);
     assert_eq!((&*waits.nodes[2].state, &*waits.noun), ("gone", "connector"), "{waits:?}");
     again();
     let back = program.fleet("it is back", |now| now.waits_for.is_empty());
     assert_eq!(back.nodes[2].lives, 2, "{back:?}");
-    // The cycle under way was made without it, and no other one.
+    // The cycle under way was made without it, and no other cycle.
     assert!(back.cycle >= waits.cycle, "{waits:?} {back:?}");
     program.fleet("it flies again", |now| now.nodes[2].flown > back.nodes[2].flown + 1);
 }

@@ -1,4 +1,4 @@
-//! Clocks: nobody compares them, so it changes nothing that one is wrong, or jumps.
+//! Clocks: they are never compared, so one that is wrong, or jumps, changes nothing.
 
 use crate::processes::{Program, folder, job};
 use crate::support::{alone, superconflict, wide};
@@ -29,7 +29,7 @@ fn no_code_of_fleets_names_the_wall_clock() {
     }
 }
 
-/// Code that takes the place of the system's: a wall clock that is an hour ahead in every other second.
+/// Code that replaces the system's wall clock by one that is an hour ahead in every other second.
 const JUMPS: &str = r#"
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -89,7 +89,7 @@ fn a_wall_clock_that_jumps_makes_nobody_late_or_lost() {
     assert_eq!(losses, 0);
 }
 
-/// Two machines whose monotonic clocks, too, have nothing to do with each other: one has run for a day longer.
+/// Two machines with monotonic clocks that are unrelated, too: one has run for a day longer.
 #[test]
 fn a_node_whose_machine_runs_since_another_day_flies_with_the_rest() {
     let text = superconflict(3, "compact-team", 20, "");

@@ -62,7 +62,7 @@ fn a_node_that_is_stopped_is_late_and_flies_on_when_it_goes_on() {
     assert_eq!(losses, 0);
 }
 
-/// The server does not hurry to catch up, and counts that it was late.
+/// The server does not rush to catch up, and counts that it was late.
 #[test]
 fn a_server_that_is_stopped_for_a_while_is_late_once_and_goes_on() {
     let folder = folder(&wide(&superconflict(3, "compact-team", 1_000_000, ""), 8_000));

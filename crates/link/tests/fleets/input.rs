@@ -22,7 +22,7 @@ fn with(job: &FleetJob, key: &str) -> FleetJob {
     flown(job, |flown| flown.overrides.push(key.into()))
 }
 
-/// Does a job that is wrong, and returns what is said.
+/// Does a job that is wrong, and returns the message.
 pub(crate) fn refused(job: &Job) -> String {
     let (code, failed) = Program::start(job).end();
     let failed = failed.expect("it says why");

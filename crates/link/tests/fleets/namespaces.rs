@@ -114,7 +114,7 @@ fn two_machines_come_out_as_one_process_does() {
     }
 }
 
-/// TCP sends again what the cable loses, so that all comes, and late.
+/// TCP sends lost packets again, so that all of them come, and late.
 #[test]
 fn a_cable_that_loses_packets_costs_time_and_no_bit() {
     let Some(machines) = Machines::new() else { return };
@@ -145,7 +145,7 @@ fn losses(mut server: Program) -> u64 {
     })
 }
 
-/// A cable on which a packet takes a hundredth of a second, or on which packets queue where that cannot be had.
+/// A cable on which a packet takes a hundredth of a second, or on which packets queue where that is not available.
 #[test]
 fn a_slow_cable_costs_no_separation() {
     let Some(machines) = Machines::new() else { return };
@@ -190,7 +190,7 @@ fn a_pulled_cable_costs_delay_and_no_separation_and_all_fly_on_afterwards() {
     });
 }
 
-/// The second machine hears what it is told until the first one misses its answers.
+/// The second machine hears the first until the first misses its answers.
 #[test]
 fn a_cable_that_carries_one_way_costs_delay_and_no_separation_and_all_fly_on_afterwards() {
     let Some(machines) = Machines::new() else { return };

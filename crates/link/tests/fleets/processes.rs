@@ -1,4 +1,4 @@
-//! Fleets as processes: the program `sidestep-link` as it is started by `sidestep fleet`.
+//! Fleets as processes: the program `sidestep-link` as started by `sidestep fleet`.
 
 use crate::support::{alone, superconflict, untimed, wide};
 use sidestep::worlds::WORLDS;
@@ -13,7 +13,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// Time that nothing here takes.
+/// Time longer than anything here takes.
 const LONG: Duration = Duration::from_secs(60);
 
 /// A job of the scenario `s.toml` of a folder.
@@ -117,7 +117,7 @@ impl Program {
         })
     }
 
-    /// Returns the exit code, and why it failed if it did.
+    /// Returns the exit code, and the reason if it failed.
     pub(crate) fn end(mut self) -> (Option<i32>, Option<Failed>) {
         let status = self.child.wait().expect("it ends");
         let failed = self.told.iter().find_map(|told| match told {
@@ -141,7 +141,7 @@ pub(crate) fn folder(text: &str) -> tempfile::TempDir {
     folder
 }
 
-/// Returns whether a process is there, and is no corpse.
+/// Returns whether a process exists, and is no zombie.
 fn is_alive(process: u32) -> bool {
     let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
     stat.rsplit(')')
@@ -230,7 +230,7 @@ fn a_fleet_whose_starter_is_gone_ends_in_good_order_and_leaves_no_process() {
     assert_eq!(stored["status"], "incomplete");
 }
 
-/// The server is killed, and its nodes end although nobody ends them; the folder is not lost.
+/// The server is killed, and its nodes end although nothing ends them; the folder is not lost.
 #[test]
 fn nodes_of_a_server_that_is_killed_end_by_themselves_and_the_folder_resumes() {
     let text = wide(&superconflict(4, "compact-team", 200, ""), 8_000)

@@ -1,7 +1,7 @@
-//! Fleets for an hour, or as long as is said, with random kills, stops and partitions from a seed.
+//! Fleets for an hour, or for a given time, with random kills, stops and partitions from a seed.
 //!
-//! `SIDESTEP_SOAK_S` says how many seconds (60 if it does not), `PROPTEST_RNG_SEED` the seed. The same seed gives the
-//! same faults at the same times; what happens between them is up to the machine.
+//! `SIDESTEP_SOAK_S` is the number of seconds (60 if not set), `PROPTEST_RNG_SEED` the seed. The same seed gives the
+//! same faults at the same times; everything between them is up to the machine.
 
 use crate::processes::{Program, folder, job, try_signal, wait_until_gone};
 use sidestep::kernel::stream::{Purpose, Streams};
@@ -33,7 +33,7 @@ struct Plan {
     topology: Topology,
     /// Time since the beginning, airplane and fault, by rising time.
     faults: Vec<(Duration, EntityId, Fault)>,
-    /// Partitions and losses, as the scenario has them.
+    /// Partitions and losses, in the form of the scenario.
     network: String,
 }
 
@@ -65,7 +65,7 @@ impl Plan {
         }
     }
 
-    /// Returns a scenario that lasts longer than all faults: airplanes that fly to and fro through one point.
+    /// Returns a scenario that lasts longer than all faults: airplanes that fly back and forth through one point.
     fn scenario(&self, lasts: Duration) -> String {
         let Self { seed, deployment, network, .. } = self;
         let mut text = format!(
@@ -91,7 +91,7 @@ impl Plan {
     }
 }
 
-/// Returns a network that loses some messages, and is parted now and then.
+/// Returns a network that loses some messages, and is partitioned now and then.
 fn network(seconds: u64, draw: impl Fn(u64) -> [u32; 4]) -> String {
     let mut partitions = Vec::new();
     let mut at = 60;
@@ -141,14 +141,14 @@ impl Watch {
     }
 }
 
-/// Returns the memory of a process that nobody else has, in kB.
+/// Returns the memory that a process shares with no other, in kB.
 fn own_memory_kb(process: u32) -> Option<u64> {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let line = status.lines().find(|line| line.starts_with("RssAnon:"))?;
     line.split_whitespace().nth(1)?.parse().ok()
 }
 
-/// Lets the faults happen, and returns the fleet as it is at the end of time.
+/// Lets the faults happen, and returns the fleet at the end of the time.
 fn fly(program: &Program, plan: &Plan, lasts: Duration) -> FleetNow {
     let mut faults = plan.faults.iter().peekable();
     let mut stopped: Vec<(Instant, u32)> = Vec::new();

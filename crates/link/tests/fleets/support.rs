@@ -18,10 +18,10 @@ use std::sync::Arc;
 use std::thread::{JoinHandle, spawn};
 use std::time::Duration;
 
-/// Time that no test needs.
+/// Time longer than any test needs.
 pub(crate) const LONG: Duration = Duration::from_secs(60);
 
-/// Returns the text of a scenario: `n` airplanes on a circle, each of which wants to the other side.
+/// Returns the text of a scenario: `n` airplanes on a circle, each of which wants to get to the other side.
 pub(crate) fn superconflict(n: usize, deployment: &str, cycles: u64, more: &str) -> String {
     format!(
         "format = 1\nworld = \"airspace\"\nname = \"ring\"\nseed = 5\ncycles = {cycles}\n[airspace]\n\
@@ -30,7 +30,7 @@ pub(crate) fn superconflict(n: usize, deployment: &str, cycles: u64, more: &str)
     )
 }
 
-/// Returns the part of a scenario that all with chains have in common.
+/// Returns the part of a scenario that is common to all with chains.
 fn chains(cycles: u64, more: &str) -> String {
     format!(
         "format = 1\nworld = \"chain\"\nname = \"chain\"\nseed = 3\ncycles = {cycles}\n[chain]\ndt_s = 0.05\n\
@@ -58,12 +58,12 @@ pub(crate) fn chain_in_space(connectors: usize, cycles: u64, network: &str) -> S
     chains(cycles, &more)
 }
 
-/// Returns the same on a circle of another size, so that it takes longer.
+/// Returns the same scenario on a circle of another size, so that it takes longer.
 pub(crate) fn wide(text: &str, radius_m: u32) -> String {
     text.replace("radius_m = 1500.0", &format!("radius_m = {radius_m}.0"))
 }
 
-/// The outcome of a run: the digest of its state, and the metrics but for those that a clock measures.
+/// The outcome of a run: the digest of its state, and the metrics except those that a clock measures.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Came {
     pub(crate) digest: String,
@@ -76,7 +76,7 @@ fn compiled(text: &str) -> (Source, Box<dyn Compiled>) {
     (source, compiled)
 }
 
-/// Returns metrics without what a clock has measured.
+/// Returns metrics without those that a clock measures.
 pub(crate) fn untimed(mut metrics: Value) -> Value {
     let all = metrics.as_object_mut().expect("an object");
     all.retain(|key, _| !key.contains("cpu") && !key.contains("wall"));
@@ -88,7 +88,7 @@ fn came(journey: Journey) -> Came {
     Came { digest: summary.digest, metrics: untimed(summary.metrics) }
 }
 
-/// Returns what comes of a scenario in one process.
+/// Returns the outcome of a scenario in one process.
 pub(crate) fn alone(text: &str) -> Came {
     let (source, compiled) = compiled(text);
     let mut journey =
@@ -98,7 +98,7 @@ pub(crate) fn alone(text: &str) -> Came {
     came(journey)
 }
 
-/// Somebody who leaves a fleet alone.
+/// An attendant that leaves a fleet alone.
 pub(crate) struct Nobody;
 
 impl Attendant for Nobody {
@@ -107,7 +107,7 @@ impl Attendant for Nobody {
     }
 }
 
-/// The manner in which a fleet is flown in a test.
+/// The way in which a fleet is flown in a test.
 pub(crate) struct Way<'a> {
     pub(crate) clock: Clock,
     pub(crate) topology: Topology,
@@ -117,11 +117,11 @@ pub(crate) struct Way<'a> {
     /// Endpoints at which a node is reached.
     pub(crate) listens: &'a dyn Fn(EntityId) -> Vec<String>,
     pub(crate) attendant: &'a mut dyn Attendant,
-    /// The agent whose node says nonsense instead of its control.
+    /// The agent with a node that sends nonsense instead of its control.
     pub(crate) liar: Option<EntityId>,
 }
 
-/// The program of an agent that says nonsense instead of its control.
+/// The program of an agent that sends nonsense instead of its control.
 struct Liar(Box<dyn Program>);
 
 impl Program for Liar {

@@ -1,4 +1,4 @@
-//! In lockstep a fleet comes out as one process does: in threads, over memory and over sockets.
+//! In lockstep a fleet gives the same results as one process: in threads, over memory and over sockets.
 
 use crate::support::{LONG, Nobody, Way, alone, in_threads, superconflict};
 use sidestep::kernel::EntityId;
@@ -111,7 +111,7 @@ fn sockets_come_out_as_one_process_does_in_a_mesh_and_in_a_star() {
 }
 
 /// A control that cannot be flown is refused and counted, and the airplane stays on its orbit; so do those of its group where
-/// the network is reliable, as plans are safe only if all fly them.
+/// the network is reliable, because plans are safe only if all fly them.
 #[test]
 fn a_node_that_says_nonsense_is_counted_and_harms_nobody() {
     let exchange = Exchange::default();

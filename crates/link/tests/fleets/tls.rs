@@ -1,4 +1,4 @@
-//! Encrypted links, whose both ends prove who they are.
+//! Encrypted links, at which both ends prove their identity.
 
 use crate::processes::{Program, folder, job};
 use crate::support::{alone, superconflict};
@@ -15,7 +15,7 @@ fn openssl(folder: &Path, words: &str) -> bool {
     made.is_ok_and(|made| made.status.success())
 }
 
-/// Makes an authority, and a certificate of it that holds so many days for this machine.
+/// Makes an authority, and a certificate of it that is valid for a number of days on this machine.
 fn authority(folder: &Path, name: &str, days: i32) -> Option<Tls> {
     let ca = format!(
         "req -x509 {KEY} -keyout {name}-ca.key -out {name}-ca.pem -subj /CN={name}-ca -days 2"
@@ -93,7 +93,7 @@ fn with_certificates_a_fleet_flies_as_ever_and_whoever_has_none_of_its_authority
         assert!(failed.cause.contains(cause) && failed.remedy.contains("--tls-ca"), "{failed:?}");
         assert_eq!(failed.place, connect[0], "{failed:?}");
     }
-    // Zenoh's words, as it alone sees them.
+    // Zenoh's words, because it alone sees the certificate.
     let says = |line: &String| line.contains("UnknownIssuer");
     assert!(server.logged().iter().any(says), "{:?}", server.logged());
     let last = node(Some(ours), 30.0);
@@ -131,7 +131,7 @@ fn certificates_that_are_none_or_out_of_date_are_refused_before_anything_starts(
     assert!(failed.remedy.contains("tls/HOST:PORT"), "{failed:?}");
 }
 
-/// A node looks at its own certificate first; here one that does not.
+/// A node checks its own certificate first; here is one that does not.
 #[test]
 fn a_certificate_that_is_out_of_date_is_refused_by_the_server_which_says_so() {
     let folder = tempfile::tempdir().expect("a folder");

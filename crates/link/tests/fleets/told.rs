@@ -10,13 +10,13 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// Returns addresses of this machine that nobody has; no two are one, for all are held at once.
+/// Returns free addresses of this machine; no two are the same, because all are held at once.
 fn free_addresses<const N: usize>() -> [String; N] {
     let held = [(); N].map(|()| hold("tcp/127.0.0.1:0").expect("a free port"));
     held.map(|held| held.endpoint.trim_start_matches("tcp/").to_string())
 }
 
-/// Asks an address by HTTP, and returns the first line of the answer, and what follows its head.
+/// Asks an address by HTTP, and returns the first line of the answer, and its body.
 fn ask(address: &str, method: &str) -> (String, String) {
     let mut stream = TcpStream::connect(address).expect("somebody answers");
     write!(stream, "{method} /metrics HTTP/1.1\r\nHost: {address}\r\n\r\n").expect("asked");
@@ -67,7 +67,7 @@ fn value_of(line: &str) -> (String, BTreeMap<String, String>, f64) {
     (name.into(), labels, number.parse().unwrap_or_else(|_| panic!("no number: {line}")))
 }
 
-/// Reads Prometheus' text, line by line, as its format (0.0.4) is written.
+/// Reads Prometheus' text, line by line, by its format (0.0.4).
 fn families(text: &str) -> BTreeMap<String, Family> {
     let mut families: BTreeMap<String, Family> = BTreeMap::new();
     let mut present = String::new();
@@ -166,7 +166,7 @@ fn metrics_of_the_server_and_of_a_node_are_prometheus_text_of_what_happens() {
         let (_, text) = ask(&at_node, "GET");
         let node_tells = families(&text);
         assert_eq!(node_tells.keys().cloned().collect::<BTreeSet<_>>(), all(&["node_cycle"]));
-        // Each talk begins with nobody heard.
+        // Each talk begins without any heard.
         if node_tells["sidestep_heard"].value(&[("airplane", "2")]) == Some(2.0) {
             break;
         }
@@ -175,7 +175,7 @@ fn metrics_of_the_server_and_of_a_node_are_prometheus_text_of_what_happens() {
     assert_eq!(ask(&at_node, "POST").0, "HTTP/1.1 405 Method Not Allowed");
 }
 
-/// Returns the lines of a fleet's log as JSON, once one of them holds.
+/// Returns the lines of a fleet's log as JSON, once something holds for one of them.
 fn logs_until(program: &Program, holds: impl Fn(&Value) -> bool) -> Vec<Value> {
     let until = Instant::now() + Duration::from_secs(60);
     loop {

@@ -1,4 +1,4 @@
-//! Lines and sections of a text: taken away, inserted, moved.
+//! Lines and sections of a text: removed, inserted, moved.
 
 use super::layout::{Layout, Step, above_comments, line_start};
 use super::section::section_text;
@@ -7,12 +7,12 @@ use super::{Refusal, refusal};
 use serde_json::Value as Json;
 use std::ops::Range;
 
-/// Takes away all lines of what stands at a way.
+/// Removes all lines of the item at a path.
 pub(super) fn taken(layout: &Layout<'_>, path: &[Step]) -> Vec<Splice> {
     layout.runs(path).iter().map(|run| delete(removable(layout, run))).collect()
 }
 
-/// Returns what goes with statements that are taken away: their comment, and a blank line.
+/// Returns the lines that go with removed statements: their comment, and a blank line.
 fn removable(layout: &Layout<'_>, run: &Range<usize>) -> Range<usize> {
     let text = layout.text;
     let mut lines = layout.lines(run);
@@ -22,7 +22,7 @@ fn removable(layout: &Layout<'_>, run: &Range<usize>) -> Range<usize> {
     if !is_section {
         lines.start = match is_alone {
             true => above_comments(text, lines.start),
-            // The comment may be on the keys behind it, too.
+            // The comment may be about the keys after it, too.
             false => lines.start,
         };
     }
@@ -39,14 +39,14 @@ fn blank_before(text: &str, start: usize) -> Option<usize> {
     matches!(&text[before..start], "\n" | "\r\n").then_some(before)
 }
 
-/// Returns the end of the empty line behind a line.
+/// Returns the end of the empty line after a line.
 fn blank_after(text: &str, end: usize) -> Option<usize> {
     let rest = &text[end..];
     let ends = ["\n", "\r\n"].into_iter().find(|new_line| rest.starts_with(new_line));
     ends.map(|new_line| end + new_line.len())
 }
 
-/// Inserts a section into a list at a number, which is at most their count.
+/// Inserts a section into a list at a number, which is at most the number of sections.
 pub(super) fn inserted(
     layout: &Layout<'_>,
     list: &[Step],
@@ -72,7 +72,7 @@ pub(super) fn set_before(layout: &Layout<'_>, start: usize, block: &str) -> Spli
     insert(start, format!("{block}{}", if is_spaced { layout.new_line() } else { "" }))
 }
 
-/// Moves a section to another number of its list, which has so many.
+/// Moves the sections of a list into another order.
 pub(super) fn moved(layout: &Layout<'_>, list: &[Step], order: &[usize]) -> Vec<Splice> {
     let runs_of = |number| layout.runs(&[list, &[Step::Index(number)]].concat());
     let text_of = |number: usize| {

@@ -1,4 +1,4 @@
-//! Keys and sections that are new.
+//! New keys and sections.
 
 use super::blocks::set_before;
 use super::layout::{Layout, Statement, Step, line_start};
@@ -11,7 +11,7 @@ use super::{Refusal, refusal};
 use serde_json::{Map, Value as Json};
 use toml_edit::{Item, Table, Value};
 
-/// Makes a key with a value in what stands at a way, and the tables on the way to it.
+/// Makes a key with a value in the item at a path, and the tables on the way to it.
 pub(super) fn create(
     layout: &Layout<'_>,
     path: &[Step],
@@ -32,7 +32,7 @@ pub(super) fn create(
     }
 }
 
-/// Makes a line behind those of a table of dotted keys.
+/// Makes a line after those of a table of dotted keys.
 fn in_dotted(
     layout: &Layout<'_>,
     path: &[Step],
@@ -42,7 +42,7 @@ fn in_dotted(
     let runs = layout.runs(path);
     let below = |s: &Statement| names_of(&s.path[path.len()..]).len();
     let mut own = runs.iter().flat_map(|run| &layout.statements[run.clone()]);
-    // Those below a header of their own do not show the way.
+    // Keys below a header of their own are no pattern for the new line.
     let Some(last) = own.rfind(|s| !s.is_header && s.keys.len() > below(s)) else {
         return Ok(Vec::new());
     };
@@ -103,7 +103,7 @@ fn is_section(
     path.is_empty() || !on_the_way.is_empty() || is_among || is_large(members)
 }
 
-/// Inserts a section behind all of what stands at a way.
+/// Inserts a section after everything at a path.
 fn behind(layout: &Layout<'_>, path: &[Step], block: &str) -> Splice {
     let new_line = layout.new_line();
     match layout.runs(path).last().filter(|_| !path.is_empty()) {
@@ -113,14 +113,14 @@ fn behind(layout: &Layout<'_>, path: &[Step], block: &str) -> Splice {
     }
 }
 
-/// Inserts a line into a section, behind its own.
+/// Inserts a line into a section, after the section's own lines.
 fn line_in(layout: &Layout<'_>, path: &[Step], line: &str) -> Splice {
     let is_own = |s: &&Statement| s.is_header && s.path == path;
     let header = layout.statements.iter().position(|s| is_own(&s));
     let first = match header {
         Some(header) => header + 1,
         None if path.is_empty() => 0,
-        // There is no header but those of sections in it.
+        // The only headers are those of sections in it.
         None => return before(layout, path, line),
     };
     let lines = layout.statements[first..].iter().take_while(|s| !s.is_header);
@@ -131,7 +131,7 @@ fn line_in(layout: &Layout<'_>, path: &[Step], line: &str) -> Splice {
     }
 }
 
-/// Inserts a header, and a line, before the sections that are in it.
+/// Inserts a header, and a line, before the sections in it.
 pub(super) fn before(layout: &Layout<'_>, path: &[Step], line: &str) -> Splice {
     let block = format!("{}{line}", header(layout, path, false));
     match layout.runs(path).first() {
@@ -140,7 +140,7 @@ pub(super) fn before(layout: &Layout<'_>, path: &[Step], line: &str) -> Splice {
     }
 }
 
-/// Returns the place behind a comment that heads the text, and the empty lines behind it.
+/// Returns the place after a comment that heads the text, and the empty lines after it.
 fn behind_head(layout: &Layout<'_>) -> usize {
     let mut at = 0;
     let lines = layout.text.split_inclusive('\n');

@@ -1,4 +1,4 @@
-//! Elements that are inserted, and moved.
+//! Inserted and moved elements.
 
 use super::blocks::{inserted, moved, set_before};
 use super::create::create;

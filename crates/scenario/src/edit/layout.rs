@@ -9,17 +9,17 @@ use toml_edit::{Document, Item, Table, TomlError};
 /// A header of a section, or a key with its value, on lines of its own.
 #[derive(Debug)]
 pub(super) struct Statement {
-    /// The way from the root; sections of a list end in their number.
+    /// The path from the root; sections of a list end in their number.
     pub(super) path: Vec<Step>,
     /// Whether it is a header.
     pub(super) is_header: bool,
-    /// The parts of the key as it is written: those of the last names of the way.
+    /// The parts of the key as written: those of the last names of the path.
     pub(super) keys: Vec<Range<usize>>,
     /// Its lines, with the end of the last.
     pub(super) lines: Range<usize>,
 }
 
-/// A text, and what stands where in it.
+/// A text, and the places of all items in it.
 pub(super) struct Layout<'t> {
     pub(super) text: &'t str,
     document: Document<&'t str>,
@@ -27,13 +27,13 @@ pub(super) struct Layout<'t> {
     pub(super) statements: Vec<Statement>,
 }
 
-/// The end of a key's way into a text.
+/// The end of a key's path in a text.
 pub(super) struct Reach<'l> {
-    /// The way to the last thing that is there, with every number.
+    /// The path to the last existing item, with every number.
     pub(super) path: Vec<Step>,
-    /// The last thing that is there.
+    /// The last existing item.
     pub(super) item: &'l Item,
-    /// The names that are not there.
+    /// The remaining names, which do not exist.
     pub(super) rest: Vec<String>,
 }
 
@@ -70,7 +70,7 @@ impl<'t> Layout<'t> {
         }
     }
 
-    /// Returns what stands at the end of a way.
+    /// Returns the item at the end of a path.
     pub(super) fn item(&self, path: &[Step]) -> &Item {
         path.iter().fold(self.document.as_item(), |item, step| {
             let found = match step {
@@ -81,7 +81,7 @@ impl<'t> Layout<'t> {
         })
     }
 
-    /// Returns the numbers of the statements at a way or below, in runs without others between them.
+    /// Returns the numbers of the statements at a path or below, in runs without others between them.
     pub(super) fn runs(&self, path: &[Step]) -> Vec<Range<usize>> {
         let mut runs: Vec<Range<usize>> = Vec::new();
         let below = |s: &Statement| s.path.starts_with(path);
@@ -102,7 +102,7 @@ impl<'t> Layout<'t> {
         start..last.lines.end
     }
 
-    /// Returns the end of line that the text has.
+    /// Returns the end of line that the text uses.
     pub(super) fn new_line(&self) -> &'static str {
         let first = self.text.find('\n').unwrap_or(0);
         if self.text[..first].ends_with('\r') { "\r\n" } else { "\n" }
@@ -152,7 +152,7 @@ fn step(reach: &mut Reach<'_>, part: &Part) -> Result<(), Refusal> {
 fn missing(reach: &mut Reach<'_>, part: &Part) -> Result<(), Refusal> {
     match part.number() {
         None => reach.rest.push(part.name.clone()),
-        // What will be made stands alone.
+        // The new section will stand alone.
         Some(0) if !reach.rest.is_empty() => {}
         Some(number) => {
             return Err(refusal(format!("there is no element {number}"), "count from 0"));
@@ -174,7 +174,7 @@ fn not_a_table(name: &str) -> Refusal {
     )
 }
 
-/// Collects the statements of a table and of those in it.
+/// Collects the statements of a table and of the tables in it.
 fn collect(text: &str, table: &Table, path: &mut Vec<Step>, found: &mut Vec<Statement>) {
     for (name, item) in table.iter() {
         path.push(Step::Name(name.to_string()));
@@ -227,12 +227,12 @@ pub(super) fn line_start(text: &str, at: usize) -> usize {
     text[..at].rfind('\n').map_or(0, |end| end + 1)
 }
 
-/// Returns the end of the line of a place, behind its end of line.
+/// Returns the end of the line of a place, after its line break.
 pub(super) fn line_end(text: &str, at: usize) -> usize {
     text[at..].find('\n').map_or(text.len(), |end| at + end + 1)
 }
 
-/// Returns the start of the comment whose lines end where a line begins, or the start of that line.
+/// Returns the start of the comment that ends where a line begins, or the start of that line.
 pub(super) fn above_comments(text: &str, mut start: usize) -> usize {
     while start > 0 {
         let before = line_start(text, start - 1);

@@ -9,7 +9,7 @@ use toml_edit::Array;
 struct OwnLines {
     /// Its lines, with the end of the last.
     lines: Range<usize>,
-    /// The comma behind it.
+    /// The comma after it.
     comma: Option<usize>,
 }
 
@@ -18,7 +18,7 @@ fn places(array: &Array) -> Vec<Range<usize>> {
     array.iter().filter_map(toml_edit::Value::span).collect()
 }
 
-/// Inserts an element at a number, which is at most their count.
+/// Inserts an element at a number, which is at most the number of elements.
 pub(super) fn with(text: &str, array: &Array, at: usize, value: &str) -> Vec<Splice> {
     let places = places(array);
     let Some(last) = places.last() else {
@@ -46,13 +46,13 @@ pub(super) fn with(text: &str, array: &Array, at: usize, value: &str) -> Vec<Spl
     }
 }
 
-/// Takes an element away.
+/// Removes an element.
 pub(super) fn without(text: &str, array: &Array, number: usize) -> Vec<Splice> {
     let places = places(array);
     let Some(place) = places.get(number) else { return Vec::new() };
     let (before, next) = (number.checked_sub(1).map(|n| &places[n]), places.get(number + 1));
     if let Some(OwnLines { lines, comma }) = own_lines(text, place) {
-        // The last one stays without a comma, if it was.
+        // The last one stays without a comma, if it had none.
         let is_last = next.is_none() && comma.is_none();
         let comma = before.filter(|_| is_last).and_then(|before| comma_after(text, before.end));
         let comma = comma.map(|comma| delete(comma..comma + 1));
@@ -104,13 +104,13 @@ fn end_of_line<'t>(text: &'t str, lines: &Range<usize>) -> &'t str {
     }
 }
 
-/// Returns the place of the comma behind a value, if there is one.
+/// Returns the place of the comma after a value, if there is one.
 pub(super) fn comma_after(text: &str, at: usize) -> Option<usize> {
     let at = behind_space(text, at);
     text[at..].starts_with(',').then_some(at)
 }
 
-/// Returns the place behind blanks, ends of lines and comments.
+/// Returns the place after blanks, ends of lines and comments.
 pub(super) fn behind_space(text: &str, mut at: usize) -> usize {
     loop {
         at = text.len() - text[at..].trim_start().len();

@@ -9,7 +9,7 @@ use toml_edit::{InlineTable, Item, Value};
 
 /// A key with its value, in braces.
 pub(super) struct Member {
-    /// The way to it from the table in braces.
+    /// The path to it from the table in braces.
     path: Vec<String>,
     /// The parts of its key.
     pub(super) keys: Vec<Range<usize>>,
@@ -22,14 +22,14 @@ impl Member {
         self.keys.first().map_or(self.end, |key| key.start)
     }
 
-    /// Returns whether it is at a way or below.
+    /// Returns whether it is at a path or below.
     pub(super) fn is_below(&self, path: &[Step]) -> bool {
         let name = |(step, own): (&Step, &String)| *step == Step::Name(own.clone());
         path.len() <= self.path.len() && path.iter().zip(&self.path).all(name)
     }
 }
 
-/// Returns the table in braces that a way leads into, and how many steps it is away.
+/// Returns the table in braces that a path leads into, and the number of steps to it.
 pub(super) fn enclosing<'l>(
     layout: &'l Layout<'_>,
     path: &[Step],
@@ -61,7 +61,7 @@ pub(super) fn members(text: &str, table: &InlineTable) -> Vec<Member> {
     found
 }
 
-/// Inserts a member behind the others.
+/// Inserts a member after the others.
 pub(super) fn with_member(text: &str, table: &InlineTable, member: &str) -> Vec<Splice> {
     let open = table.span().map_or(0, |span| span.start + 1);
     vec![match members(text, table).last() {
@@ -71,7 +71,7 @@ pub(super) fn with_member(text: &str, table: &InlineTable, member: &str) -> Vec<
     }]
 }
 
-/// Takes the members at a way, or below, away.
+/// Removes the members at a path or below.
 pub(super) fn without_members(text: &str, table: &InlineTable, path: &[Step]) -> Vec<Splice> {
     let all = members(text, table);
     let open = table.span().map_or(0, |span| span.start + 1);
@@ -88,7 +88,7 @@ pub(super) fn without_members(text: &str, table: &InlineTable, path: &[Step]) ->
     splices
 }
 
-/// Puts one member in the place of those at a way, or below.
+/// Puts one member in place of those at a path or below.
 pub(super) fn with_value(
     text: &str,
     table: &InlineTable,

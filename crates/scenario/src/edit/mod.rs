@@ -1,15 +1,15 @@
-//! Changes of a scenario's text by keys. Whatever an edit does not name stays as it is, byte for byte.
+//! Changes of a scenario's text by keys. All text that an edit does not name stays the same, byte for byte.
 //!
 //! ```text
 //! path.rs     `robots.1.at` -> parts          layout.rs   text -> places of all keys
 //! value.rs    values -> text                  splice.rs   pieces of text that are replaced
-//! set.rs      values in place of others       create.rs   keys and sections that are new
-//! section.rs  text of new sections            insert.rs   elements that are new, or move
+//! set.rs      values in place of others       create.rs   new keys and sections
+//! section.rs  text of new sections            insert.rs   new and moved elements
 //! blocks.rs   lines and sections of a text    lists.rs    elements of arrays in brackets
-//! members.rs  keys of tables in braces        names.rs    keys that get another name
+//! members.rs  keys of tables in braces        names.rs    renamed keys
 //! paint.rs    characters of drawings
 //! ```
-//! An edit reads the text, and gives a list of pieces to replace: the text is never written from what was read of it,
+//! An edit reads the text, and gives a list of pieces to replace: the text is never rebuilt from its parsed form,
 //! so that comments, order and layout cannot be lost.
 
 mod blocks;
@@ -38,13 +38,13 @@ use sidestep_kernel::InputError;
 use splice::Splice;
 use value::New;
 
-/// The number of edits at a time.
+/// The largest number of edits at a time.
 const MOST_EDITS: usize = 1000;
-/// The bytes that all edits together may read.
+/// The largest number of bytes that all edits together may read.
 const MOST_WORK: usize = 1 << 30;
 
 /// A change of a scenario. Keys are those of overrides: `robots.1.at.0`, with elements counted from 0, and a section
-/// that stands alone by 0 or without a number; parts with dots in quotes.
+/// that stands alone named by 0 or without a number; parts with dots stand in quotes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Edit {
     /// Sets a value; makes the tables on the way to it.
@@ -127,7 +127,7 @@ impl Edit {
         }
     }
 
-    /// Returns what it replaces in a text.
+    /// Returns the pieces that it replaces in a text.
     fn splices(&self, layout: &Layout<'_>) -> Result<Vec<Splice>, Refusal> {
         let key = parts(self.key())?;
         match self {
@@ -142,8 +142,8 @@ impl Edit {
 }
 
 impl Source {
-    /// Returns the scenario with changes of its text: all of them, one after the other, or an error. What they do not
-    /// name stays as it is, byte for byte.
+    /// Returns the scenario with changes of its text: all of them, one after the other, or an error. All text that
+    /// they do not name stays the same, byte for byte.
     ///
     /// # Errors
     /// When the text is not TOML, or an edit does not fit it.
@@ -166,7 +166,7 @@ impl Source {
         Ok(source)
     }
 
-    /// Sets a key to a value that is given as TOML.
+    /// Sets a key to a value given as TOML.
     pub(crate) fn set_to(
         &mut self,
         key: &str,
@@ -178,8 +178,8 @@ impl Source {
         self.change(set, told)
     }
 
-    /// Sets those of the keys that have values to others, given as TOML, with one reading of the text; returns the numbers
-    /// of the rest. Sets none where one key stands for another, or for a part of another.
+    /// Sets the keys that already have values to new ones, given as TOML, with one reading of the text; returns the
+    /// numbers of the remaining keys. Sets none if one key equals another, or is a part of another.
     pub(crate) fn replace_values(&mut self, given: &[(&str, String)]) -> Vec<usize> {
         let all = || (0..given.len()).collect();
         let Ok(layout) = Layout::of(&self.text) else { return all() };
@@ -187,7 +187,7 @@ impl Source {
             |(key, text): &(&str, String)| set::replacement(&layout, &parts(key).ok()?, text);
         let Some(found) = given.iter().map(found).collect::<Option<Vec<_>>>() else { return all() };
         let mut ways: Vec<_> = found.iter().map(|(way, _)| way).collect();
-        // A way stands directly before those that go on from it.
+        // A path comes directly before its own continuations.
         ways.sort();
         if ways.windows(2).any(|pair| pair[1].starts_with(pair[0])) {
             return all();
@@ -216,7 +216,7 @@ impl Source {
         }
         let text = splice::spliced(&self.text, splices);
         let mut changed = Self { text, ..self.clone() };
-        // A last line without an end stays so.
+        // A last line without a line break stays so.
         if is_open && changed.text.ends_with('\n') {
             changed.text.pop();
         }

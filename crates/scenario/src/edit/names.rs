@@ -1,4 +1,4 @@
-//! Keys that get another name.
+//! Renamed keys.
 
 use super::layout::{Layout, Step};
 use super::members::{enclosing, members};
@@ -8,7 +8,7 @@ use super::{Refusal, refusal};
 use std::ops::Range;
 use toml_edit::{Item, Value};
 
-/// Gives the last part of a key another name, wherever it is written.
+/// Gives the last part of a key another name, everywhere it is written.
 pub(super) fn rename(layout: &Layout<'_>, key: &[Part], to: &str) -> Result<Vec<Splice>, Refusal> {
     let path = layout.find(key)?.path;
     let Some((Step::Name(from), parent)) = path.split_last() else {

@@ -24,11 +24,11 @@ pub(super) fn paint(
         let painted = painted(&text[inside.clone()], cells)?;
         return Ok(vec![replace(span.start + inside.start..span.start + inside.end, painted)]);
     }
-    // It is written with escapes, which hide where its characters stand.
+    // It is written with escapes, which hide the places of its characters.
     Ok(vec![replace(span, text_of(&Json::String(painted(value, cells)?), false)?)])
 }
 
-/// Returns what stands between the quotes of a string; an end of line behind the first ones does not belong to it.
+/// Returns the range between the quotes of a string; a line break after the opening quotes does not belong to it.
 fn quoted(text: &str) -> Range<usize> {
     let quotes = if text.starts_with("\"\"\"") || text.starts_with("'''") { 3 } else { 1 };
     let first = match &text[quotes..] {

@@ -3,7 +3,7 @@
 use super::{Refusal, refusal};
 use toml_edit::Key;
 
-/// Keys of more parts are refused.
+/// The largest number of parts of a key.
 const MOST_PARTS: usize = 64;
 
 /// A part of a key.
@@ -55,7 +55,7 @@ fn part(text: &str) -> Result<Part, Refusal> {
     }
 }
 
-/// Returns where the part ends that a text begins with.
+/// Returns the end of the part that a text begins with.
 fn end_of_part(text: &str) -> usize {
     match text.bytes().next() {
         Some(quote @ (b'"' | b'\'')) => end_of_quoted(text, quote),
@@ -63,7 +63,7 @@ fn end_of_part(text: &str) -> usize {
     }
 }
 
-/// Returns where the quoted name ends that a text begins with.
+/// Returns the end of the quoted name that a text begins with.
 fn end_of_quoted(text: &str, quote: u8) -> usize {
     let mut bytes = text.bytes().enumerate().skip(1);
     while let Some((at, byte)) = bytes.next() {
@@ -76,7 +76,7 @@ fn end_of_quoted(text: &str, quote: u8) -> usize {
     text.len()
 }
 
-/// Returns the places of the parts of the key that stands at a place of a text, which is TOML.
+/// Returns the places of the parts of the key at a place of a text, which must be TOML.
 pub(super) fn keys_at(text: &str, at: usize) -> Vec<std::ops::Range<usize>> {
     let mut found = Vec::new();
     let mut at = behind_blanks(text, at);

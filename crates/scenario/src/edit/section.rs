@@ -6,10 +6,10 @@ use super::path::written;
 use super::value::text_of;
 use serde_json::{Map, Value as Json};
 
-/// A longer table is a section rather than one in braces.
+/// The length of the longest table in braces; a longer one becomes a section.
 const MOST_IN_BRACES: usize = 80;
 
-/// Returns whether a table is better a section than in braces.
+/// Returns whether a table should be a section rather than in braces.
 pub(super) fn is_large(members: &Map<String, Json>) -> bool {
     let text = text_of(&Json::Object(members.clone()), false);
     text.is_ok_and(|text| text.len() > MOST_IN_BRACES)
@@ -20,7 +20,7 @@ pub(super) fn are_sections(items: &[Json]) -> bool {
     !items.is_empty() && items.iter().all(Json::is_object)
 }
 
-/// Returns the names on a way.
+/// Returns the names on a path.
 pub(super) fn names_of(path: &[Step]) -> Vec<String> {
     let names = path.iter().filter_map(|step| match step {
         Step::Name(name) => Some(name.clone()),

@@ -1,4 +1,4 @@
-//! Values in place of others, and keys that are taken away.
+//! Replaced values, and removed keys.
 
 use super::blocks::taken;
 use super::create::{before, create};
@@ -12,7 +12,7 @@ use super::{Refusal, refusal};
 use serde_json::{Map, Value as Json};
 use toml_edit::{Item, Value};
 
-/// Larger tables are not set key by key.
+/// The size of the largest table that is set key by key.
 const MOST_KEYS: usize = 1000;
 
 /// Sets a value.
@@ -24,8 +24,8 @@ pub(super) fn set(layout: &Layout<'_>, key: &[Part], new: New<'_>) -> Result<Vec
     }
 }
 
-/// Returns the way of a key, and what sets its value if it has one that is written as one, not by dotted keys. A value in
-/// place of another leaves TOML, and all else where it is.
+/// Returns the path of a key, and the pieces that set its value if it has one written as a value, not by dotted keys.
+/// Replacing a value leaves the text valid TOML, and everything else in its place.
 pub(super) fn replacement(
     layout: &Layout<'_>,
     key: &[Part],
@@ -40,7 +40,7 @@ pub(super) fn replacement(
     Some((path, span.map(|span| replace(span, text))))
 }
 
-/// Returns what gives a header to a table that has none and gets keys of its own.
+/// Returns the pieces that give a header to a table that has none and gets keys of its own.
 pub(super) fn headed(
     layout: &Layout<'_>,
     key: &[Part],
@@ -57,7 +57,7 @@ pub(super) fn headed(
     }
 }
 
-/// Takes a key, an element or a section away.
+/// Removes a key, an element or a section.
 pub(super) fn remove(layout: &Layout<'_>, key: &[Part]) -> Result<Vec<Splice>, Refusal> {
     let path = layout.find(key)?.path;
     match path.is_empty() {
@@ -66,7 +66,7 @@ pub(super) fn remove(layout: &Layout<'_>, key: &[Part]) -> Result<Vec<Splice>, R
     }
 }
 
-/// Returns what takes away that which stands at a way.
+/// Returns the pieces that remove the item at a path.
 pub(super) fn removed(layout: &Layout<'_>, path: &[Step]) -> Vec<Splice> {
     let Some((last, parent)) = path.split_last() else { return Vec::new() };
     match (layout.item(parent), last) {
@@ -123,7 +123,7 @@ fn set_dotted(
     }
 }
 
-/// Sets a value in place of one that is written as a value; parts that stay the same keep their text.
+/// Replaces a value that is written as a value; parts that stay the same keep their text.
 fn set_value(old: &Value, new: New<'_>) -> Result<Vec<Splice>, Refusal> {
     match (old, new) {
         (_, New::Json(json)) if is_same(old, json) => Ok(Vec::new()),

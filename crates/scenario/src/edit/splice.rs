@@ -2,12 +2,12 @@
 
 use std::ops::Range;
 
-/// A piece of a text, and what takes its place.
+/// A piece of a text, and its replacement.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Splice {
     /// The bytes that are replaced; none where something is inserted.
     pub(super) range: Range<usize>,
-    /// The text that takes their place.
+    /// The text that replaces them.
     pub(super) text: String,
 }
 
@@ -21,12 +21,12 @@ pub(super) fn insert(at: usize, text: impl Into<String>) -> Splice {
     replace(at..at, text)
 }
 
-/// Takes a piece away.
+/// Removes a piece.
 pub(super) fn delete(range: Range<usize>) -> Splice {
     replace(range, "")
 }
 
-/// Returns a text with pieces replaced; where two overlap, the second takes what the first has left.
+/// Returns a text with pieces replaced; where two overlap, the second gets the remainder of the first.
 pub(super) fn spliced(text: &str, mut splices: Vec<Splice>) -> String {
     splices.sort_by_key(|splice| splice.range.start);
     let mut new = String::with_capacity(text.len());

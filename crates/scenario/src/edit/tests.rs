@@ -1,4 +1,4 @@
-//! Edits of small texts, with the text that they come to.
+//! Edits of small texts, with the resulting text.
 
 use super::{Cell, Edit};
 use crate::Source;

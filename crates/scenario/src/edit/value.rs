@@ -1,4 +1,4 @@
-//! Values as TOML writes them.
+//! Values in the notation of TOML.
 
 use super::path::written;
 use super::{Refusal, refusal};
@@ -6,7 +6,7 @@ use serde_json::{Map, Number, Value as Json};
 use std::fmt::Write;
 use toml_edit::{Datetime, Value};
 
-/// Whole numbers up to this are exact as floats.
+/// The number up to which whole numbers are exact as floats.
 const MOST_EXACT: f64 = 9_007_199_254_740_992.0;
 
 /// A value that is set.
@@ -19,7 +19,7 @@ pub(super) enum New<'v> {
 }
 
 impl New<'_> {
-    /// Returns its text; `old` is what it takes the place of.
+    /// Returns its text; `old` is the value that it replaces.
     pub(super) fn written(self, old: Option<&Value>) -> Result<String, Refusal> {
         match self {
             New::Toml(text) => Ok(text.to_string()),
@@ -29,7 +29,7 @@ impl New<'_> {
     }
 }
 
-/// Returns whether a text takes the place of a date, and is one.
+/// Returns whether a text replaces a date, and is one.
 fn is_date(old: Option<&Value>, text: &str) -> bool {
     old.is_some_and(Value::is_datetime) && text.parse::<Datetime>().is_ok()
 }
@@ -43,7 +43,7 @@ pub(super) fn has_floats(value: &Value) -> bool {
     }
 }
 
-/// Returns the text of a value on one line, but for strings of several lines.
+/// Returns the text of a value on one line, except for strings of several lines.
 pub(super) fn text_of(value: &Json, floats: bool) -> Result<String, Refusal> {
     let mut text = String::new();
     write_value(&mut text, value, floats)?;

@@ -5,8 +5,8 @@ use super::shown::{Shown, shown};
 use serde_json::{Map, Value};
 use sidestep_kernel::ports::table::split_unit;
 
-/// Adds to each key what the commented scenario says of it: words, examples, and its default; and what
-/// its name says: a title and a unit.
+/// Adds to each key the statements of the commented scenario about it: words, examples, and its default; and those of
+/// its name: a title and a unit.
 pub(crate) fn describe(schema: &mut Value, scenario: &str) {
     let mut told: Vec<String> = Vec::new();
     for one in shown(scenario) {
@@ -14,7 +14,7 @@ pub(crate) fn describe(schema: &mut Value, scenario: &str) {
             let is_new = !told.contains(&place);
             let Some(Value::Object(part)) = schema.pointer_mut(&place) else { continue };
             add(part, &one, is_new);
-            // Tables of names have what is said of the first one that is shown.
+            // Tables of names get the statements about the first name that is shown.
             let table = place.strip_suffix("/additionalProperties");
             if let Some(Value::Object(table)) = table.and_then(|table| schema.pointer_mut(table))
                 && !one.words.is_empty()
@@ -27,7 +27,7 @@ pub(crate) fn describe(schema: &mut Value, scenario: &str) {
     add_titles(schema);
 }
 
-/// Adds what is shown of a key. Of several alternatives the first has the words, and all are examples.
+/// Adds the statements about a key. Of several alternatives the first has the words, and all are examples.
 fn add(part: &mut Map<String, Value>, one: &Shown, is_new: bool) {
     if !one.words.is_empty() && (is_new || !part.contains_key("description")) {
         part.insert("description".into(), one.words.clone().into());
@@ -62,7 +62,7 @@ fn default_of(one: &Shown, part: &Map<String, Value>) -> Option<Value> {
     is_plain.then(|| value.clone())
 }
 
-/// Returns whether both are arrays, or both are none.
+/// Returns whether both are arrays, or neither is.
 fn is_like(one: &Value, other: &Value) -> bool {
     one.is_array() == other.is_array()
 }
@@ -85,7 +85,7 @@ fn add_titles(schema: &mut Value) {
                     let (quantity, unit) = split_unit(key);
                     let Some(part) = part.as_object_mut() else { continue };
                     part.insert("title".into(), quantity.replace('_', " ").into());
-                    // Names of alternatives mean what these mean.
+                    // Names of alternatives mean the same as the alternatives.
                     if let Some(own) =
                         own.clone().filter(|_| is_alone || part.contains_key("const"))
                     {

@@ -7,8 +7,7 @@
 //!              words, examples, defaults
 //! ```
 //! Beside the words of the standard, a schema has `x-unit` (the unit of a number), `x-names` (the key
-//! of the table whose keys can be named there) and `x-infinite` (whether `inf` is allowed, which JSON
-//! has not).
+//! of the table with the keys that can be named there) and `x-infinite` (whether `inf` is allowed, which JSON lacks).
 
 mod describe;
 mod numbers;
@@ -37,7 +36,7 @@ pub fn of<T: JsonSchema>() -> Value {
     schema
 }
 
-/// Takes the null of optional values out of a schema.
+/// Removes the null of optional values from a schema.
 fn without_null(schema: &mut Value) {
     match schema {
         Value::Array(many) => many.iter_mut().for_each(without_null),
@@ -96,8 +95,8 @@ pub fn of_world(kind: &dyn Kind) -> Value {
     Value::Object(all)
 }
 
-/// Returns the schema of a file of which `own` says the keys, with a title, and with the words of a commented scenario where
-/// both have a key.
+/// Returns the schema of a file with the keys in `own`, a title, and the words of a commented scenario for the keys
+/// that both have.
 pub fn of_file(title: &str, mut own: Value, scenario: &str) -> Value {
     describe::describe(&mut own, scenario);
     let mut all = Map::new();
@@ -110,7 +109,7 @@ pub fn of_file(title: &str, mut own: Value, scenario: &str) -> Value {
     Value::Object(all)
 }
 
-/// Adds the sections of a world to the keys that all share.
+/// Adds the sections of a world to the keys that all worlds share.
 fn join(schema: &mut Value, own: &mut Map<String, Value>) {
     for (key, value) in std::mem::take(own) {
         match (schema.get_mut(&key), value) {
@@ -169,7 +168,7 @@ fn rename(schema: &mut Value, world: &str) {
     }
 }
 
-/// Returns limits to which infinity belongs, too, of which JSON has none.
+/// Returns limits that include infinity, which JSON lacks.
 #[must_use]
 pub fn or_infinite(mut limits: Value) -> Value {
     limits["x-infinite"] = true.into();
@@ -204,8 +203,8 @@ pub fn unknown(kind: &dyn Kind) -> Vec<String> {
     unknown.map(|one| one.way.join(".")).collect()
 }
 
-/// Returns the keys of a world's schema that its commented scenario shows nowhere, neither as a key nor in the words
-/// beside one: as JSON pointers.
+/// Returns the keys of a world's schema, as JSON pointers, that its commented scenario shows nowhere, neither as a
+/// key nor in the words beside one.
 pub fn unshown(kind: &dyn Kind) -> Vec<String> {
     let schema = of_world(kind);
     let shown = shown::shown(kind.default_scenario());
@@ -223,7 +222,7 @@ fn has_word(text: &str, key: &str) -> bool {
     text.split(|c: char| !c.is_alphanumeric() && c != '_').any(|word| word == key)
 }
 
-/// Returns examples of a key's values, as the commented scenario of its world shows them.
+/// Returns examples of a key's values, from the commented scenario of its world.
 pub fn examples(schema: &Value, way: &[String]) -> Vec<Value> {
     let places = places::places(schema, way);
     let known = places.iter().filter_map(|place| schema.pointer(place)?.get("examples"));
@@ -236,8 +235,8 @@ pub fn written(schema: Value) -> Schema {
     Schema::try_from(schema).unwrap_or_default()
 }
 
-/// Gives a type whose reading is written by hand a schema that is written by hand: a
-/// `serde_json::Value`, which stands wherever the type does.
+/// Gives a handwritten schema to a type with handwritten reading: a `serde_json::Value`, which
+/// stands wherever the type does.
 #[macro_export]
 macro_rules! schema_by_hand {
     ($name:ident, $schema:expr) => {

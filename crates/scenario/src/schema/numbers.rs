@@ -1,4 +1,4 @@
-//! Numbers that check themselves, as a JSON Schema has them.
+//! Numbers that check themselves, in terms of JSON Schema.
 
 use crate::{Limits, Number, Point, Rule, Whole};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -14,7 +14,7 @@ fn numbers(conditions: Value) -> Schema {
     schema
 }
 
-/// Implements what all have in common: they have no definition of their own.
+/// Implements the common part of all: they have no definition of their own.
 macro_rules! inline {
     ($name:literal) => {
         fn inline_schema() -> bool {

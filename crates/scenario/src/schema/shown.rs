@@ -1,9 +1,9 @@
-//! The keys that a commented scenario shows, with what its comments say of them.
+//! The keys that a commented scenario shows, with its comments about them.
 //!
 //! ```text
-//! [map]                        # what it is        a section
+//! [map]                        # its meaning       a section
 //! box_size_m = 0.25            # side of a box     a key, its value and its words
-//! # unknown = "wall"           # what it does      the same: a key that is commented out
+//! # unknown = "wall"           # its effect        the same: a key that is commented out
 //!                              # and why           goes on with the words
 //! # Words above a key or a section that has none beside it.
 //! ```
@@ -13,13 +13,13 @@ use toml_edit::{DocumentMut, Item, Table, Value};
 /// A key or a section that a scenario shows.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Shown {
-    /// The names on the way to it. Elements of arrays have no part of it.
+    /// The names on the path to it, without the numbers of elements of arrays.
     pub(crate) way: Vec<String>,
     /// Its comments; may be empty.
     pub(crate) words: String,
-    /// Its value; none of a section.
+    /// Its value; none for a section.
     pub(crate) value: Option<serde_json::Value>,
-    /// Whether the key is commented out, in a section that is not.
+    /// Whether the key is commented out, in a section that is not commented out.
     pub(crate) is_left_out: bool,
 }
 
@@ -45,8 +45,8 @@ pub(crate) fn shown(text: &str) -> Vec<Shown> {
     reader.found
 }
 
-/// Returns the piece of TOML that begins with a line, if it does; a value of several lines takes
-/// them all.
+/// Returns the piece of TOML that begins with a line, if there is one; a value of several lines
+/// takes all of them.
 fn piece<'t>(
     first: &str,
     is_comment: bool,
@@ -76,9 +76,9 @@ struct Reader {
     found: Vec<Shown>,
     section: Vec<String>,
     is_section_left_out: bool,
-    /// Words above what comes next.
+    /// Words above the next section or key.
     above: String,
-    /// Whether these words stand directly above it.
+    /// Whether these words stand directly above that.
     is_near: bool,
 }
 
@@ -111,8 +111,8 @@ impl Reader {
         self.is_near = true;
     }
 
-    /// Takes a section or a key. The words above a section may be apart from it, those above a key
-    /// may not.
+    /// Takes a section or a key. The words above a section may be set apart from it, those above a
+    /// key may not.
     fn takes(&mut self, document: &DocumentMut, is_left_out: bool) {
         let above = std::mem::take(&mut self.above);
         let above = above.trim_start_matches("--- ").to_string();
@@ -135,7 +135,7 @@ impl Reader {
     }
 }
 
-/// Returns the table of a header, following the way to it; with the mark of a dotted key.
+/// Returns the table of a header, following the path to it, with the mark of a dotted key.
 fn header<'t>(table: &'t Table, way: &mut Vec<String>) -> Option<(&'t Table, bool)> {
     let (name, item) = table.iter().next()?;
     let inner = match item {
@@ -151,7 +151,7 @@ fn header<'t>(table: &'t Table, way: &mut Vec<String>) -> Option<(&'t Table, boo
     }
 }
 
-/// Gathers the keys of a piece, and those of the tables that are their values.
+/// Gathers the keys of a piece, and those of the tables in their values.
 fn keys(table: &Table, way: Vec<String>, above: &str, is_left_out: bool, found: &mut Vec<Shown>) {
     for (name, item) in table.iter() {
         let mut way = way.clone();
@@ -162,7 +162,7 @@ fn keys(table: &Table, way: Vec<String>, above: &str, is_left_out: bool, found: 
                 let beside = comment(value.decor().suffix());
                 let words = if beside.is_empty() { above.to_string() } else { beside };
                 inside(value, &way, found);
-                // Last, so that what goes on goes on with the words of the key itself.
+                // Last, so that continued words belong to the key itself.
                 found.push(Shown { way, words, value: json(value), is_left_out });
             }
             _ => {}

@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-/// Returns a schema that takes what either of two takes, which differ in nothing but the number of
-/// elements of arrays: places in the plane, and places in space.
+/// Returns a schema that accepts everything that either of two accepts, which differ only in the
+/// number of elements of arrays: places in the plane, and places in space.
 pub fn widened(plane: &Value, space: &Value) -> Value {
     match (plane, space) {
         (Value::Object(a), Value::Object(b)) => {

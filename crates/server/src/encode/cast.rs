@@ -1,4 +1,4 @@
-//! Casts: which bodies the columns of frames stand for.
+//! Casts: the bodies that the columns of frames stand for.
 
 use super::{CONDITIONS, plain};
 use crate::protocol::{Cast, Look, SessionId};
@@ -22,7 +22,7 @@ pub(super) struct Troupe {
     /// All different shapes, those of lines without their points.
     shapes: Vec<Shape>,
     forms: Vec<Form>,
-    /// Whether all lies in a plane, where heights are not seen: a door that opens there stays who it is.
+    /// Whether everything lies in a plane, where heights are not seen: a door that opens there stays the same body.
     is_flat: bool,
 }
 
@@ -49,7 +49,7 @@ impl Troupe {
         troupe
     }
 
-    /// Returns whether these are its bodies, in their order, with the same shapes.
+    /// Returns whether the given bodies are its own, in their order, with the same shapes.
     pub(super) fn is_of(&self, bodies: &[Body]) -> bool {
         let is_same = |(member, body): (&Member, &Body)| {
             member.kind == body.kind
@@ -61,7 +61,7 @@ impl Troupe {
         self.members.len() == bodies.len() && self.members.iter().zip(bodies).all(is_same)
     }
 
-    /// Returns it as it is told.
+    /// Returns its cast, as the page gets it.
     pub(super) fn cast(
         &self,
         session: SessionId,

@@ -1,4 +1,4 @@
-//! Frames as bytes, and what is told beside them. The layout is in [`protocol`](crate::protocol).
+//! Frames as bytes, and the messages beside them. The layout is in [`protocol`](crate::protocol).
 
 mod cast;
 mod plain;
@@ -15,7 +15,7 @@ const MAGIC: u32 = 0x4654_5353;
 /// Bytes before the first column.
 const HEADER_BYTES: usize = 56;
 
-/// Makes the frames of a session, and a cast whenever the bodies are no longer those of the last one.
+/// The maker of a session's frames, and of a cast whenever the bodies are no longer those of the last one.
 pub struct Encoder {
     session: SessionId,
     dimensions: u8,
@@ -33,7 +33,7 @@ impl Encoder {
         encoder
     }
 
-    /// Goes over to another run; casts are counted on.
+    /// Switches to another run; the numbering of casts goes on.
     pub fn restart(&mut self, scenery: &Scenery) {
         let named = |(kind, number, name): &(Kind, u32, String)| ((*kind, *number), name.clone());
         self.names = scenery.names.iter().map(named).collect();
@@ -58,7 +58,7 @@ impl Encoder {
             .as_ref()
             .filter(|_| is_new)
             .map(|troupe| troupe.cast(self.session, self.casts, &frame.bodies, &self.names));
-        // Text of numbers and strings: nothing in it can fail.
+        // Text made of numbers and strings only: serializing cannot fail.
         let text = serde_json::to_vec(text).unwrap_or_default();
         (cast, self.bytes(frame, &text, left_out))
     }
@@ -116,7 +116,7 @@ fn put(out: &mut Vec<u8>, numbers: impl Iterator<Item = f64>) {
     numbers.for_each(|number| out.extend_from_slice(&(number as f32).to_le_bytes()));
 }
 
-/// Writes the number of the first point of each line, and of the one behind the last.
+/// Writes the number of the first point of each line, and the number after the last point.
 fn put_starts(out: &mut Vec<u8>, lines: &[&[[f64; 3]]]) {
     let mut start = 0_u32;
     out.extend(start.to_le_bytes());

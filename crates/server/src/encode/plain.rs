@@ -4,7 +4,7 @@ use crate::protocol::{Event, Floor, Look, Problem, Scan, Scene, Shape, StillBody
 use sidestep::kernel::InputError;
 use sidestep::kernel::view::{self, Body, Entry, Level, Occupancy, Scenery};
 
-/// Returns what stays as it is in a world, by its name and its noun for an agent.
+/// Returns the scene of a world, which stays the same, by the world's name and its noun for an agent.
 pub(crate) fn scene((world, agent): (&str, &str), scenery: &Scenery, is_recording: bool) -> Scene {
     let still = |body: &Body| still_body(body, scenery);
     Scene {
@@ -67,7 +67,7 @@ pub(super) fn look(body: &Body, dimensions: u8) -> Look {
     Look { color, opacity, layer }
 }
 
-/// Returns which body it is.
+/// Returns the name of a body.
 pub(crate) fn who(&(kind, number, part): &view::Who) -> Who {
     Who { kind: kind.name().into(), number, part }
 }

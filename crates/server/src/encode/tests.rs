@@ -1,4 +1,4 @@
-//! The layout of frames, byte by byte, and when a cast begins.
+//! The layout of frames, byte by byte, and the beginnings of casts.
 
 use super::*;
 use crate::protocol::Scan;

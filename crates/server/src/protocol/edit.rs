@@ -6,7 +6,7 @@ use sidestep::scenario::{self, Cell};
 
 /// A change of a text. Keys are those of `--set`: `robots.1.at.0`; elements count from 0, and a section that stands
 /// alone is 0 or left out. Parts that hold dots or are not bare are quoted: `kinds."a.b".observation`. Everything else
-/// in the text stays as it is, byte for byte.
+/// in the text stays the same, byte for byte.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(tag = "op", rename_all = "kebab-case", deny_unknown_fields)]

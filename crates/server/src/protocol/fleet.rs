@@ -9,7 +9,7 @@ use serde::Serialize;
 pub struct Fleet {
     /// Whether all nodes have joined.
     pub has_begun: bool,
-    /// Seconds since its server was heard.
+    /// Seconds since its server was last heard.
     pub silent_s: f64,
     /// Number of cycles that began late, in real time.
     pub late_cycles: u64,
@@ -47,6 +47,6 @@ pub struct Node {
     pub packets_per_s: f64,
     /// Bytes that it sends in a second.
     pub bytes_per_s: f64,
-    /// Seconds since the server has heard it; none of one that it has never heard.
+    /// Seconds since the server last heard it; none if it never has.
     pub silent_s: Option<f64>,
 }

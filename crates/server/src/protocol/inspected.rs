@@ -85,7 +85,7 @@ pub struct Mark {
     pub role: Role,
     /// The same in words.
     pub label: String,
-    /// Likelihood or strength, from 0 to 1; 1 where that means nothing.
+    /// Likelihood or strength, from 0 to 1; 1 where that has no meaning.
     pub weight: f64,
     /// Its shape.
     pub shape: MarkShape,
@@ -108,7 +108,7 @@ pub enum Role {
     Refused,
     /// Room that is claimed.
     Claim,
-    /// Those in conflict.
+    /// The bodies in conflict.
     Group,
     /// A prediction.
     Predicted,

@@ -7,7 +7,7 @@
 //!                  frame                                 binary, see below
 //! ```
 //! TypeScript's types are generated from these (`studio/src/protocol/types.ts`, see `typescript.rs`). A frame is
-//! little-endian; every column starts at a multiple of 4 bytes, so typed arrays look at it without a copy:
+//! little-endian; every column starts at a multiple of 4 bytes, so typed arrays can view it without a copy:
 //! ```text
 //!  0 u32  magic 0x46545353 ("SSTF")      4 u16 version     6 u8 dimensions (2|3)    7 u8 0
 //!  8 u32  session                       12 u32 cast (the cast that the columns follow)
@@ -21,7 +21,7 @@
 //!    u8[n]       condition: 0 plain 1 leading 2 open 3 touching 4 failed; padded to 4
 //!    u8[t]       FrameText as JSON: scans and events, which are few
 //! ```
-//! A page grants credit for frames ([`Call::Credit`]), and gets none without. At most
+//! A page grants credit for frames ([`Call::Credit`]), and gets none without it. At most
 //! [`FRAMES_PER_S`](crate::FRAMES_PER_S) are made in a second; those that were due and could not be sent are left
 //! out and counted.
 

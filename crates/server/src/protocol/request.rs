@@ -19,7 +19,7 @@ pub struct Request {
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Call {
-    /// Lists a folder below those named at start (all of those without one).
+    /// Lists a folder below those named at start (all of those if none is given).
     Files {
         /// Its path, as a listing gave it.
         folder: Option<String>,
@@ -48,23 +48,23 @@ pub enum Call {
         /// The session.
         session: SessionId,
     },
-    /// Goes some cycles on and stays paused; answered there. Counted from where a way leads that is not gone to its
-    /// end, whose request is then answered at once.
+    /// Goes some cycles on and stays paused; answered there. While a seek or a step is under way, counted from its
+    /// end; the request for that one is then answered at once.
     Step {
         /// The session.
         session: SessionId,
         /// Number of cycles.
         cycles: u32,
     },
-    /// Goes to a cycle, earlier or later, and stays paused; answered there. A problem tells that another request
-    /// has changed the way meanwhile.
+    /// Goes to a cycle, earlier or later, and stays paused; answered there. A problem means that another request has
+    /// changed the destination meanwhile.
     Seek {
         /// The session.
         session: SessionId,
         /// The cycle; a run that is over before it stays at its end.
         cycle: u64,
     },
-    /// Starts anew, with another seed and with another text where they are given. Answered by
+    /// Starts anew, with another seed and another text where given. Answered by
     /// [`Opened`](super::Answer::Opened), with the session's own number; the run before stays if the text is wrong.
     Restart {
         /// The session.
@@ -74,36 +74,36 @@ pub enum Call {
         /// Another text for the scenario, which is not saved.
         text: Option<String>,
     },
-    /// Names the bodies whose scans frames shall hold.
+    /// Names the bodies of which frames shall hold scans.
     Look {
         /// The session.
         session: SessionId,
         /// The bodies.
         scans_of: Vec<Who>,
     },
-    /// Grants the server further frames; it sends none without.
+    /// Grants the server further frames; it sends none without credit.
     Credit {
         /// The session.
         session: SessionId,
         /// Number of frames.
         frames: u32,
     },
-    /// Asks what a body perceives, decides and does.
+    /// Asks for the percepts, decisions and deeds of a body.
     Inspect {
         /// The session.
         session: SessionId,
         /// The body.
         who: Who,
     },
-    /// Asks for samples of all metrics from the sample of this number on.
+    /// Asks for samples of all metrics, from the sample with this number on.
     Metrics {
         /// The session.
         session: SessionId,
         /// The number of the first sample wanted.
         from: u32,
     },
-    /// Asks for the events so far between two cycles (`from` is inside, `until` is not), at most `most`, after the
-    /// first ones that are skipped.
+    /// Asks for the events so far between two cycles (`from` included, `until` excluded), at most `most`, after the
+    /// first `skip` ones.
     Events {
         /// The session.
         session: SessionId,
@@ -111,7 +111,7 @@ pub enum Call {
         from: u64,
         /// The cycle after the last one.
         until: u64,
-        /// The number of the first events that are not wanted; none without it.
+        /// The number of first events to leave out; 0 without it.
         skip: Option<u32>,
         /// The largest number of events.
         most: u32,
@@ -138,8 +138,8 @@ pub enum Call {
         /// The text.
         text: String,
     },
-    /// Changes a text that stands for the session's scenario: all edits, one after the other, or none. Nothing is
-    /// kept of it here.
+    /// Changes a text that stands for the session's scenario: all edits, one after the other, or none. The server
+    /// keeps nothing of it.
     Edit {
         /// The session.
         session: SessionId,
@@ -166,7 +166,7 @@ pub enum Call {
         /// The text that the file holds as far as the page knows; without it the one that this session has read or
         /// written, which another program may have changed before a page was connected again.
         base: Option<String>,
-        /// Whether a file is replaced that holds something else.
+        /// Whether a file is replaced even if it holds something else.
         over: bool,
     },
     /// Asks for the JSON Schema of a world's scenarios.
@@ -214,7 +214,7 @@ pub enum Speed {
     Fastest,
 }
 
-/// The name of a body: kind, number, and part of things that have parts.
+/// The name of a body: kind, number, and, for things that have parts, the part.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(deny_unknown_fields)]

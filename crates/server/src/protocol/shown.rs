@@ -1,9 +1,9 @@
-//! All that is to be seen: the scene that stays, the cast of bodies that move, and the text of frames.
+//! Everything to be seen: the scene that stays the same, the cast of moving bodies, and the text of frames.
 
 use super::{SessionId, Who};
 use serde::Serialize;
 
-/// The scene, which stays as it is.
+/// The scene, which stays the same.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Scene {
@@ -83,9 +83,9 @@ pub enum Shape {
         /// Its radius, in meters.
         radius_m: f64,
     },
-    /// A polyline; its points are in the frame of the world, whatever the pose.
+    /// A polyline; its points are in the frame of the world, regardless of the pose.
     Line {
-        /// Its points, in meters; of bodies that move, none, as they are in the frames.
+        /// Its points, in meters; none for moving bodies, because the frames have them.
         points_m: Vec<[f64; 3]>,
         /// Its thickness in meters; 0 for the thinnest line that can be drawn.
         thickness_m: f64,
@@ -136,7 +136,7 @@ pub struct Cast {
     pub looks: Vec<[Look; 5]>,
     /// The look of each body.
     pub look: Vec<u16>,
-    /// Names of those that have their own: index of body, name.
+    /// Names of the bodies that have one: index of the body, name.
     pub names: Vec<(u32, String)>,
     /// The bodies that are agents, which can be inspected.
     pub is_agent: Vec<bool>,
@@ -170,7 +170,7 @@ pub struct Scan {
     pub bearings_rad: Vec<f64>,
     /// Range of each beam in meters, as reported; null: nothing in range.
     pub ranges_m: Vec<Option<f64>>,
-    /// The same as it is; empty where the world does not tell it.
+    /// The true range of each beam in meters; empty where the world does not give it.
     pub true_m: Vec<Option<f64>>,
     /// The maximum range, in meters.
     pub range_m: f64,
@@ -184,9 +184,9 @@ pub struct Event {
     pub cycle: f64,
     /// `info`, `warning` or `error`.
     pub level: String,
-    /// A word of the fixed vocabulary of events, e.g. `contact`, `veto`, `trip`; empty where the world tells none.
+    /// A word of the fixed vocabulary of events, e.g. `contact`, `veto`, `trip`; empty where the world gives none.
     pub kind: String,
-    /// The body that it is about.
+    /// The body concerned.
     pub who: Option<Who>,
     /// The other body or thing that took part, if any.
     pub with: Option<Who>,

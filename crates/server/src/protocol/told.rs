@@ -9,7 +9,7 @@ use serde::Serialize;
 pub struct Reply {
     /// The request's number; 0 for a request that could not be read.
     pub id: u32,
-    /// The answer, or why there is none.
+    /// The answer, or the reason why there is none.
     #[serde(flatten)]
     pub result: Outcome,
 }
@@ -42,7 +42,7 @@ pub enum Answer {
     Opened {
         /// Its number.
         session: SessionId,
-        /// The scene, which stays as it is.
+        /// The scene, which stays the same.
         scene: Scene,
         /// Its state.
         status: Status,
@@ -67,9 +67,9 @@ pub enum Answer {
     Events {
         /// The events.
         entries: Vec<Event>,
-        /// Number of events of these cycles that are not here: beyond what was asked for, or never kept.
+        /// Number of events of these cycles that are not here: beyond the requested number, or never kept.
         left_out: u64,
-        /// All events before this cycle are known: of a run those so far, of a recording soon all.
+        /// The cycle before which all events are known: of a run those so far, of a recording soon all.
         known_until: f64,
     },
     /// The scenario's text.
@@ -81,7 +81,7 @@ pub enum Answer {
         /// Whether it cannot be replaced by another text.
         read_only: bool,
     },
-    /// The names of a recording's tables; none of an MCAP file, or of what is no recording.
+    /// The names of a recording's tables; none for an MCAP file, or if it is no recording.
     Tables {
         /// The names.
         names: Vec<String>,
@@ -99,7 +99,7 @@ pub enum Answer {
     },
     /// The errors of a text, and its surprises.
     Problems {
-        /// Nothing for a valid text without surprises.
+        /// The problems; none for a valid text without surprises.
         problems: Vec<Problem>,
     },
     /// A text with all edits.
@@ -112,7 +112,7 @@ pub enum Answer {
         /// The table of the text: dates are strings; numbers that JSON cannot hold are null.
         #[cfg_attr(test, ts(type = "unknown"))]
         value: serde_json::Value,
-        /// Files that a key of the text can name, as it would name them: those below its folder, and those
+        /// Files that a key of the text can name, written as it would name them: those below its folder, and those
         /// elsewhere that it names.
         files: Vec<String>,
     },
@@ -134,7 +134,7 @@ pub enum Answer {
     },
 }
 
-/// An error as people read it: where, what, remedy.
+/// An error as people read it: place, cause, remedy.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Problem {
@@ -146,7 +146,7 @@ pub struct Problem {
     pub column: Option<u32>,
     /// Line of its end, from 1.
     pub end_line: Option<u32>,
-    /// Column behind its end, from 1.
+    /// Column after its end, from 1.
     pub end_column: Option<u32>,
     /// Key of the scenario that is wrong, as `--set` names it: `robots.1.at.0`.
     pub key: Option<Box<str>>,
@@ -199,7 +199,7 @@ pub struct FileEntry {
 pub struct SweepRun {
     /// The name of its variant.
     pub variant: String,
-    /// Its seed, in decimal digits, as it may be larger than a number of JavaScript can be.
+    /// Its seed, in decimal digits, because it may be larger than any exact integer of JavaScript.
     pub seed: String,
     /// The cause of its failure; empty if it did not fail.
     pub failure: String,
@@ -230,12 +230,12 @@ pub enum FileKind {
     Profile,
 }
 
-/// A message of the server that nobody asked for.
+/// A message of the server without a request.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(tag = "notice", rename_all = "kebab-case")]
 pub enum Notice {
-    /// First of all.
+    /// The first of all notices.
     Hello {
         /// See [`VERSION`](super::VERSION).
         version: u32,
@@ -248,11 +248,11 @@ pub enum Notice {
         /// The things that the command line asked to open.
         open: Vec<Named>,
     },
-    /// The bodies that the columns of frames with this number stand for; before the first such frame.
+    /// The bodies that the columns of frames with this number stand for; sent before the first such frame.
     Cast(Cast),
-    /// The state of a session: when it changes, at most ten times a second.
+    /// The state of a session; sent when it changes, at most ten times a second.
     Status(Status),
-    /// A session ended by itself, and why.
+    /// The end of a session by itself, and the reason.
     Ended {
         /// The session.
         session: SessionId,
@@ -285,11 +285,11 @@ pub struct Status {
     pub cycles_planned: f64,
     /// Simulated seconds since the start.
     pub time_s: f64,
-    /// Its speed now, or when it played last.
+    /// Its speed now, or when it was last playing.
     pub speed: Speed,
     /// Cycles per second over the last second.
     pub cycles_per_s: f64,
-    /// The seed, in decimal digits, as it may be larger than a number of JavaScript can be.
+    /// The seed, in decimal digits, because it may be larger than any exact integer of JavaScript.
     pub seed: String,
     /// Digest of the state, while the run stands still.
     pub digest: Option<String>,
@@ -314,7 +314,7 @@ pub enum State {
     Watched,
     /// It has come to its end.
     Over,
-    /// It cannot go on; the notice [`Notice::Ended`] says why.
+    /// It cannot go on; the notice [`Notice::Ended`] gives the reason.
     Failed,
 }
 

@@ -1,4 +1,4 @@
-//! The page's types are those of the server.
+//! The types of the page, which are those of the server.
 //!
 //! `SIDESTEP_WRITE=protocol cargo test --release -p sidestep-server protocol` writes them.
 

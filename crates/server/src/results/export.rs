@@ -1,4 +1,4 @@
-//! Exports of recorded runs, by the exporters of the command, to a file that the browser keeps.
+//! Exports of recorded runs, by the exporters of the command, to a file that the browser saves.
 
 use super::Failed;
 use super::fields::Fields;
@@ -102,7 +102,7 @@ pub(super) fn plain(name: &str) -> String {
     if name.starts_with('.') || name.is_empty() { format!("run{name}") } else { name }
 }
 
-/// Exports to a folder that is gone afterwards; returns the content of the file.
+/// Exports to a temporary folder; returns the content of the file.
 fn written(
     worlds: Worlds,
     path: &Path,
@@ -140,7 +140,7 @@ fn too_large() -> Failed {
     Failed::new(StatusCode::PAYLOAD_TOO_LARGE, Problem::new("export", cause, remedy))
 }
 
-/// A watcher that stops what becomes too large.
+/// A watcher that stops an export that becomes too large.
 struct Bounded<'a> {
     client: &'a Client,
     folder: &'a Path,

@@ -4,12 +4,12 @@ use super::Failed;
 use crate::protocol::Problem;
 use std::collections::BTreeMap;
 
-/// The fields behind the question mark of an address.
+/// The fields after the question mark of an address.
 #[derive(Debug, Default)]
 pub(super) struct Fields(BTreeMap<String, String>);
 
 impl Fields {
-    /// Reads fields as `encodeURIComponent` writes them.
+    /// Reads fields in the encoding of `encodeURIComponent`.
     pub(super) fn of(query: Option<&str>) -> Self {
         let parts = query.unwrap_or_default().split('&').filter_map(|part| part.split_once('='));
         Self(parts.filter_map(|(name, value)| Some((decoded(name)?, decoded(value)?))).collect())
@@ -20,17 +20,17 @@ impl Fields {
         self.0.get(name).map(String::as_str)
     }
 
-    /// Returns a field that must be there.
+    /// Returns a required field.
     ///
     /// # Errors
-    /// When it is not.
+    /// When it is missing.
     pub(super) fn need(&self, name: &str) -> Result<&str, Failed> {
         let missing = || Problem::new("address", format!("it has no `{name}`"), "name one");
         self.get(name).ok_or_else(|| missing().into())
     }
 }
 
-/// Returns a text without percent signs; `None` if it is none.
+/// Returns a text with its percent signs decoded; `None` if they are malformed.
 fn decoded(text: &str) -> Option<String> {
     let mut bytes = Vec::with_capacity(text.len());
     let mut parts = text.split('%');

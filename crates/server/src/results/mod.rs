@@ -1,13 +1,13 @@
-//! Results of runs and sweeps that are recorded: their reports, what can be exported of them, and the runs of a sweep.
+//! Results of recorded runs and sweeps: their reports, their exports, and the runs of a sweep.
 //!
 //! They are fetched by plain addresses, so that a browser shows a report in a frame and keeps an export as a file:
 //! ```text
 //! /report?path=DIR                       the page of `sidestep report`
 //! /report?path=DIR&as=html|markdown|NN-figure   the same as a file, its text, or one of its figures
-//! /export?path=DIR&as=csv&table=NAME     what `sidestep export` writes; of pictures, with &cycle=N
+//! /export?path=DIR&as=csv&table=NAME     the output of `sidestep export`; of pictures, with &cycle=N
 //! ```
-//! Whoever asks must come from our own page, and each path must be below the folders that were named at start. One
-//! result is made at a time, in a thread of its own; nobody makes one any more for a browser that is gone.
+//! Requests must come from our own page, and each path must be below the folders that were named at start. One result
+//! is made at a time, in a thread of its own; none is finished for a browser that is gone.
 
 mod export;
 mod fields;

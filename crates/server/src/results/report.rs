@@ -19,8 +19,8 @@ use sidestep_session::report::document;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The rights of the page of a report, unlike those of all others: it runs what stands in it, in our frame, and
-/// nothing else. It has no origin, so it could ask nobody anything even if a name in it were taken for a script.
+/// The rights of the page of a report, unlike those of all others: it runs its inline scripts, in our frame, and
+/// nothing else. It has no origin, so it could send no requests even if a name in it were taken for a script.
 const POLICY: &str = "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; \
     style-src 'unsafe-inline'; img-src data: blob:; font-src data:; base-uri 'none'; form-action 'none'; \
     frame-ancestors 'self'";

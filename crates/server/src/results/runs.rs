@@ -1,11 +1,11 @@
-//! The runs of a sweep, each with what opens it.
+//! The runs of a sweep, each with the thing that opens it.
 
 use crate::encode::problem;
 use crate::protocol::{Answer, Named, Problem, SweepRun};
 use sidestep_session::sweep::{Finished, Folder, finished};
 use std::path::Path;
 
-/// The number of runs that are listed.
+/// The largest number of runs listed.
 const MOST_RUNS: usize = 20_000;
 
 /// Lists the runs of the sweep in a folder.
@@ -21,7 +21,7 @@ pub(crate) fn runs(path: &Path) -> Result<Answer, Problem> {
         let cell = plan.cell_of(number("cell", row)? as u64)?;
         let failure = table.column("failure").map_or_else(String::new, |c| c.values.text(row));
         let kept = folder.run_folder(cell.id);
-        // A run that is not recorded is that of its variant's scenario with its seed.
+        // A run that is not recorded is its variant's scenario run with its seed.
         let (kind, replay) = match kept.join("run.json").is_file() {
             true => ("recording", kept),
             false => ("scenario", folder.scenario(cell.variant)),

@@ -16,7 +16,7 @@ use tokio::task::spawn_blocking;
 /// The place where results are made.
 pub(crate) struct Workshop {
     turn: Semaphore,
-    /// The report that was made last, of which figures are asked for next.
+    /// The report that was made last, because its figures are asked for next.
     last: Mutex<Option<(PathBuf, Arc<Rendered>)>>,
 }
 
@@ -39,7 +39,7 @@ impl Client {
         self.is_gone.load(Relaxed)
     }
 
-    /// Wants no more of the work.
+    /// Notes that it no longer wants the work.
     pub(super) fn leave(&self) {
         self.is_gone.store(true, Relaxed);
         self.interrupt.raise();
@@ -56,7 +56,7 @@ impl Watcher for Client {
     }
 }
 
-/// Tells the work that nobody waits any more.
+/// A guard that tells the work that its browser no longer waits.
 struct Leaves(Client);
 
 impl Drop for Leaves {
@@ -66,7 +66,7 @@ impl Drop for Leaves {
 }
 
 impl Workshop {
-    /// Does a piece of work in its turn, for as long as the future is waited for.
+    /// Does a piece of work in its turn, for as long as the future is awaited.
     ///
     /// # Errors
     /// Those of the work; a bug in it.
@@ -98,7 +98,7 @@ impl Workshop {
     }
 }
 
-/// Returns an error of the work as it is told.
+/// Returns an error of the work as an answer.
 pub(super) fn failed(error: &Error) -> Failed {
     crate::session::stopped(error).into()
 }

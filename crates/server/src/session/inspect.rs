@@ -7,10 +7,10 @@ use crate::protocol::{
 use sidestep::kernel::Simulation;
 use sidestep::kernel::view;
 
-/// Returns what a body perceives, decides and does.
+/// Returns the percepts, decisions and deeds of a body.
 ///
 /// # Errors
-/// When there is no such body, or nothing is to tell of it.
+/// When there is no such body, or there is nothing to show of it.
 pub(super) fn inspection(run: &dyn Simulation, of: &Who) -> Result<Inspection, Problem> {
     let told = body(of).and_then(|body| run.inspect(body)).ok_or_else(|| {
         let part = of.part.map(|part| format!("/{part}")).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! The memory of a session of a run as it goes on: places to go back to, samples of metrics, and events.
+//! The memory of a session as its run goes on: places to go back to, samples of metrics, and events.
 
 use crate::chronicle::Chronicle;
 use crate::keyframes::{Budget, Keyframes};
@@ -8,7 +8,7 @@ use sidestep::scenario::Meaning;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// The memory of one run, filled by whichever of its computations comes to a cycle first.
+/// The memory of one run, filled by the first of its computations to come to a cycle.
 pub(super) struct Memory {
     pub(super) keyframes: Keyframes,
     pub(super) samples: Samples,
@@ -34,7 +34,7 @@ impl Memory {
         memory
     }
 
-    /// Takes note of a run that has gone on for a time.
+    /// Records a run that has gone on for a time.
     pub(super) fn note(&mut self, run: &dyn Simulation, took: Duration) {
         if self.keyframes.is_due(run.cycle(), took) {
             self.keep_keyframe(run);
@@ -44,7 +44,7 @@ impl Memory {
         }
     }
 
-    /// Takes note of where a run stands still.
+    /// Records the place where a run stands still.
     pub(super) fn note_stand(&mut self, run: &dyn Simulation) {
         if self.samples.is_new(run.cycle()) {
             self.sample(run);

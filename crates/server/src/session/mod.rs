@@ -1,7 +1,7 @@
 //! Sessions: each is a thread of its own that owns a run, and takes requests by a channel.
 //!
-//! Nothing that comes from a socket waits for another socket, and no result depends on one: the thread decides what
-//! is computed, and what is shown of it goes to an [`Outbox`], which never lets it wait.
+//! Nothing that comes from a socket waits for another socket, and no result depends on one: the thread alone controls
+//! the computation, and its views go to an [`Outbox`], which never makes it wait.
 
 mod edit;
 mod inspect;
@@ -34,7 +34,7 @@ use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 use watching::Watching;
 
-/// The number of requests that wait for a session.
+/// The largest number of requests that wait for a session.
 const MOST_WAITING: usize = 256;
 /// The longest wait for a request, after which the thread looks around again.
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
@@ -51,7 +51,7 @@ pub(crate) struct Opening {
     pub(crate) seed: Option<u64>,
 }
 
-/// A session, as a socket knows it. It ends when this is dropped.
+/// A session, from the side of a socket. It ends when this is dropped.
 pub(crate) struct Session {
     orders: SyncSender<(u32, Call)>,
     interrupt: Interrupt,
@@ -63,7 +63,7 @@ impl Session {
     /// Starts a session, which answers the request that opens it; `ticket` is dropped when it has ended.
     ///
     /// # Errors
-    /// When the system has no more threads.
+    /// When the system has no threads left.
     pub(crate) fn start(
         means: Means,
         opening: Opening,
@@ -109,12 +109,12 @@ impl Session {
 
 impl Drop for Session {
     fn drop(&mut self) {
-        // Nobody waits for the end of its cycle, whose result nobody will see.
+        // There is no need to wait for the end of its cycle: the result will not be seen.
         self.interrupt.raise();
     }
 }
 
-/// Returns the problem of a request for a session that is there no more.
+/// Returns the problem of a request for a session that is gone.
 pub(crate) fn ended() -> Problem {
     Problem::new("session", "there is no such session, or it has ended", "open it again")
 }
@@ -128,14 +128,14 @@ struct Desk {
 
 /// The reason why work was not done to its end.
 enum Broken {
-    /// It was interrupted, as nobody wants it any more.
+    /// It was interrupted, because it is no longer wanted.
     Unwanted,
     /// A bug, in words.
     Bug(String),
 }
 
 impl Desk {
-    /// Opens what is asked for and plays it, until nobody asks any more or a bug ends it.
+    /// Opens the requested thing and plays it, until the socket drops it or a bug ends it.
     fn work(self, means: Means, opening: Opening, shown: Shown) {
         let Opening { session, id, what, seed } = opening;
         if let Subject::Fleet { path } = &what {
@@ -165,7 +165,7 @@ impl Desk {
         self.close();
     }
 
-    /// Refuses what was asked after the end.
+    /// Refuses requests that came after the end.
     fn close(&self) {
         while let Ok((id, _)) = self.orders.try_recv() {
             self.refuse(id, ended());

@@ -1,9 +1,9 @@
-//! The number of cycles that a run goes at a time, and that of a second.
+//! The number of cycles that a run goes at a time, and in a second.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// Duration of a slice, and so the longest wait of orders, but for cycles that take longer.
+/// Duration of a slice, and so the longest wait of orders, unless a cycle takes longer.
 const SLICE: Duration = Duration::from_millis(12);
 /// The time over which cycles are counted.
 const COUNTED: Duration = Duration::from_secs(1);
@@ -39,7 +39,7 @@ impl Rate {
     pub(super) fn note(&mut self, now: Instant, cycles: u64) {
         self.forget(now);
         match self.0.back_mut() {
-            // A hundred stretches are enough.
+            // A resolution of a hundred stretches is enough.
             Some((at, sum)) if now.duration_since(*at) < COUNTED / 100 => *sum += cycles,
             _ => self.0.push_back((now, cycles)),
         }

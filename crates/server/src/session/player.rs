@@ -1,4 +1,4 @@
-//! A run that is played: what it does next, and what it answers.
+//! A run that is played: its next steps, and its answers.
 
 mod viewers;
 mod way;
@@ -24,7 +24,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use way::Errand;
 
-/// The number of events in an answer; whoever wants more asks again.
+/// The largest number of events in an answer; a page that wants more asks again.
 const MOST_EVENTS: u32 = 5000;
 
 /// A run that is played.
@@ -42,7 +42,7 @@ pub(super) struct Player {
     speed: Speed,
     beat: Option<Beat>,
     errand: Option<Errand>,
-    /// The request that is being taken.
+    /// The request now being taken.
     taken: Option<u32>,
     pace: Pace,
     rate: Rate,
@@ -85,7 +85,7 @@ impl Player {
         Ok(player)
     }
 
-    /// Makes a run ready that is at its start.
+    /// Prepares a run that is at its start.
     fn begin(&mut self) {
         self.stage.run.heed(self.interrupt.clone());
         self.stage.run.watch();
@@ -113,7 +113,7 @@ impl Player {
         Ok(self.opened())
     }
 
-    /// Returns what a page is told that has opened the session.
+    /// Returns the answer to the page that has opened the session.
     pub(super) fn opened(&mut self) -> Answer {
         let (run, is_recording) = (&self.stage.run, self.stage.recorded.is_some());
         let scene = scene((run.world(), run.agent()), &self.scenery, is_recording);
@@ -171,7 +171,7 @@ impl Player {
         })
     }
 
-    /// Answers what does not change where the run is.
+    /// Answers a request that does not move the run.
     fn told(&mut self, call: Call) -> Result<Answer, Problem> {
         let run = self.stage.run.as_mut();
         match call {
@@ -228,7 +228,7 @@ impl Player {
         Ok(Answer::Done)
     }
 
-    /// Stands still where the run is.
+    /// Stops where the run is.
     fn stand(&mut self) {
         let is_at_end = self.is_at_end();
         self.state = if is_at_end { State::Over } else { State::Paused };
@@ -243,8 +243,8 @@ impl Player {
         self.verdict = self.stage.verdict(self.stage.run.as_ref()).or(self.verdict.take());
     }
 
-    /// Does what is due, for some milliseconds at most. Returns how long nothing will be, unless there is a
-    /// request; `None` forever.
+    /// Does the work that is due, for some milliseconds at most. Returns the time until there is more, unless a
+    /// request comes; `None` for forever.
     pub(super) fn turn(&mut self) -> Option<Duration> {
         let now = Instant::now();
         self.memory.keyframes.fit();
@@ -286,7 +286,7 @@ impl Player {
         self.viewer.has_to_tell(status).then(|| self.viewer.status_due())
     }
 
-    /// Stands still where the way or the run ends.
+    /// Stops where the seek or the run ends.
     fn arrive(&mut self) {
         let is_there = self.errand.is_some_and(|errand| self.cycle() >= errand.target);
         let is_on_the_way = matches!(self.state, State::Playing | State::Seeking);
@@ -303,7 +303,7 @@ impl Player {
         }
     }
 
-    /// Goes on for some milliseconds, but not beyond a cycle.
+    /// Goes on for some milliseconds, but not beyond the target cycle.
     fn slice(&mut self, target: Cycle) {
         let asked = self.pace.cycles().min(target.saturating_sub(self.cycle()));
         if asked == 0 || self.stage.run.is_over() {
@@ -319,7 +319,7 @@ impl Player {
         self.memory.note(self.stage.run.as_ref(), took);
     }
 
-    /// Goes ahead where there is nothing else to do; returns whether there was something ahead.
+    /// Computes ahead when there is nothing else to do; returns whether there was anything to compute ahead.
     fn scout(&mut self) -> bool {
         let Some(scout) = &mut self.scout else { return false };
         if let Some(run) = scout.slice(&mut self.memory) {
@@ -353,11 +353,11 @@ impl Player {
         }
     }
 
-    /// Tells that the session ends here; the run is not touched any more.
+    /// Reports that the session ends here; the run is no longer touched.
     pub(super) fn fail(&mut self, problem: Problem) {
         let errand = self.errand.and_then(|errand| errand.id);
         self.give_up("the session has ended");
-        // Whoever asked for what met the bug waits for an answer, too.
+        // The request that met the bug waits for an answer, too.
         if let Some(id) = self.taken.take().filter(|id| Some(*id) != errand) {
             self.reply(id, Err(problem.clone()));
         }

@@ -1,4 +1,4 @@
-//! Scenarios that are saved: whole or not at all, and never over what somebody else wrote meanwhile.
+//! Scenarios that are saved: whole or not at all, and never over a text that another program wrote meanwhile.
 
 use crate::files::Files;
 use crate::protocol::{Answer, Problem};
@@ -8,14 +8,14 @@ use sidestep::scenario::{Source, Worlds};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The file of a session, as it was read or written last.
+/// The file of a session, as last read or written.
 #[derive(Debug, Clone)]
 pub(super) struct OwnFile {
     pub(super) path: PathBuf,
     pub(super) text: String,
 }
 
-/// The scenario of a session, as others than its thread know it: its place is that of the file it was saved in last.
+/// The scenario of a session, for other threads than its own: its place is the file in which it was last saved.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Shown(Arc<Mutex<Option<Source>>>);
 
@@ -25,7 +25,7 @@ impl Shown {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Shows another one.
+    /// Replaces it by another one.
     pub(super) fn set(&self, source: &Source) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(source.clone());
     }
@@ -51,22 +51,22 @@ pub(super) fn own_path(own: Option<&OwnFile>, place: &str) -> Result<String, Pro
 /// The way in which a page wants a text saved.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Wish {
-    /// The text that the page believes the file holds; what the session has read or written without it.
+    /// The text that the page believes the file holds; without it, the text that the session has read or written.
     pub(super) base: Option<String>,
-    /// Whether the file is replaced whatever it holds.
+    /// Whether the file is replaced regardless of its content.
     pub(super) over: bool,
 }
 
-/// Refuses a text that would let a page read what it may not, and one that is no scenario. A text that is no TOML may be
-/// saved, half-typed: neither as a scenario nor as the file of another program can it be read, and what names further
-/// files (maps, worlds of Stage) is never read from a file that ends in `.toml`.
+/// Refuses a text that would let a page read forbidden files, and one that is no scenario. A text that is no TOML may
+/// be saved, half-typed: it can be read neither as a scenario nor as the file of another program, and formats that
+/// name further files (maps, worlds of Stage) are never read from a file that ends in `.toml`.
 ///
 /// # Errors
-/// With the file that it names, or what it has to be.
+/// With the file that it names, or the kind of text that it has to be.
 pub(super) fn writable(files: &Files, worlds: &Worlds, source: &Source) -> Result<(), Problem> {
     let Ok(values) = source.parse::<Value>() else { return Ok(()) };
     files.check_text(source)?;
-    // Also over a scenario: in two saves, a page could otherwise make any file out of one.
+    // This holds over a scenario, too: in two saves, a page could otherwise make any file out of one.
     match values["world"].is_null() {
         false => Ok(()),
         true => {
@@ -81,7 +81,7 @@ pub(super) fn writable(files: &Files, worlds: &Worlds, source: &Source) -> Resul
     }
 }
 
-/// Writes a text into a file, unless the file holds something else than the page knows of.
+/// Writes a text into a file, unless the file holds something that the page does not know.
 ///
 /// # Errors
 /// When it cannot be written; then the file is as it was.
@@ -92,7 +92,7 @@ pub(super) fn saved(
     wish: &Wish,
 ) -> Result<Answer, Problem> {
     let own = own.filter(|own| is_same(&own.path, target)).map(|own| own.text.as_str());
-    // A page that was connected again knows another text than its new session has read.
+    // A reconnected page knows a different text from the one that its new session has read.
     let known = wish.base.as_deref().or(own);
     let may_replace = |found: Option<&str>| match found {
         None => true,

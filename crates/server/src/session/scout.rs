@@ -1,5 +1,6 @@
 //! A second computation of a recorded run, ahead of the one that is watched, whenever there is nothing else to do:
-//! so a page knows all events of a recording, any cycle is near, and the digest is confirmed, before all was played.
+//! so a page knows all events of a recording, any cycle is near, and the digest is confirmed, before everything was
+//! played.
 
 use super::memory::Memory;
 use super::pace::Pace;
@@ -7,7 +8,7 @@ use sidestep::kernel::view::Look;
 use sidestep::kernel::{Cycle, Interrupt, Simulation};
 use std::time::{Duration, Instant};
 
-/// Events are taken over so often: a run keeps some thousands only.
+/// The time between two transfers of events: a run keeps only some thousands.
 const EVENTS: Duration = Duration::from_millis(100);
 
 /// A run on its way to its end.
@@ -19,7 +20,7 @@ pub(super) struct Scout {
 }
 
 impl Scout {
-    /// Sends a run out that is at its start.
+    /// Sends out a run that is at its start.
     pub(super) fn new(mut run: Box<dyn Simulation>, until: Cycle, interrupt: Interrupt) -> Self {
         run.heed(interrupt);
         run.watch();
@@ -43,14 +44,14 @@ impl Scout {
         is_at_end.then_some(self.run.as_ref())
     }
 
-    /// Leaves out what the watched run was the first to compute.
+    /// Leaves out the cycles that the watched run was the first to compute.
     fn skip(&mut self, memory: &mut Memory) {
         let known = memory.keyframes.before(memory.log.frontier());
         if let Some((at, checkpoint)) = known
             && at > self.run.cycle()
         {
             self.run.restore(checkpoint).unwrap_or_else(|error| panic!("a keyframe: {error}"));
-            // What it did before is known.
+            // The events before are known.
             drop(self.run.frame(Look::BODIES));
         }
     }

@@ -1,4 +1,4 @@
-//! Viewers of Foxglove's protocol, who watch the session that was opened last.
+//! Viewers of Foxglove's protocol, which watch the session that was opened last.
 
 use crate::chronicle::Chronicle;
 use crate::protocol::SessionId;
@@ -8,10 +8,10 @@ use sidestep_session::{Error, Playback, Playing, Steering, Viewers, ViewersAt};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// The time between two looks at what viewers want.
+/// The time between two checks of viewers' wishes.
 const LOOK: Duration = Duration::from_millis(40);
 
-/// The one place at which viewers are served. Sessions share it: it goes to the one that is opened.
+/// The one place at which viewers are served. Sessions share it: it goes to the one opened last.
 pub(crate) struct Showcase {
     at: ViewersAt,
     shown: Mutex<Option<(SessionId, Viewers)>>,
@@ -55,7 +55,7 @@ impl Showing {
         self.showcase.is_some()
     }
 
-    /// Takes the place for a run of so many simulated seconds.
+    /// Takes the place for a run of a given number of simulated seconds.
     ///
     /// # Errors
     /// When another program has taken the address.
@@ -67,7 +67,7 @@ impl Showing {
     ) -> Result<(), Error> {
         let Some(showcase) = &self.showcase else { return Ok(()) };
         let mut shown = showcase.lock();
-        // Whoever watches comes back to a server that tells the new length and the new topics.
+        // Viewers reconnect to a server that tells the new length and the new topics.
         *shown = None;
         let (playing, time_s) = (Playing::Paused, run.cycle() as f64 * scenery.cycle_s);
         let now = Playback { playing, time_s, speed: 1.0, did_seek: false };
@@ -76,7 +76,7 @@ impl Showing {
         Ok(())
     }
 
-    /// Shows the run to those who watch it, and returns what they want.
+    /// Shows the run to its viewers, and returns their wishes.
     pub(super) fn attend(
         &mut self,
         run: &mut dyn Simulation,
@@ -97,7 +97,7 @@ impl Showing {
         viewers.wish()
     }
 
-    /// Returns when to look at what viewers want.
+    /// Returns when to check viewers' wishes.
     pub(super) fn due(&self) -> Option<Instant> {
         self.is_possible().then_some(self.due)
     }

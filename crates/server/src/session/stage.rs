@@ -36,7 +36,7 @@ impl Means {
     /// Returns the screen of a fleet.
     ///
     /// # Errors
-    /// When none of this name is watched, or nothing is heard of it now.
+    /// When none of this name is watched, or it is not heard now.
     pub(super) fn screen(&self, endpoint: &str) -> Result<Arc<Screen>, Problem> {
         let found = self.screens.iter().find(|screen| screen.endpoint == endpoint);
         let screen = found.cloned().ok_or_else(|| {
@@ -53,9 +53,9 @@ pub(crate) struct Stage {
     pub(crate) run: Box<dyn Simulation>,
     /// Its last cycle.
     pub(crate) until: Cycle,
-    /// The scenario, without the seed that was asked for.
+    /// The scenario, without the requested seed.
     pub(crate) source: Source,
-    /// The recording that is computed again, if it is one.
+    /// The recording that is shown, if it is one.
     pub(crate) recorded: Option<Recorded>,
     means: Means,
     seed: Option<u64>,
@@ -96,7 +96,7 @@ impl Stage {
         }
     }
 
-    /// Tells others than its thread about the scenario.
+    /// Shows the scenario to other threads.
     pub(crate) fn shown_by(mut self, shown: Shown) -> Self {
         shown.set(&self.source);
         self.shown = shown;
@@ -131,10 +131,10 @@ impl Stage {
         Ok(Self { run, until, source, recorded: Some(recorded), means, seed, own, shown })
     }
 
-    /// Starts anew. Without a text it stays the same, also in its seed unless another is given.
+    /// Starts again. Without a text the scenario stays the same, including its seed unless another is given.
     ///
     /// # Errors
-    /// When the seed or the text is wrong; then everything stays as it is.
+    /// When the seed or the text is wrong; then everything stays the same.
     pub(crate) fn restart(
         &mut self,
         seed: Option<u64>,
@@ -150,7 +150,7 @@ impl Stage {
         let (source, seed) = match text {
             Some(text) => (other_text(&self.means, &self.source, text)?, seed),
             None => {
-                // Saving it elsewhere has changed what its paths lead to.
+                // Saving it elsewhere has changed the targets of its paths.
                 check_names(&self.means, &self.source)?;
                 (self.source.clone(), seed.or(self.seed))
             }
@@ -203,13 +203,13 @@ impl Stage {
         Ok(answer)
     }
 
-    /// Returns the same run at its start once more, of a recording.
+    /// Returns the same run at its start once more, if it is a recording.
     pub(crate) fn again(&self) -> Option<Box<dyn Simulation>> {
-        // It could be started before: where it cannot now, nothing is known ahead.
+        // It could be started before: if it cannot now, nothing is computed ahead.
         self.recorded.as_ref()?.shown(self.means.workers).ok()
     }
 
-    /// Returns what comes of comparing the end of a recorded run with what is recorded; `None` before.
+    /// Returns the result of comparing the end of a recorded run with the recording; `None` before the end.
     pub(crate) fn verdict(&self, run: &dyn Simulation) -> Option<String> {
         let recorded = self.recorded.as_ref()?;
         if let Some(maker) = recorded.other_maker() {
@@ -254,7 +254,7 @@ impl Stage {
         self.means.worlds.named(self.run.world()).map_or(&[], |kind| kind.meanings())
     }
 
-    /// Returns the names of the recorded tables; none of what has no tables.
+    /// Returns the names of the recorded tables; none if it has no tables.
     ///
     /// # Errors
     /// When the folder can no longer be read.
@@ -342,7 +342,7 @@ fn fixed(place: &str) -> Problem {
     Problem::new(place, "a recording is computed again as it was", remedy)
 }
 
-/// Returns an error of a session as it is told.
+/// Returns an error of a session in the words of the protocol.
 pub(crate) fn stopped(error: &Error) -> Problem {
     match error {
         Error::Input(error) => problem(error),

@@ -1,4 +1,4 @@
-//! D1 for the studio: whatever a page does or leaves undone, the result is that of a plain run.
+//! D1 for the studio: whether a page acts or not, the result is that of a plain run.
 
 use super::*;
 use crate::files::Files;
@@ -60,7 +60,7 @@ impl Page {
         (page, opened)
     }
 
-    /// Takes what has come.
+    /// Takes the messages that have come.
     fn read(&mut self) {
         while let Some(mail) = self.outbox.next() {
             match mail {

@@ -14,11 +14,11 @@ use std::time::{Duration, Instant};
 const FRAME: Duration = Duration::from_nanos(1_000_000_000 / FRAMES_PER_S as u64);
 /// The time between two states.
 const STATUS: Duration = Duration::from_millis(100);
-/// Without credit, events are taken over so often: a run keeps some thousands only.
+/// The time between two transfers of events without credit: a run keeps only some thousands.
 const EVENTS: Duration = Duration::from_millis(250);
-/// Credit beyond this is forgotten.
+/// The largest credit; any beyond it is forgotten.
 const MOST_CREDIT: u32 = 1000;
-/// The number of bodies whose scans are shown.
+/// The largest number of bodies of which scans are shown.
 pub(super) const MOST_SCANNING: usize = 16;
 
 /// The view of one socket on one session.
@@ -28,11 +28,11 @@ pub(super) struct Viewer {
     encoder: Encoder,
     credit: u32,
     left_out: u32,
-    /// The bodies whose scans frames hold.
+    /// The bodies of which frames hold scans.
     scans_of: Vec<Who>,
-    /// Whether the last frame shows something else than there is now.
+    /// Whether the last frame is out of date.
     is_stale: bool,
-    /// Whether the run went on since a frame was last due.
+    /// Whether the run has gone on since a frame was last due.
     has_moved: bool,
     frame_due: Instant,
     events_due: Instant,
@@ -59,9 +59,9 @@ impl Viewer {
         }
     }
 
-    /// Goes over to another run.
+    /// Switches to another run.
     pub(super) fn restart(&mut self, scenery: &Scenery) {
-        // A frame of the run before that was not sent is of no more use.
+        // An unsent frame of the run before is of no use.
         if self.outbox.clear(self.session) {
             self.credit += 1;
         }
@@ -74,7 +74,7 @@ impl Viewer {
         (self.is_stale, self.has_moved) = (true, true);
     }
 
-    /// Asks for a frame, whatever the last one showed.
+    /// Asks for a frame, regardless of the last one.
     pub(super) fn refresh(&mut self) {
         self.is_stale = true;
     }
@@ -107,7 +107,7 @@ impl Viewer {
         self.send(&frame, log);
     }
 
-    /// Sends a frame that others have made and whose events are noted, if it is due and there is credit.
+    /// Sends a frame made by others, with its events already noted, if it is due and there is credit.
     pub(super) fn pass_on(&mut self, frame: &Frame, log: &mut Chronicle, now: Instant) {
         if self.is_due(now) && self.spends(now) {
             self.send(frame, log);
@@ -139,20 +139,20 @@ impl Viewer {
         let (cast, bytes) = self.encoder.encode(frame, &text, self.left_out);
         let cast = cast.map(Notice::Cast);
         match self.outbox.frame(self.session, cast.as_ref(), bytes) {
-            // It takes the place of one that has cost its credit.
+            // It replaces one that has cost its credit.
             true => self.left_out = self.left_out.saturating_add(1),
             false => self.credit -= 1,
         }
     }
 
-    /// Takes over the events of a run of which nothing is shown.
+    /// Takes over the events of a run that is not shown.
     pub(super) fn drain(&mut self, run: &mut dyn Simulation, log: &mut Chronicle, now: Instant) {
         log.note(&mut run.frame(Look::BODIES));
         self.events_due = now + EVENTS;
     }
 
-    /// Tells the state, if it is another one and not too soon; a change of what the session does, or of where it
-    /// stands still, is told at once.
+    /// Reports the state, if it is a new one and not too soon; a change of the session's activity, or of the place
+    /// where it stands still, is reported at once.
     pub(super) fn tell(&mut self, status: Status, now: Instant) {
         let is_same = self.told.as_ref() == Some(&status);
         let is_urgent = self
@@ -166,17 +166,17 @@ impl Viewer {
         (self.told, self.status_due) = (Some(status), now + STATUS);
     }
 
-    /// Returns whether the state that was told last is an older one than this.
+    /// Returns whether the last reported state differs from this one.
     pub(super) fn has_to_tell(&self, status: &Status) -> bool {
         self.told.as_ref() != Some(status)
     }
 
-    /// Returns the state that was told last.
+    /// Returns the last reported state.
     pub(super) fn last_told(&self) -> Option<Status> {
         self.told.clone()
     }
 
-    /// Returns when a state may be told again.
+    /// Returns when a state may be reported again.
     pub(super) fn status_due(&self) -> Instant {
         self.status_due
     }

@@ -1,4 +1,4 @@
-//! A session that watches a fleet: it shows what is heard of it, and steers nothing.
+//! A session that watches a fleet: it shows the views that arrive, and steers nothing.
 
 use super::viewer::Viewer;
 use super::{Broken, Desk};
@@ -19,10 +19,10 @@ use std::time::{Duration, Instant};
 /// Time between two looks at the screen.
 const LOOK: Duration = Duration::from_millis(33);
 
-/// A silence below it is none: views come so often.
+/// The shortest silence that counts as one: views come that often.
 const SILENCE_S: f64 = 2.0;
 
-/// The number of events in an answer; whoever wants more asks again.
+/// The largest number of events in an answer; a page that wants more asks again.
 const MOST_EVENTS: u32 = 5000;
 
 /// A fleet that is watched.
@@ -30,7 +30,7 @@ pub(super) struct Watching {
     session: SessionId,
     outbox: Arc<Outbox>,
     screen: Arc<Screen>,
-    /// The part that stays as it is of the fleet that is watched; another one may fly there later.
+    /// The unchanging part of the fleet that is watched; another one may fly there later.
     staged: Arc<Staged>,
     viewer: Viewer,
     log: Chronicle,
@@ -48,7 +48,7 @@ impl Watching {
         Self { session, outbox, screen, staged, viewer, log, frame, number: 0, known_until: 0 }
     }
 
-    /// Answers requests and shows what is heard, until nobody wants to see it or nothing more will be seen.
+    /// Answers requests and shows arriving views, until the page leaves or no more views will come.
     pub(super) fn work(&mut self, desk: &Desk, id: u32) {
         self.look();
         match desk.guarded(|| self.attend(desk, id)) {
@@ -83,7 +83,7 @@ impl Watching {
         }
     }
 
-    /// Takes what is on the screen, if it is new.
+    /// Takes the view on the screen, if it is new.
     fn look(&mut self) -> Shown {
         let shown = self.screen.now();
         let is_same = Arc::ptr_eq(&shown.staged, &self.staged);
@@ -112,7 +112,7 @@ impl Watching {
     fn opened(&self) -> Answer {
         let staged = &self.staged;
         let mut scene = scene((&staged.world, &staged.agent), &staged.scenery, false);
-        // Tabs are told apart by names, which scenarios need not have.
+        // Tabs are distinguished by names, which scenarios need not have.
         if scene.name.is_empty() {
             scene.name.clone_from(&self.screen.endpoint);
         }
@@ -122,7 +122,7 @@ impl Watching {
     fn answer(&mut self, call: Call) -> Result<Answer, Problem> {
         match call {
             Call::Credit { frames, .. } => self.viewer.grant(frames),
-            // It has no scans.
+            // A fleet has no scans.
             Call::Look { .. } => {}
             Call::Events { from, until, skip, most, .. } => {
                 let skip = skip.unwrap_or(0);
@@ -165,7 +165,7 @@ impl Watching {
         Problem::new(place, "the fleet has ended, and another one flies here", "open it again")
     }
 
-    /// Tells that nothing more will be seen.
+    /// Reports that no more views will come.
     fn fail(&mut self, problem: Problem) {
         if let Some(told) = self.viewer.last_told() {
             let status = Status { state: State::Failed, ..told };

@@ -1,4 +1,4 @@
-//! Promise E1: what is saved is whole, or the file is as it was.
+//! Promise E1: a saved text is whole, or the file is as it was.
 
 use super::*;
 use std::cell::Cell;

@@ -54,7 +54,7 @@ pub struct Export<'a> {
     pub out: Option<&'a Path>,
     /// Whether an earlier export is replaced.
     pub replace: bool,
-    /// The first cycle; of pictures, the cycle that is shown.
+    /// The first cycle; for pictures, the cycle that is shown.
     pub from: Option<Cycle>,
     /// The last cycle.
     pub until: Option<Cycle>,
@@ -72,7 +72,7 @@ pub struct Written {
     pub paths: Vec<PathBuf>,
     /// Whether a run that was computed again reached the recorded digest.
     pub is_confirmed: bool,
-    /// Number of frames of an animation, and how many are shown per second.
+    /// Number of frames of an animation, and number shown per second.
     pub film: Option<(usize, u16)>,
 }
 

@@ -11,7 +11,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Name of the table of which every row is kept, whatever `every` is.
+/// Name of the table of which every row is kept, regardless of `every`.
 const EVENTS: &str = "events";
 
 /// The formats of tables.

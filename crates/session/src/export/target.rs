@@ -18,7 +18,7 @@ impl Target {
     /// Returns the requested place, or one beside the recorded run, with its name and `ending`.
     ///
     /// # Errors
-    /// When that is the recording itself, or a folder that it lies in: it would be lost.
+    /// When that is the recording itself, or a folder that contains it: it would be lost.
     fn named(job: &Job<'_>, ending: &str) -> Result<Self, InputError> {
         let recorded = &job.recorded.path;
         let path = job.wanted.out.map_or_else(|| beside(recorded, ending), Path::to_path_buf);
@@ -43,7 +43,7 @@ impl Target {
         }
     }
 
-    /// Returns a folder; one that is replaced may hold only files with an extension out of `holds`.
+    /// Returns a folder; one that is replaced may hold only files with an extension in `holds`.
     ///
     /// # Errors
     /// When the folder exists and may not be replaced, or holds something else.
@@ -81,7 +81,7 @@ impl Target {
         &self.path
     }
 
-    /// Creates the folder: `fill` gets one with another name, which takes the place of the folder
+    /// Creates the folder: `fill` gets one with another name, which replaces the folder
     /// when it is complete.
     ///
     /// # Errors

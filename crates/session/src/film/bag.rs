@@ -1,4 +1,4 @@
-//! A run as a ROS 2 bag: what its robots would have recorded, and the truth.
+//! A run as a ROS 2 bag: the records that its robots would have made, and the truth.
 
 use super::Film;
 use super::mcap::LOOK;
@@ -79,7 +79,7 @@ impl BagFilm {
         self.write("/tf", frame.time_s, &TfMessage { transforms })
     }
 
-    /// Returns the mean velocity since the frame before, in the frame of the robot then.
+    /// Returns the mean velocity since the frame before, in the frame of the robot at that time.
     fn twist(&self, frame: &Frame, who: Who, claimed: &Pose) -> TwistWithCovariance {
         let mut twist = TwistWithCovariance {
             linear_mps: [0.0; 3],
@@ -103,7 +103,7 @@ impl BagFilm {
         for (who, _) in &frame.odometry {
             let body = frame.bodies.iter().find(|body| (body.kind, body.number, body.part) == *who);
             let Some(body) = body else { continue };
-            // A floor has no height, whatever pictures show.
+            // A floor has no height, even if pictures show one.
             let [x_m, y_m, _] = body.pose.at_m;
             let pose = ros_pose(&Pose { at_m: [x_m, y_m, 0.0], ..body.pose });
             let message = PoseStamped { header: header(frame.time_s, MAP.into()), pose };
@@ -112,7 +112,7 @@ impl BagFilm {
         Ok(())
     }
 
-    /// Places the scanners in the middle of their robots, from where ranges are told.
+    /// Places the scanners in the middle of their robots, from which ranges are reported.
     fn write_mounts(&mut self, frame: &Frame) -> Result<(), Error> {
         let mount = |scan: &Scan| TransformStamped {
             header: header(frame.time_s, base_frame(scan.of)),
@@ -158,7 +158,7 @@ impl Film for BagFilm {
     }
 }
 
-/// Returns the map with a wall around it, for nothing leaves the floor and no beam does.
+/// Returns the map with a wall around it, because nothing leaves the floor, not even a beam.
 fn files_of(floor: &Floor) -> [(&'static str, Vec<u8>); 2] {
     let cell = |occupancy: &Occupancy| match occupancy {
         Occupancy::Free => Cell::Free,
@@ -200,7 +200,7 @@ fn scan_frame(scan: &Scan) -> String {
     format!("{}/{}", namespace(scan.of), ros_name(&scan.sensor))
 }
 
-/// Returns a name with nothing in it that a topic may not have.
+/// Returns a name without characters that a topic may not have.
 fn ros_name(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
 }

@@ -1,4 +1,4 @@
-//! Animated GIFs: one palette for all frames, and of each frame only the part that has changed.
+//! Animated GIFs: one palette for all frames, and for each frame only the part that has changed.
 
 use gif::{DisposalMethod, Encoder, Frame, Repeat};
 use sidestep::kernel::view::{ALERT, COLORS, DOOR, MOBILE, UNKNOWN, WALL};

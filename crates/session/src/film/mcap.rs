@@ -12,8 +12,8 @@ use sidestep_record::{McapEnd, McapOrigin, McapRecorder, Origin, Status};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Scans of more bodies than this are left out: each has its own topic, and reading sensors for a
-/// scan costs as much as simulating.
+/// The bodies of which scans are recorded; further scans are left out: each has its own topic, and
+/// reading sensors for a scan costs as much as simulating.
 pub(crate) const LOOK: Look = Look::first(64);
 
 /// The reason why a recording ends.

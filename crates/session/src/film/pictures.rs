@@ -1,4 +1,4 @@
-//! Frames of a run, kept until all are there and then drawn, because the view depends on all of
+//! Frames of a run, kept until all are complete and then drawn, because the view depends on all of
 //! them.
 
 use super::Film;
@@ -12,9 +12,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Largest number of bodies in all frames; more would take too much memory.
 const MOST_BODIES: usize = 4_000_000;
-/// Number of cycles of which every place of a way is kept: sixty ways of them take some hundred megabytes.
+/// Largest number of cycles for which every place of a track is kept: sixty such tracks take some hundred megabytes.
 const MOST_CYCLES: Cycle = 50_000;
-/// Number of frames before a picture whose tracks are shown.
+/// Number of frames before a picture for which tracks are shown.
 const TRAIL: usize = 30;
 
 /// The frames of an animation.
@@ -23,7 +23,7 @@ pub(crate) struct Pictures {
     every: Cycle,
     frames: Vec<Frame>,
     bodies: usize,
-    /// Cycles between places of ways: one, unless a film is very long.
+    /// Cycles between places of tracks: one, unless a film is very long.
     step: Cycle,
     ways: BTreeMap<Who, Way>,
 }
@@ -43,7 +43,7 @@ impl Pictures {
         Self { scenery, every, frames, bodies: 0, step, ways }
     }
 
-    /// Notes where those are whose ways are shown.
+    /// Notes the places of the bodies with tracks to show.
     fn note(&mut self, frame: &Frame) {
         let whose: BTreeSet<Who> = worth_a_trail(&self.scenery, frame).into_iter().collect();
         for body in frame.bodies.iter().filter(|body| whose.contains(&body.who())) {
@@ -59,7 +59,7 @@ impl Pictures {
         }
     }
 
-    /// Returns the way of a body that led to a frame; empty if it is not there.
+    /// Returns the track of a body up to a frame; empty if the body is not there.
     fn trail(&self, of: Who, index: usize) -> Trail {
         let frame = &self.frames[index];
         let from = self.frames[index.saturating_sub(TRAIL)].cycle;
@@ -136,7 +136,7 @@ impl Film for Pictures {
 }
 
 /// Returns the place where a body was if it went ahead before it slipped to a side; `None` for a straight
-/// way, and for bodies that do not stand on boxes.
+/// move, and for bodies that do not stand on boxes.
 fn slipped(scenery: &Scenery, body: &Body, from: (Place, u32)) -> Option<Place> {
     let plane = &scenery.floor.as_ref()?.plane;
     let flat = |[x, y, z]: Place| {

@@ -18,19 +18,19 @@ struct Row {
     body: Body,
 }
 
-/// Frames that are kept in memory: the first when the run is looked at first, then those at multiples of a number of
+/// Frames kept in memory: one when the run is first looked at, then those at multiples of a number of
 /// cycles, and the last one of a run that is over.
 pub(crate) struct FrameRows {
     every: Cycle,
-    /// The cycle at which the run was looked at first,
+    /// The cycle at which the run was first looked at.
     first: Option<Cycle>,
-    /// and that of the last frame.
+    /// The cycle of the last frame.
     last: Option<Cycle>,
     rows: Vec<Row>,
 }
 
 impl FrameRows {
-    /// Returns frames that are taken every `every` cycles.
+    /// Returns a store of frames that are taken every `every` cycles.
     pub(crate) fn new(every: Cycle) -> Self {
         Self { every: every.max(1), first: None, last: None, rows: Vec::new() }
     }
@@ -41,11 +41,11 @@ impl FrameRows {
         (table.schema(), table.block(&rows))
     }
 
-    /// Keeps the frames of these cycles alone: the run stands at their end again.
+    /// Keeps only the frames of these cycles: the run is back at their end.
     pub(crate) fn rewind(&mut self, kept: Range<Cycle>) {
         self.rows.retain(|row| kept.contains(&row.cycle));
         self.first = self.first.filter(|&first| first < kept.end);
-        // Any frame before serves: none is taken twice.
+        // Any earlier frame will do: none is taken twice.
         self.last = self.first;
     }
 
@@ -62,7 +62,7 @@ impl Film for FrameRows {
     }
 
     fn shoot(&mut self, run: &mut dyn Simulation) -> Result<(), Error> {
-        // Whoever advances a run in small steps looks at it more often than frames are due.
+        // A caller that advances a run in small steps looks at it more often than frames are due.
         if self.is_due(run) {
             self.last = Some(run.cycle());
             self.first = self.first.or(self.last);

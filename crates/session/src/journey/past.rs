@@ -1,4 +1,4 @@
-//! The way back of a run: checkpoints, and what was recorded on the way that it did not go in the end.
+//! The way back of a run: checkpoints, and the rows recorded on a branch that it finally did not take.
 
 use super::Journey;
 use sidestep::kernel::Cycle;
@@ -16,7 +16,7 @@ pub enum RestoreError {
     /// Rows that wait cannot be handed over.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// Rows that were stored cannot be taken back.
+    /// Stored rows cannot be taken back.
     #[error(
         "the run goes to {place}, which holds one past: it stands at cycle {now}, and the checkpoint is of {state}"
     )]
@@ -28,7 +28,7 @@ pub enum RestoreError {
         /// The cycle of the checkpoint, in words.
         state: String,
     },
-    /// Rows that are kept in memory have another past than the checkpoint.
+    /// Rows kept in memory have a different past from the checkpoint.
     #[error(
         "rows are kept from cycle {from} on, of one past: the run stands at cycle {now}, and the checkpoint of cycle {of} \
          is not known to be of this past"
@@ -44,7 +44,7 @@ pub enum RestoreError {
 }
 
 impl Journey {
-    /// Orders something of agents for the next cycle, see [`order`](sidestep::kernel::Simulation::order).
+    /// Gives agents an order for the next cycle, see [`order`](sidestep::kernel::Simulation::order).
     ///
     /// # Errors
     /// An order that cannot be obeyed; nothing is ordered then.
@@ -64,25 +64,26 @@ impl Journey {
         Ok(bytes)
     }
 
-    /// Notes a checkpoint of the present state: rows that are kept in memory may go back to it.
+    /// Notes a checkpoint of the present state: rows kept in memory may go back to it.
     fn note(&mut self, checkpoint: &[u8]) -> Result<(), RecordError> {
         let Some(rows) = &mut self.rows else { return Ok(()) };
         let now = self.run.cycle();
         if self.ordered_at == Some(now) {
-            // Orders that wait have their rows already, and both come back together.
+            // Waiting orders have their rows already, and both come back together.
             self.run.record(rows)?;
         }
         rows.note(checkpoint, now);
         Ok(())
     }
 
-    /// Goes on from a checkpoint of the same scenario. Rows and frames that are kept in memory lose those of its cycle and
-    /// of later ones, as if the run had never gone there; those that were taken before are the caller's. While there are
+    /// Goes on from a checkpoint of the same scenario. Rows and frames kept in memory lose those of its cycle and of
+    /// later ones, as if the run had never gone there; those taken before are up to the caller. While there are
     /// some of earlier cycles, it must be a checkpoint that this run made on its way, or the present state.
     ///
     /// # Errors
-    /// When the checkpoint is damaged or belongs to another world, scenario or version; when rows are kept of another past;
-    /// when the run is stored in a folder or file and the checkpoint is not its present state. The run stays as it is then.
+    /// When the checkpoint is damaged or belongs to another world, scenario or version; when rows of another past are
+    /// kept; when the run is stored in a folder or file and the checkpoint is not its present state. The run then
+    /// stays as it is.
     pub fn restore(&mut self, checkpoint: &[u8]) -> Result<(), RestoreError> {
         if self.rows.is_some() || self.recording.is_some() || self.film.is_some() {
             let present = self.run.checkpoint();
@@ -95,14 +96,14 @@ impl Journey {
             self.check_is_of_this_past(checkpoint, header.cycle)?;
         }
         if let Some(rows) = &mut self.rows {
-            // Rows that wait belong to the cycles that are over.
+            // Waiting rows belong to past cycles.
             self.run.record(rows)?;
         }
         self.run.restore(checkpoint)?;
         Ok(self.forget(checkpoint)?)
     }
 
-    /// Refuses another state of a run that is stored: it would be stored after what followed it.
+    /// Refuses a different state of a stored run: its rows would be stored after those of an abandoned past.
     fn check_is_free(&self, of: Cycle) -> Result<(), RestoreError> {
         let folder = self.recording.as_ref();
         let folder = folder.map(|it| format!("the folder {}", it.folder().path().display()));
@@ -116,7 +117,7 @@ impl Journey {
         Err(RestoreError::Stored { place, now, state })
     }
 
-    /// Refuses a checkpoint of another past than the rows that are kept: they would tell of two.
+    /// Refuses a checkpoint with a different past from the kept rows: they would be rows of two pasts.
     fn check_is_of_this_past(&self, checkpoint: &[u8], of: Cycle) -> Result<(), RestoreError> {
         let Some(rows) = &self.rows else { return Ok(()) };
         let (from, now) = (rows.begin(), self.run.cycle());

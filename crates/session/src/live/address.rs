@@ -5,7 +5,7 @@ use std::io;
 use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs};
 use std::str::FromStr;
 
-/// The port where none is given: that at which viewers look first.
+/// The port if none is given: the one that viewers try first.
 const PORT: u16 = 8765;
 /// The number of ports that are tried.
 const PORTS: u16 = 100;
@@ -24,7 +24,7 @@ impl FromStr for ViewersAt {
         let wrong = || format!("`{text}` is no HOST:PORT; give 127.0.0.1:{PORT}, for example");
         let number = |port: &str| port.parse::<u16>().map_err(|_| wrong());
         let (host, port) = match text.rsplit_once(':') {
-            // Numbers of the sixth version have colons of their own, outside of brackets.
+            // Addresses of IPv6 without brackets have colons of their own.
             _ if text.parse::<IpAddr>().is_ok() || text.ends_with(']') => (text, PORT),
             Some((host, port)) => (host, number(port)?),
             None if text.parse::<u16>().is_ok() => ("127.0.0.1", number(text)?),
@@ -36,7 +36,7 @@ impl FromStr for ViewersAt {
 }
 
 impl ViewersAt {
-    /// Returns the host as it stands before a port.
+    /// Returns the host in the form in which it precedes a port.
     pub fn host(&self) -> String {
         if self.host.contains(':') { format!("[{}]", self.host) } else { self.host.clone() }
     }
@@ -46,15 +46,15 @@ impl ViewersAt {
         self.port
     }
 
-    /// Returns whether others than this machine can reach it.
+    /// Returns whether other machines can reach it.
     pub fn is_open_to_others(&self) -> bool {
         self.resolved().is_ok_and(|ip| !ip.is_loopback())
     }
 
-    /// Returns the address with a port that is free now, where any is good enough.
+    /// Returns the address with a port that is free now, if any port will do.
     ///
     /// # Errors
-    /// When it is none of this machine, or the port is in use; then with the next free one.
+    /// When it does not belong to this machine, or the port is in use; the error then names the next free one.
     pub fn settled(&self) -> Result<Self, InputError> {
         let bound = self.resolved().and_then(|ip| TcpListener::bind((ip, self.port)));
         let port =
@@ -73,7 +73,7 @@ impl ViewersAt {
         first.ok_or_else(|| io::ErrorKind::AddrNotAvailable.into())
     }
 
-    /// Returns the error of an address that could not be had.
+    /// Returns the error of an address that could not be taken.
     pub(crate) fn unusable(&self, error: &io::Error) -> InputError {
         let place = format!("--foxglove {}:{}", self.host(), self.port);
         let in_use = error.kind() == io::ErrorKind::AddrInUse;

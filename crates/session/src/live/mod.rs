@@ -1,7 +1,7 @@
 //! Runs that are watched live, by viewers of Foxglove's protocol.
 //!
-//! A frame is made when somebody watches and the one before is encoded, which a thread of its own does: what nobody
-//! takes in time is not made, and the run goes on meanwhile.
+//! A frame is made if there are viewers and the one before is encoded, which happens on a thread of its own: frames
+//! that no viewer could take in time are not made, and the run goes on meanwhile.
 
 mod address;
 mod steered;
@@ -30,11 +30,11 @@ const BETWEEN_TRIES: Duration = Duration::from_millis(10);
 /// The speeds that viewers can ask for.
 const SPEEDS: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 
-/// The viewers of one run. They are sent away when this is dropped.
+/// The viewers of one run. They are disconnected when this is dropped.
 pub struct Viewers {
     server: LiveServer,
     wishes: Arc<Wishes>,
-    /// `None` once there are no more frames.
+    /// `None` after the last frame.
     frames: Option<SyncSender<Frame>>,
     is_encoding: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -44,7 +44,7 @@ pub struct Viewers {
     told_due: Instant,
 }
 
-/// The wishes of viewers, and what they are told of them.
+/// The wishes of viewers, and the answers to them.
 struct Wishes {
     can_seek: bool,
     told: Mutex<Playback>,
@@ -58,7 +58,7 @@ impl Viewers {
     /// Starts to serve viewers of a run, up to `end_s` of simulated time. With `can_seek`, they may ask for times.
     ///
     /// # Errors
-    /// When the address cannot be had.
+    /// When the address cannot be taken.
     pub fn start(
         at: &ViewersAt,
         run: &mut dyn Simulation,
@@ -93,17 +93,17 @@ impl Viewers {
         })
     }
 
-    /// Returns whether somebody watches.
+    /// Returns whether there are viewers.
     pub fn are_there(&self) -> bool {
         self.server.is_watched()
     }
 
-    /// Returns what viewers want since the last call.
+    /// Returns the wish of viewers since the last call.
     pub fn wish(&self) -> Option<Steering> {
         lock(&self.wishes.wish).take()
     }
 
-    /// Returns how a frame is made for them, if one is wanted of this time now.
+    /// Returns whether a frame of this time is due for them now.
     pub fn frame_due(&self, time_s: f64, now: Instant) -> bool {
         self.are_there()
             && time_s != self.shown_s
@@ -116,12 +116,13 @@ impl Viewers {
         (self.shown_s, self.frame_due) = (frame.time_s, (self.frame_due + FRAME).max(now));
         self.is_encoding.store(true, Ordering::Release);
         if let Some(frames) = &self.frames {
-            // It is taken, as the one before is encoded.
+            // It is taken, because the one before is encoded.
             let _ = frames.try_send(frame);
         }
     }
 
-    /// Tells them what the run does: at once if it does something else or its time has jumped, else now and then.
+    /// Tells them the state of the run: at once if its activity changes or its time has jumped, otherwise now and
+    /// then.
     pub fn tell(&mut self, playback: Playback, now: Instant) {
         let mut told = lock(&self.wishes.told);
         let did_seek = playback.did_seek || playback.time_s < told.time_s;
@@ -146,7 +147,7 @@ impl Drop for Viewers {
 }
 
 impl Wishes {
-    /// Takes a wish, and returns what comes of it.
+    /// Takes a wish, and returns the resulting playback.
     fn take(&self, wish: Steering) -> Playback {
         let told = *lock(&self.told);
         let speed = match wish.speed {
@@ -157,7 +158,7 @@ impl Wishes {
         };
         let seek_s = wish.seek_s.filter(|_| self.can_seek);
         let mut waiting = lock(&self.wish);
-        // Who asks for a time, and then to play, means both.
+        // A viewer that asks for a time, and then to play, means both.
         let before_s = waiting.as_ref().and_then(|before| before.seek_s);
         *waiting = Some(Steering { speed, seek_s: seek_s.or(before_s), ..wish });
         let playing = if wish.play { Playing::Playing } else { Playing::Paused };
@@ -170,7 +171,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Tries to have a port for a moment: the server that had it before may be about to end.
+/// Tries to get a port for a moment: the server that had it before may be about to end.
 fn retried<T>(start: impl Fn() -> io::Result<T>) -> io::Result<T> {
     for _ in 0..TRIES {
         match start() {
@@ -181,10 +182,10 @@ fn retried<T>(start: impl Fn() -> io::Result<T>) -> io::Result<T> {
     start()
 }
 
-/// Encodes frames until there are no more.
+/// Encodes frames until the last one.
 fn encode(mut encoder: LiveFrames, frames: &Receiver<Frame>, is_encoding: &AtomicBool) {
     for frame in frames {
-        // What cannot be encoded is not shown; the next frame can.
+        // A frame that cannot be encoded is not shown; the next one may be.
         let _ = encoder.frame(&frame);
         is_encoding.store(false, Ordering::Release);
     }

@@ -1,4 +1,4 @@
-//! A run that viewers may hold, let go on and slow down.
+//! A run that viewers may hold, continue and slow down.
 
 use super::{LOOK, Viewers, ViewersAt};
 use crate::Error;
@@ -7,10 +7,10 @@ use sidestep::kernel::{Cycle, Simulation};
 use sidestep_record::{Playback, Playing, Steering};
 use std::time::{Duration, Instant};
 
-/// The longest wait of a run that is held, after which it looks around again.
+/// The longest wait of a held run, after which it looks around again.
 const WAIT: Duration = Duration::from_millis(20);
 
-/// The viewers of a run, and their wishes. Until they have some, it goes as fast as it can.
+/// The viewers of a run, and their wishes. Until they have any, it goes as fast as it can.
 pub struct Steered {
     viewers: Viewers,
     cycle_s: f64,
@@ -23,7 +23,7 @@ impl Steered {
     /// Starts to serve viewers of a run that goes on.
     ///
     /// # Errors
-    /// When the address cannot be had.
+    /// When the address cannot be taken.
     pub(crate) fn start(at: &ViewersAt, run: &mut dyn Simulation) -> Result<Self, Error> {
         let scenery = run.scenery();
         let cycle_s = scenery.cycle_s;
@@ -35,13 +35,13 @@ impl Steered {
         Ok(Self { viewers, cycle_s, playing, speed, beat: None })
     }
 
-    /// Shows the run, and returns the cycle up to which it may go now; waits a little where it may not.
+    /// Shows the run, and returns the cycle up to which it may go now; waits a little if it may not go on.
     pub(crate) fn attend(&mut self, run: &mut dyn Simulation) -> Cycle {
         let now = Instant::now();
         if let Some(wish) = self.viewers.wish() {
             self.heed(wish, now, run.cycle());
         }
-        // The run of those who have gone is not held by them.
+        // Viewers that have gone do not hold the run.
         if !self.viewers.are_there() {
             (self.playing, self.beat) = (Playing::Playing, None);
         }

@@ -1,4 +1,4 @@
-//! Events from the table of them, whatever the world.
+//! Events from their table, for any world.
 
 use crate::recorded::has_rows;
 use sidestep::kernel::InputError;
@@ -10,10 +10,10 @@ use std::ops::Range;
 
 /// The table of events.
 const TABLE: &str = "events";
-/// Events beyond this number are left out.
+/// The largest number of events; further ones are left out.
 const MOST_EVENTS: usize = 200_000;
 
-/// Returns the recorded events by cycle, about bodies that are numbered as those of the tables of places.
+/// Returns the recorded events by cycle, about bodies with the numbers that they have in the tables of places.
 ///
 /// # Errors
 /// When the table is damaged.
@@ -39,7 +39,7 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// Returns the events; `None` of a table that is another one.
+    /// Returns the events; `None` for a table of another form.
     fn entries(&self, rows: Range<usize>) -> Option<Vec<Entry>> {
         let Values::U64(cycles) = self.table.column("cycle")? else { return None };
         self.table.column("event")?;
@@ -57,7 +57,7 @@ impl Rows<'_> {
         Some(Entry {
             cycle,
             level: if known == Some(&Happening::Contact) { Level::Warning } else { Level::Info },
-            // What has no name here is told by its own words.
+            // An event without a name here is shown with its own words.
             kind: known.copied().unwrap_or(Happening::Changed),
             who: (kind, number, part),
             with: self.number("other", row).map(|other| (self.place.kind, other, None)),
@@ -67,21 +67,21 @@ impl Rows<'_> {
         })
     }
 
-    /// Returns the kind of a body whose number counts on through all kinds.
+    /// Returns the kind of a body, by a number that counts on through all kinds.
     fn kind_of(&self, number: u32) -> Kind {
         let is_one = |kind: Kind| self.first.iter().any(|b| (b.kind, b.number) == (kind, number));
         let others = [Kind::Person, Kind::Door].into_iter().find(|kind| is_one(*kind));
         if is_one(self.place.kind) { self.place.kind } else { others.unwrap_or(self.place.kind) }
     }
 
-    /// Returns all that is told of an event in words.
+    /// Returns everything that the table says of an event, in words.
     fn words(&self, row: usize) -> String {
         let columns = self.table.schema.columns.iter().map(|column| column.name.as_str());
         let told = columns.filter_map(|name| self.text(name, row));
         told.map(|text| text.replace('_', " ")).collect::<Vec<_>>().join(" ")
     }
 
-    /// Returns the measure of an event: the first of its floats that is there.
+    /// Returns the measure of an event: the first of its floats that is not missing.
     fn amount(&self, row: usize) -> Option<Amount> {
         let columns = self.table.schema.columns.iter().zip(&self.table.columns);
         let mut floats = columns.filter(|(_, values)| matches!(values, Values::F64(_)));

@@ -1,7 +1,7 @@
 //! A recording of another build, shown from its own tables or messages: nothing is computed again.
 //!
-//! The scenario says what there is, and the tables or messages where it was. What they do not say (scans, conditions,
-//! metrics) is not shown, and nobody is inspected.
+//! The scenario defines the bodies, and the tables or messages their places. Anything missing there (scans,
+//! conditions, metrics) is not shown, and no body can be inspected.
 
 mod events;
 mod places;
@@ -18,9 +18,9 @@ use sidestep::kernel::{Cycle, Digest, InputError, Interrupt, Plan, Simulation};
 use sidestep_record::McapScenes;
 use std::path::Path;
 
-/// A recorded run that is shown as if it went on.
+/// A recorded run, shown as if it were running.
 pub(crate) struct Played {
-    /// The same scenario at its start, as this build understands it.
+    /// The same scenario at its start, as understood by this build.
     start: Box<dyn Simulation>,
     cycle_s: f64,
     bodies: Bodies,
@@ -42,7 +42,7 @@ impl Bodies {
     fn at(&mut self, cycle: Cycle) -> Vec<Body> {
         match self {
             Self::Tables(places) => places.at(cycle),
-            // The file could be read when it was opened. What cannot be read now is not shown.
+            // The file could be read when it was opened. Parts that cannot be read now are not shown.
             Self::Messages(scenes) => scenes.bodies(cycle).unwrap_or_default(),
         }
     }
@@ -85,7 +85,7 @@ impl Played {
         Self { start, cycle_s, bodies, events, cycle: 0, until, shown: 0 }
     }
 
-    /// Returns the events since the last frame; none where the time went back.
+    /// Returns the events since the last frame; none if the time went back.
     fn log(&mut self) -> Vec<Entry> {
         let at = |cycle: Cycle| self.events.partition_point(|event| event.cycle < cycle);
         let (from, to) = (at(self.shown.min(self.cycle)), at(self.cycle));
@@ -131,7 +131,7 @@ impl Simulation for Played {
 
     fn heed(&mut self, _: Interrupt) {}
 
-    /// The digest of the moment, as no state is known.
+    /// The digest of the moment, because no state is known.
     fn digest(&self) -> Digest {
         Digest::of(&self.cycle.to_le_bytes())
     }

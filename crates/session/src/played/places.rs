@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 
-/// The number of rows that are held at a time, about.
+/// The approximate number of rows held at a time.
 const ROWS: u64 = 200_000;
 
 /// The bodies of a recording.
@@ -17,7 +17,7 @@ pub(super) struct Places {
     folder: PathBuf,
     rows: Vec<PlaceRows>,
     scenery: Scenery,
-    /// The bodies at the start: what they look like.
+    /// The bodies at the start, for their appearance.
     first: Vec<Body>,
     until: Cycle,
     window: Vec<Window>,
@@ -51,7 +51,7 @@ impl Places {
         Ok(places)
     }
 
-    /// Returns the number of cycles of a window, and its first.
+    /// Returns the number of cycles of a window, and its first cycle.
     fn span(&self, rows: &PlaceRows, cycle: Cycle) -> (Cycle, Cycle) {
         let bodies = self.first.iter().filter(|body| body.kind == rows.kind).count();
         let cycles = (ROWS / bodies.max(1) as u64).max(1) * rows.every;
@@ -70,14 +70,14 @@ impl Places {
         Ok(Window { from, table: Some(table) })
     }
 
-    /// Returns the bodies of a cycle. Those that have gone are left out, and so is all that moves but has no rows.
+    /// Returns the bodies of a cycle. Bodies that are gone are left out, and so are all that move but have no rows.
     pub(super) fn at(&mut self, cycle: Cycle) -> Vec<Body> {
-        // Rows are of the beginnings of cycles, and none begins at the end.
+        // Rows are for the starts of cycles, and none starts at the end.
         let cycle = cycle.min(self.until.saturating_sub(1));
         let mut poses = BTreeMap::new();
         for k in 0..self.rows.len() {
             if self.span(&self.rows[k], cycle).0 != self.window[k].from {
-                // It could be read at the start. What cannot be read now is not shown.
+                // It could be read at the start. Rows that cannot be read now are not shown.
                 let (from, _) = self.span(&self.rows[k], cycle);
                 self.window[k] = self.read(k, cycle).unwrap_or(Window { from, table: None });
             }
@@ -88,11 +88,11 @@ impl Places {
         self.placed(&poses)
     }
 
-    /// Returns where the bodies of a table are.
+    /// Returns the poses of the bodies of a table.
     fn poses(&self, rows: &PlaceRows, table: &Table, cycle: Cycle) -> Vec<(Who, Pose)> {
         let Some(headings) = last_headings(rows, table, cycle) else { return Vec::new() };
         let whose: Vec<Who> = headings.keys().copied().collect();
-        // People are numbered on from robots, in one table.
+        // The numbers of people follow those of robots, in one table.
         let like = |body: &Body| Body { kind: rows.kind, ..body.clone() };
         let bodies = self.first.iter().filter(|body| is_of(rows, body)).map(like).collect();
         let frame = Frame { cycle: cycle + 1, bodies, ..Frame::default() };
@@ -143,7 +143,7 @@ impl Places {
         Some((rows.kind, body.number, body.part))
     }
 
-    /// Returns a body that was not there at the start: it looks like those that were.
+    /// Returns a body that was not there at the start; it looks like the others of its kind.
     fn latecomer(&self, (kind, number, part): Who, pose: Pose) -> Body {
         let like = self.first.iter().find(|body| body.kind == kind);
         let shape = like.map_or(Shape::Sphere { radius_m: 1.0 }, |body| body.shape.clone());
@@ -157,7 +157,7 @@ fn is_of(rows: &PlaceRows, body: &Body) -> bool {
     is_kind && body.part.is_some() == rows.part.is_some()
 }
 
-/// Returns the line through the joints that follow those of the lines before.
+/// Returns the line through the next joints, after those of the lines before.
 fn line(body: &Body, poses: &BTreeMap<Who, Pose>, joint: &mut u32) -> Option<Body> {
     let Shape::Line { points_m, thickness_m } = &body.shape else { return None };
     let from = *joint;
@@ -168,7 +168,7 @@ fn line(body: &Body, poses: &BTreeMap<Who, Pose>, joint: &mut u32) -> Option<Bod
     Some(Body { shape, ..body.clone() })
 }
 
-/// Returns everybody who has rows up to a cycle, with the last recorded heading in quarter turns.
+/// Returns all bodies that have rows up to a cycle, with the last recorded heading in quarter turns.
 fn last_headings(
     rows: &PlaceRows,
     table: &Table,

@@ -14,7 +14,7 @@ use std::path::Path;
 const MOST_ROWS: usize = 100;
 /// Number of stretches of cycles over which events are counted.
 const STRETCHES: u64 = 50;
-/// Largest number of kinds of events with a line of their own; palettes have no more colors.
+/// Largest number of kinds of events with a line of their own; palettes are limited to as many colors.
 const MOST_KINDS: usize = 7;
 
 /// Returns the name of a column as words, with its unit.

@@ -16,8 +16,8 @@ pub(super) fn unit(name: &str) -> String {
     split_unit(name).1.unwrap_or_default().into()
 }
 
-/// Returns a tree of values as one row for each leaf, in the words of its world: first those that tell
-/// something, then, folded, those that stayed 0 or have no value.
+/// Returns a tree of values as one row for each leaf, in the words of its world: first the informative ones, then,
+/// folded, those that stayed 0 or have no value.
 pub(super) fn flat(title: &str, tree: &Value, meanings: &[Meaning]) -> Vec<Table> {
     let columns = ["metric", "value", "unit", "meaning", "name in summary.json"];
     let note = "Counts that stayed 0, and what has no value.";
@@ -33,7 +33,7 @@ pub(super) fn flat(title: &str, tree: &Value, meanings: &[Meaning]) -> Vec<Table
     [telling, silent].into_iter().filter(|table| !table.rows.is_empty()).collect()
 }
 
-/// Returns words with a capital, as a sentence begins.
+/// Returns words with a capital first letter, as at the beginning of a sentence.
 fn capital(words: &str) -> String {
     let mut letters = words.chars();
     let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
@@ -70,7 +70,7 @@ fn head(name: &str, meanings: &[Meaning]) -> String {
     unit.map_or_else(|| words.clone(), |unit| format!("{words} ({unit})"))
 }
 
-/// Returns how many rows are not shown, as text; empty if all are.
+/// Returns the number of rows not shown, as text; empty if all are shown.
 pub(super) fn left_out(all: usize, shown: usize) -> String {
     match all - shown {
         0 => String::new(),
@@ -119,7 +119,7 @@ fn word(value: &Value) -> String {
     }
 }
 
-/// Formats whole numbers as they are, and others with six digits.
+/// Formats whole numbers unchanged, and others with six digits.
 fn number(number: &serde_json::Number) -> String {
     match (number.as_u64(), number.as_f64()) {
         (Some(whole), _) => whole.to_string(),

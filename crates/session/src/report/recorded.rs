@@ -38,7 +38,7 @@ pub(super) fn tell(document: &mut Document, folder: &Path) -> Result<(), InputEr
     let columns = ["table", "column", "type", "unit", "meaning"];
     let mut table = Table::new("Columns", note, &columns).folded();
     for name in names(folder)? {
-        // The first rows are enough for the schema; the whole table may be large.
+        // The first row is enough for the schema; the whole table may be large.
         let first = read_table(folder, &name, ..1).or_else(|_| read_table(folder, &name, ..))?;
         for column in &first.schema.columns {
             let unit = unit(&column.name);
@@ -52,10 +52,10 @@ pub(super) fn tell(document: &mut Document, folder: &Path) -> Result<(), InputEr
     Ok(())
 }
 
-/// Returns a value of a column as people read it.
+/// Returns a value of a column in a form for people.
 pub(super) fn cell(column: &ColumnSpec, values: &Values, row: usize) -> String {
     match values {
-        // The value that stands for none.
+        // The value that stands for a missing one.
         Values::U32(v) if v[row] == u32::MAX => "-".into(),
         Values::F64(v) => super::metrics::digits(v[row]),
         _ if values.is_missing(row) => "-".into(),

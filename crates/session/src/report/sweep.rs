@@ -1,4 +1,4 @@
-//! The folder of a sweep as a document: its runs, their results, and how precise these are.
+//! The folder of a sweep as a document: its runs, their results, and the precision of these.
 
 use super::run::quoted;
 use super::words::{count, duration};
@@ -11,9 +11,9 @@ use sidestep::scenario::Worlds;
 use sidestep_document::Table;
 use sidestep_document::document::{Block, Code, Document, Picture, Text};
 
-/// Number of variants of which a run is drawn.
+/// Number of variants for which a run is drawn.
 const DRAWN: usize = 4;
-/// Largest time in seconds of a run that is made again for its picture.
+/// Longest time in seconds of a run that is repeated for its picture.
 const LONGEST_S: f64 = 20.0;
 /// Largest number of failed runs that are listed.
 const NAMED: usize = 20;
@@ -176,7 +176,7 @@ fn tell_results(document: &mut Document, summary: &Summary) {
     }
 }
 
-/// Appends what all tables have in common, and the metrics that are not shown.
+/// Appends the notes common to all tables, and the metrics that are not shown.
 fn tell_methods(document: &mut Document, summary: &Summary) {
     document.section("How the numbers were made");
     summary.footnotes().into_iter().for_each(|note| {
@@ -185,7 +185,7 @@ fn tell_methods(document: &mut Document, summary: &Summary) {
     document.tables(summary.left_out().map(Table::folded));
 }
 
-/// Appends what was run, and how to run it again.
+/// Appends the plan of the runs, and the commands to repeat them.
 fn tell_plan(document: &mut Document, folder: &Folder, table: &RunTable) {
     let plan = folder.plan();
     document.section("What was run").push(Block::Facts(facts(folder, table)));
@@ -231,7 +231,7 @@ fn tell_failures(document: &mut Document, plan: &Plan, table: &RunTable) {
     document.tables([rows]);
 }
 
-/// Pictures of some runs, and why there is none of others.
+/// Pictures of some runs, and the reasons why others have none.
 #[derive(Default)]
 struct Pictures {
     all: Vec<Picture>,
@@ -283,7 +283,7 @@ fn row_of(table: &RunTable, cell: u64) -> Option<usize> {
     (0..table.runs()).find(|&row| cells.values.number(row) == Some(cell as f64))
 }
 
-/// Returns whether a run did not fail, and is quickly made again.
+/// Returns whether a run did not fail, and is quick to repeat.
 fn is_short(table: &RunTable, row: usize) -> bool {
     let number = |name: &str| table.column(name).and_then(|c| c.values.number(row));
     let failed = table.column("failure").is_some_and(|c| !c.values.text(row).is_empty());

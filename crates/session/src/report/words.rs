@@ -2,12 +2,12 @@
 
 use sidestep::kernel::words::grouped;
 
-/// Returns a number whose groups of digits stay on one line.
+/// Returns a number with groups of digits that stay on one line.
 pub(super) fn count(number: u64) -> String {
     grouped(number).replace(' ', "\u{a0}")
 }
 
-/// Returns a duration as people write it: `0.83 s`, `4 min 12 s`, `2 h 05 min`.
+/// Returns a duration in a form for people: `0.83 s`, `4 min 12 s`, `2 h 05 min`.
 pub fn duration(seconds: f64) -> String {
     let whole = seconds.round() as u64;
     match whole {

@@ -1,7 +1,7 @@
-//! Others who run cells: processes, nodes of a cluster, anybody.
+//! Runners of cells outside of this process: other processes, nodes of a cluster.
 //!
 //! The plan, the journal and the stopping rule stay with the process that drives the sweep. A crew gets cells and
-//! scenarios that need no other file, and gives outcomes back, in any order: no common file system is needed.
+//! self-contained scenarios, and gives outcomes back, in any order: no common file system is needed.
 
 use crate::Error;
 use sidestep::experiment::sweep::{Cell, Outcome};
@@ -11,16 +11,16 @@ use sidestep::scenario::{Resolved, Source, Worlds};
 /// Takes an outcome; `Ok` once it is safe.
 pub type Taken<'a> = dyn FnMut(Outcome) -> Result<(), Error> + Send + 'a;
 
-/// Somebody who runs cells.
+/// A runner of cells.
 pub trait Crew: Sync {
-    /// Runs all cells that are dealt, in any order, and passes each outcome on once; an outcome that comes a second time is
-    /// left out. Cells that it does not finish are dealt again by the next call.
+    /// Runs all dealt cells, in any order, and passes each outcome on; an outcome that comes a second time is
+    /// ignored. Cells that it does not finish are dealt again by the next call.
     ///
     /// # Errors
-    /// Those of `take`; whatever ends the sweep.
+    /// Those of `take`; any error that ends the sweep.
     fn run(&self, deal: &Deal<'_>, take: &mut Taken<'_>) -> Result<(), Error>;
 
-    /// Returns how many runs are in progress at once.
+    /// Returns the number of runs in progress at once.
     fn at_once(&self) -> usize;
 }
 
@@ -29,7 +29,7 @@ pub trait Crew: Sync {
 pub enum Engine<'a> {
     /// This many threads of this process.
     Workers(usize),
-    /// Others.
+    /// A crew outside of this process.
     Crew(&'a dyn Crew),
 }
 
@@ -58,7 +58,7 @@ pub struct Deal<'a> {
 }
 
 impl Deal<'_> {
-    /// Returns the cells, those first on which others may depend.
+    /// Returns the cells, first those on which others may depend.
     pub fn cells(&self) -> &[Cell] {
         self.cells
     }

@@ -11,7 +11,7 @@ pub struct Effort {
     pub wall_s: f64,
     /// Elapsed time of all workers in seconds.
     worked_s: f64,
-    /// The part of it that was spent on simulation.
+    /// The part of that time spent on simulation.
     simulated_s: f64,
     /// Number of runs.
     pub runs: u64,

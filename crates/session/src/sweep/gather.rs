@@ -19,7 +19,7 @@ pub(super) fn share_of(shard: Shard) -> Share {
     Share { index: shard.index, count: shard.count }
 }
 
-/// Refuses another build: results may change between builds, so only one makes all runs.
+/// Refuses another build: results may change between builds, so a single one makes all runs.
 pub(super) fn check_build(folder: &Folder) -> Result<(), InputError> {
     let manifest = folder.manifest();
     let maker = Maker { version: manifest.program_version.clone(), build: manifest.build.clone() };

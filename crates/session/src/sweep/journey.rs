@@ -1,4 +1,4 @@
-//! The way from a sweep to the table of its runs: in memory, in a folder, or share by share.
+//! The path from a sweep to the table of its runs: in memory, in a folder, or share by share.
 
 use super::crew::Engine;
 use super::effort::Effort;
@@ -36,7 +36,7 @@ pub struct Done {
     pub table: RunTable,
     /// The time that they took in this process.
     pub effort: Effort,
-    /// Whether they were finished already.
+    /// Whether all were already finished before.
     pub was_done: bool,
 }
 
@@ -82,7 +82,7 @@ pub fn in_memory<'a>(
     Ok((plan, ended))
 }
 
-/// Plans a sweep into a folder, on so many workers: completely or not at all.
+/// Plans a sweep into a folder, on a number of workers: completely or not at all.
 ///
 /// # Errors
 /// When the sweep is wrong, or the folder is taken.
@@ -122,7 +122,7 @@ pub fn planned_or_there(
     }
 }
 
-/// Opens the sweep in the folder, which must be this one.
+/// Opens the sweep in the folder, which must be the given one.
 fn the_same(
     worlds: Worlds,
     sweep: &Sweep,
@@ -163,7 +163,7 @@ pub fn go_on<'a>(
     let mut log = Log::new(folder.plan());
     gather(folder, Some(Shard::ALL), |outcome| log.note(&outcome))?;
     let mut effort = Effort::default();
-    // Locked until all is joined, so that nobody else begins to join.
+    // Locked until everything is joined, so that no other process begins to join.
     let mut journal = folder.journal(share_of(Shard::ALL), |o: Outcome| log.note(&o))?;
     if let Some(journal) = &mut journal {
         with_work(worlds, folder, engine.into(), watcher, |work| {
@@ -179,7 +179,7 @@ pub fn go_on<'a>(
     joined(folder, PILE, effort, watcher)
 }
 
-/// Joins all runs into the sweep's tables, in blocks of so many cells: only as many are in memory at a time.
+/// Joins all runs into the sweep's tables, in blocks of a number of cells: only one block is in memory at a time.
 fn joined(
     folder: &Folder,
     cells: u64,
@@ -208,7 +208,7 @@ fn joined(
         Ok(())
     })?;
     completion.map_or(Ok(()), Completion::finish)?;
-    // A table of several blocks is read again once all that joined them is out of the memory.
+    // A table of several blocks is read again once the data that joined them is out of memory.
     let table = match only {
         Some(table) => table,
         None => finished(folder)?.table,
@@ -271,7 +271,7 @@ pub fn share(
     Ok(Done::now(table, effort))
 }
 
-/// Returns the finished runs of the cells of a share, whoever made them.
+/// Returns the finished runs of the cells of a share, regardless of their maker.
 fn finished_of(folder: &Folder, shard: Shard) -> Result<RunTable, Error> {
     let own: BTreeSet<u64> = folder.plan().share(shard).map(|c| c.id).collect();
     let mut rows = Rows::default();
@@ -309,7 +309,7 @@ pub fn collect(folder: &Folder, watcher: &dyn Watcher) -> Result<Ended, Error> {
     joined(folder, PILE, Effort::default(), watcher)
 }
 
-/// Passes on what is needed to run the cells of a folder.
+/// Passes on everything needed to run the cells of a folder.
 fn with_work(
     worlds: Worlds,
     folder: &Folder,
@@ -339,7 +339,7 @@ fn with_work(
     run(&Work { worlds, agents: plan.agents, source: &source, record, engine, watcher })
 }
 
-/// Adds to an error of storing which runs are saved, and how to continue.
+/// Adds to a storage error the runs that are saved, and words for continuing.
 fn saved(error: Error, folder: &Path) -> Error {
     match error {
         Error::Record(error) => {
@@ -350,7 +350,7 @@ fn saved(error: Error, folder: &Path) -> Error {
     }
 }
 
-/// The finished runs, as far as it takes to know which come next: a number for each.
+/// The finished runs, as far as needed to choose the next ones: a number for each.
 struct Log<'a> {
     plan: &'a Plan,
     finished: Vec<u64>,
@@ -460,7 +460,7 @@ mod tests {
         folder
     }
 
-    /// Columns that come and go, and one whose type only a late cell tells.
+    /// Columns that come and go, and one with a type that only a late cell reveals.
     fn outcome(cell: Cell) -> Outcome {
         let value = if cell.id == 555 { json!(0.5) } else { json!(cell.id) };
         let mut metrics = serde_json::Map::from_iter([("wide".to_string(), value)]);

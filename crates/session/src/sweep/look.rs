@@ -40,8 +40,8 @@ pub fn finished(folder: &Folder) -> Result<Finished, InputError> {
     Ok(Finished { table: rows.table(folder.plan())?, is_complete: false })
 }
 
-/// Returns the picture of the run of a cell that came to `digest`, as SVG: from its run folder, or from a run made again
-/// for it. If there is none of that very run, the reason.
+/// Returns the picture of the run of a cell that ended with `digest`, as SVG: from its run folder, or from a repeated
+/// run. If there is none of that very run, returns the reason.
 ///
 /// # Errors
 /// When nothing can be stored, or the watcher asks to stop.

@@ -2,13 +2,13 @@
 //!
 //! ```text
 //! prepare.rs   every variant compiled, a plan     work.rs      cells -> outcomes, many at once
-//! journey.rs   from the plan to the table         effort.rs    the time that all took
+//! journey.rs   from the plan to the table         effort.rs    the time of all runs
 //! gather.rs    the folder, and the finished runs in it
-//! crew.rs      others who run cells            task.rs      cells that another process sends
+//! crew.rs      runners outside                    task.rs      cells that another process sends
 //! piles.rs     finished runs -> the table, in blocks
 //! told.rs      the results, for programs
 //! look.rs      finished runs, for reports         stamped.rs   lines of a journal
-//! status.rs    a sweep that others work on
+//! status.rs    a sweep in progress elsewhere
 //! ```
 
 mod crew;

@@ -1,7 +1,7 @@
 //! Finished runs in any order -> the table of runs, block by block, within a bounded memory.
 //!
-//! Each outcome is laid on the pile of its cell: [`PILE`] cells that follow each other. A sweep of one pile is joined in
-//! memory; of more, piles are files, read one by one, and one below the other they are the table.
+//! Each outcome is put on the pile of its cell: [`PILE`] consecutive cells. A sweep of one pile is joined in memory;
+//! with more, piles are files, read one by one, and one below the other they form the table.
 
 use super::gather::Folder;
 use crate::Error;
@@ -33,7 +33,7 @@ enum Kept {
 }
 
 impl<'a> Piles<'a> {
-    /// Makes room for all runs of a sweep, in piles of so many cells.
+    /// Makes room for all runs of a sweep, in piles of a number of cells.
     ///
     /// # Errors
     /// When files cannot be made.
@@ -56,7 +56,7 @@ impl<'a> Piles<'a> {
         Ok(Self { plan, shape, trials, cells, kept, failure: None })
     }
 
-    /// Lays an outcome on its pile, unless it is none of the plan's.
+    /// Puts an outcome on its pile, unless it is not in the plan.
     pub(super) fn put(&mut self, outcome: &Outcome) {
         if self.failure.is_some() || self.plan.cell_of(outcome.cell).is_none() {
             return;

@@ -11,14 +11,14 @@ use sidestep::kernel::InputError;
 use sidestep::scenario::{Compiled, Seeds, Source, Worlds, nearest};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// A plan, and what was made of each variant, by its number.
+/// A plan, and the thing made of each variant, by its number.
 pub(super) type Prepared<T> = (Plan, Vec<T>);
 
-/// A function that makes something of a variant: of its number, its scenario, and what that compiles to.
+/// A function that makes a thing of a variant: of its number, its scenario, and the compiled scenario.
 pub(super) type Make<'a, T> = &'a (dyn Fn(u32, &Source, &dyn Compiled) -> Result<T, Error> + Sync);
 
-/// Compiles every variant on so many workers, makes of each what `make` makes, and returns it with the plan. Whatever the
-/// number of workers, the error is that of the first variant that has one.
+/// Compiles every variant on a number of workers, calls `make` for each, and returns the results with the plan. With
+/// any number of workers, the error is that of the first variant that has one.
 ///
 /// # Errors
 /// When the design or a variant is wrong, `make` fails, or the watcher asks to stop.
@@ -59,19 +59,19 @@ pub(super) fn prepare<T: Send>(
     let plain = first.plan();
     let base = Base { world: first.world(), seed: plain.seed, source: &base };
     let plan = Plan::new(sweep, variants, base)?;
-    // A sweep without a name of its own goes by that of its scenario.
+    // A sweep without a name of its own has that of its scenario.
     let name = if plan.name.is_empty() { plain.name } else { plan.name };
     Ok((Plan { agents, name, ..plan }, made))
 }
 
-/// The findings of compiling a variant, and the thing that was made of it.
+/// The findings of compiling a variant, and the thing made of it.
 struct One<T> {
     seeds: Seeds,
     agents: u64,
     made: T,
 }
 
-/// Does the work for each variant, on so many workers, and returns what came of it in the order of the variants.
+/// Does the work for each variant, on a number of workers, and returns the results in the order of the variants.
 ///
 /// # Errors
 /// That of the first variant that has one, or when the watcher asks to stop.
@@ -82,7 +82,7 @@ fn each<T: Send>(
     work: &(dyn Fn(u32, &Variant) -> Result<T, Error> + Sync),
 ) -> Result<Vec<T>, Error> {
     let cells: Vec<(u32, &Variant)> = (0..).zip(variants).collect();
-    // Those before a wrong one are done to their end, as one of them may be wrong, too.
+    // Variants before a wrong one are completed, because one of them may be wrong, too.
     let wrong_at = AtomicU32::new(u32::MAX);
     let run = |(k, variant): &(u32, &Variant)| {
         let is_wanted = watcher.go_on() && *k < wrong_at.load(Ordering::Relaxed);
@@ -107,7 +107,7 @@ fn each<T: Send>(
     if found.len() < variants.len() { Err(Error::Interrupted) } else { Ok(found) }
 }
 
-/// Returns the scenario with what all variants share.
+/// Returns the scenario with the settings that all variants share.
 fn base(worlds: Worlds, sweep: &Sweep, fixed: &[String]) -> Result<Source, InputError> {
     match &sweep.given {
         Some(source) => source.clone().with(fixed),
@@ -148,8 +148,8 @@ fn variant(
     Ok((source, compiled))
 }
 
-/// Returns the error of a variant, which names the variant unless all have it: the lines of the text
-/// that its settings have edited are nobody's.
+/// Returns the error of a variant, which names the variant unless all have it: users do not see the
+/// lines of the text that its settings have edited.
 fn of_variant(
     wanted: &Variant,
     base: &Source,

@@ -1,10 +1,10 @@
-//! Lines of a journal: the outcome of a run, and when it came in.
+//! Lines of a journal: the outcome of a run, and its time of arrival.
 
 use serde::{Deserialize, Serialize};
 use sidestep::experiment::sweep::Outcome;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// An outcome with the time at which it was stored. Whoever reads outcomes alone sees no difference: no result depends on
+/// An outcome with the time at which it was stored. Readers of outcomes alone see no difference: no result depends on
 /// a clock.
 #[derive(Debug, Serialize)]
 pub(super) struct Stamped<'a> {
@@ -13,7 +13,7 @@ pub(super) struct Stamped<'a> {
     ended_unix_s: f64,
 }
 
-/// The same, as it is read back.
+/// The same, as read back.
 #[derive(Debug, Deserialize)]
 pub(super) struct Read {
     #[serde(flatten)]

@@ -1,4 +1,4 @@
-//! The state of a sweep that others work on, as its folder tells it; looking changes nothing.
+//! The state of a sweep that other processes work on, read from its folder; looking changes nothing.
 
 use super::gather::{Folder, check_variants, share_of, table_of};
 use super::stamped::{Read, now_unix_s};
@@ -8,13 +8,13 @@ use sidestep::kernel::InputError;
 use sidestep_record::sweep::Share;
 use std::collections::BTreeSet;
 
-/// Runs that came in within this many seconds before the last one tell the rate.
+/// The span in seconds before the last run from which runs give the rate.
 const WINDOW_S: f64 = 600.0;
-/// Whoever works on a sweep has finished a run within as many times the usual time between two,
+/// The idle time, in usual times between two runs, after which a sweep counts as abandoned,
 const IDLE_RUNS: f64 = 10.0;
-/// or within this many seconds.
+/// but not before this many seconds.
 const IDLE_S: f64 = 60.0;
-/// Largest number of failed runs that are told one by one.
+/// Largest number of failed runs that are listed one by one.
 const MOST_TOLD: usize = 100;
 
 /// The state of a sweep.
@@ -24,7 +24,7 @@ pub struct Status {
     pub is_complete: bool,
     /// Number of finished runs, those that failed among them.
     pub runs: u64,
-    /// Number of runs that there will be; at most as many where a precision ends the sweep.
+    /// Number of planned runs; an upper bound if a precision ends the sweep.
     pub of: u64,
     /// Whether a precision ends the sweep.
     pub until_precise: bool,
@@ -32,17 +32,17 @@ pub struct Status {
     pub failed: usize,
     /// The first of them.
     pub failures: Vec<Failure>,
-    /// Whether somebody works on it, by the locks of its journals; where there are no locks, by how long ago the last
-    /// runs came in.
+    /// Whether a process works on it, by the locks of its journals; where there are no locks, by the time since the
+    /// last runs came in.
     pub is_worked_on: bool,
-    /// The shares that somebody has begun, in order.
+    /// The shares that have been begun, in order.
     pub shares: Vec<ShareStatus>,
-    /// Finished runs per second of late; none before the second run, and none once it is complete.
+    /// Recent rate of finished runs per second; none before the second run, and none once the sweep is complete.
     pub runs_per_s: Option<f64>,
     /// Seconds since the last run came in.
     pub idle_s: Option<f64>,
-    /// Seconds until the last run comes in, if all goes on as of late; none where nobody seems to work on it, and
-    /// where a precision ends it.
+    /// Seconds until the last run comes in, at the recent rate; none if no process seems to work on it, or if a
+    /// precision ends it.
     pub left_s: Option<f64>,
 }
 
@@ -66,11 +66,11 @@ pub struct ShareStatus {
     pub share: String,
     /// Number of finished runs that it has.
     pub runs: u64,
-    /// Number of runs that it is to have; at most as many where a precision ends the sweep.
+    /// Number of its planned runs; an upper bound if a precision ends the sweep.
     pub of: u64,
     /// Whether it is done.
     pub is_done: bool,
-    /// Seconds since its last run came in; none for one that is done.
+    /// Seconds since its last run came in; none if it is done.
     pub idle_s: Option<f64>,
 }
 
@@ -156,7 +156,7 @@ fn share_status(
             ended_unix_s.map(|s| newest_s.map_or(s, |newest_s| newest_s.max(s))).or(newest_s);
     });
     if let Err(error) = read {
-        // A share that has ended meanwhile has no journal any more.
+        // A share that has ended meanwhile no longer has a journal.
         return match folder.shares()?.contains(&(share, true)) {
             true => Ok(done()),
             false => Err(error),
@@ -166,7 +166,7 @@ fn share_status(
     Ok(ShareStatus { share: shard.to_string(), runs, of, is_done: false, idle_s })
 }
 
-/// Returns the runs per second of late.
+/// Returns the recent rate of runs per second.
 fn rate(stamps: &[f64], newest_s: f64) -> Option<f64> {
     let late: Vec<f64> = stamps.iter().copied().filter(|s| newest_s - s <= WINDOW_S).collect();
     let oldest_s = late.iter().copied().fold(newest_s, f64::min);
@@ -179,17 +179,17 @@ fn left_s(left: u64, runs_per_s: Option<f64>, idle_s: Option<f64>) -> Option<f64
     (!is_long(idle_s, Some(runs_per_s))).then(|| left as f64 / runs_per_s)
 }
 
-/// Returns whether nobody has finished a run for longer than whoever works on a sweep takes.
+/// Returns whether no run has finished for longer than a sweep in progress would take.
 fn is_long(idle_s: f64, runs_per_s: Option<f64>) -> bool {
     idle_s > runs_per_s.map_or(IDLE_S, |runs_per_s| IDLE_S.max(IDLE_RUNS / runs_per_s))
 }
 
-/// Returns whether somebody works on one of the shares that are begun and not done.
+/// Returns whether a process works on one of the shares that are begun and not done.
 fn is_worked_on(folder: &Folder, shares: &[ShareStatus], runs_per_s: Option<f64>) -> bool {
     shares.iter().filter(|share| !share.is_done).any(|share| {
         let shard: Option<Shard> = share.share.parse().ok();
         let locked = shard.and_then(|shard| folder.is_locked(share_of(shard)));
-        // A share without a run may be at its first one for as long as it likes.
+        // A share without a finished run may take any time for its first one.
         let may_be = || share.idle_s.is_none_or(|idle_s| !is_long(idle_s, runs_per_s));
         locked.unwrap_or_else(may_be)
     })

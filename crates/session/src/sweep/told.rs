@@ -9,7 +9,8 @@ use sidestep::experiment::sweep::rounds::stopped;
 use sidestep::experiment::sweep::{Plan, RunTable, Summary};
 
 impl Done {
-    /// Returns what `sidestep sweep --json` prints: the summary, how many runs failed, and what stopped each variant.
+    /// Returns the output of `sidestep sweep --json`: the summary, the number of failed runs, and the reason why each
+    /// variant stopped.
     pub fn told(&self, plan: &Plan, folder: Option<&Folder>, summary: &Summary) -> Value {
         json!({
             "status": "complete",
@@ -35,7 +36,7 @@ pub fn failed(table: &RunTable) -> impl Iterator<Item = usize> {
 }
 
 impl Effort {
-    /// Returns it for programs.
+    /// Returns the status for programs.
     pub fn told(&self) -> Value {
         json!({
             "runs": self.runs,

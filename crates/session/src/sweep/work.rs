@@ -16,7 +16,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Number of agents from which a world fills the caches alone: such runs are made one after
+/// Number of agents from which a single world fills the caches: such runs are made one after
 /// another, each on all workers, which also bounds the memory.
 const LARGE: u64 = 20_000;
 
@@ -68,7 +68,7 @@ impl Work<'_> {
         }
     }
 
-    /// Lets a crew run the cells. Whichever outcome of a cell comes first counts.
+    /// Lets a crew run the cells. The first outcome of a cell counts.
     fn dealt(&self, crew: &dyn Crew, cells: &[Cell], take: &mut Take<'_>) -> Result<(), Error> {
         let mut open: BTreeSet<u64> = cells.iter().map(|cell| cell.id).collect();
         let Self { worlds, source, .. } = *self;
@@ -78,7 +78,7 @@ impl Work<'_> {
         })
     }
 
-    /// Returns how many of `runs` are in progress at once; each has its part of the workers.
+    /// Returns the number of `runs` in progress at once; each has its part of the workers.
     pub(super) fn at_once(&self, runs: usize) -> usize {
         let most = match self.engine {
             Engine::Crew(crew) => crew.at_once(),
@@ -131,8 +131,8 @@ impl Work<'_> {
     }
 }
 
-/// Runs a cell into a run folder of its own; `None` if it was interrupted. A folder that a kill has
-/// left is started again.
+/// Runs a cell into a run folder of its own; `None` if it was interrupted. A folder left by a
+/// killed process is started again.
 ///
 /// # Errors
 /// When the scenario is wrong with this seed, or something cannot be stored.

@@ -1,4 +1,4 @@
-//! Folders in which something is not as it was written: they are refused, and nothing panics.
+//! Folders changed after they were written: they are refused, and nothing panics.
 
 use crate::support::{Place, WORLDS, edit};
 use crate::sweeps::sweep;
@@ -16,7 +16,7 @@ fn refused<T>(result: Result<T, impl Into<Error>>, cause: &str) {
     assert!(told.contains(cause) && told.contains("help"), "{told}");
 }
 
-/// Asks everybody who reads a sweep; each refuses it for this reason.
+/// Calls every reader of a sweep; each refuses it for this reason.
 fn refused_by_all(path: &Path, cause: &str) {
     let open = || Folder::open(path).map_err(Error::from);
     refused(open().and_then(|folder| Ok(status(&folder)?)), cause);

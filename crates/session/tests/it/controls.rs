@@ -1,4 +1,4 @@
-//! Promise D1, D2: a run that was flown by pilots outside of it is computed again from its folder, also where some
+//! Promise D1, D2: a run that was flown by pilots outside of it is computed again from its folder, even if some
 //! of their controls are missing.
 
 use sidestep::kernel::EntityId;
@@ -75,7 +75,7 @@ fn a_run_that_was_flown_from_outside_is_replayed_from_its_controls() {
     }
 }
 
-/// Whoever served it is gone: pilots in memory fly on, and the whole run is computed again.
+/// The server is gone: pilots in memory fly on, and the whole run is computed again.
 #[test]
 fn a_run_that_lost_its_server_goes_on_by_itself_and_is_replayed() {
     let dir = tempfile::tempdir().expect("a folder");

@@ -1,4 +1,4 @@
-//! Links to folders, in whose place something is written: they stay, and what they lead to is filled.
+//! Links to folders as places of results: they stay, and their targets are filled.
 
 use crate::exports::wanted;
 use crate::support::{Place, WORLDS};

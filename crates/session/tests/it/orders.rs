@@ -61,7 +61,7 @@ fn a_run_that_lost_its_deciders_is_not_resumed_without_them() {
     replay_to(&again, 119, 1, &Unwatched).expect("what was recorded can be looked at");
 }
 
-/// Returns the cycles of the poses that are kept, each once, and takes all rows.
+/// Returns the cycles of the kept poses, each once, and takes all rows.
 fn taken(journey: &mut Journey) -> Vec<u64> {
     let tables = journey.take_rows().expect("rows");
     let poses = tables.iter().find(|(schema, _)| schema.name == "trajectories").expect("poses");
@@ -90,7 +90,7 @@ fn rows_in_memory_never_tell_of_two_pasts_and_have_no_hole() {
     assert!(matches!(refused, RestoreError::Astray { from: 0, now: 25, of: 33 }), "{refused}");
     assert_eq!((journey.cycle(), journey.simulation().digest()), (25, digest));
     assert_eq!(taken(&mut journey), (0..25).collect::<Vec<_>>());
-    // Nothing is kept of another past any more.
+    // Nothing of another past is kept any longer.
     journey.restore(&at_33).expect("of the same scenario");
     advance(&mut journey, 38);
     assert_eq!(taken(&mut journey), (33..38).collect::<Vec<_>>());

@@ -57,7 +57,7 @@ fn the_status_counts_each_run_once_and_tells_those_that_failed() {
     let folder = planned(WORLDS, &sweep, &place.path("s"), 2, &Unwatched).expect("planned");
     let shard: Shard = "1/2".parse().expect("a share");
     share(WORLDS, &folder, shard, 1, &Unwatched).expect("run");
-    // A run of that share again, one of another build of the shares, and one that failed.
+    // A run of that share again, from another division into shares, and one that failed.
     let journal = place.path("s/shares/0-of-1.journal");
     let outcome =
         |cell: u64| Outcome::failed(folder.plan().cell_of(cell).expect("a cell"), "no frogs");
@@ -105,7 +105,7 @@ fn runs_of_a_sweep_are_recorded_and_reported() {
     }
 }
 
-/// Others who get tasks, the last cells first, and do only some of them in a call.
+/// A crew outside that gets tasks, the last cells first, and does only some of them in a call.
 struct Others {
     in_a_call: usize,
 }

@@ -86,7 +86,7 @@ impl<T> Cells<T> {
         self.mask.0.as_deref()
     }
 
-    /// Returns the values as they lie in memory, and the mask of those that there are, without a copy.
+    /// Returns the values as they lie in memory, and the mask of those that are not missing, without a copy.
     pub fn into_parts(self) -> (Vec<T>, Option<Vec<bool>>) {
         (self.values, self.mask.0)
     }

@@ -121,13 +121,13 @@ impl<R> Table<R> {
         self
     }
 
-    /// Says what holds for all rows, by name: see [`TableSchema::about`].
+    /// Sets facts about all rows, by name: see [`TableSchema::about`].
     #[must_use]
     pub fn about(self, about: Vec<(String, String)>) -> Self {
         Self { about, ..self }
     }
 
-    /// Returns its name and columns, and what holds for all rows.
+    /// Returns its name and columns, and the facts about all rows.
     pub fn schema(&self) -> TableSchema {
         let columns = self.columns.iter().map(|column| column.spec.clone()).collect();
         TableSchema { about: self.about.clone(), ..TableSchema::new(&self.name, columns) }

@@ -9,7 +9,7 @@
 //! buffer.rs   rows that wait to be recorded
 //! ```
 //!
-//! The values of a column lie as Arrow wants them: one after the other, with a mask beside them
+//! The values of a column lie as Arrow requires: one after the other, with a mask beside them
 //! only where some are missing; text as offsets into one string.
 
 mod buffer;

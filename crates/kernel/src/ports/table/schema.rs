@@ -50,7 +50,7 @@ impl ColumnSpec {
     }
 }
 
-/// One table: name, columns, and what holds for all of its rows.
+/// One table: name, columns, and facts about all of its rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TableSchema {
     /// File stem, e.g. `trajectories`.
@@ -63,7 +63,7 @@ pub struct TableSchema {
 }
 
 impl TableSchema {
-    /// Creates a table of which nothing else is to be known.
+    /// Creates a table without further facts.
     pub fn new(name: impl Into<String>, columns: Vec<ColumnSpec>) -> Self {
         Self { name: name.into(), columns, about: Vec::new() }
     }

@@ -32,7 +32,7 @@ const UNITS: [(&str, &str); 27] = [
 ];
 
 /// Splits a name into quantity and unit: `min_separation_m` is `min_separation`, in m. A name, or
-/// the last part of a path, that is nothing but an ending has no unit.
+/// the last part of a path, that consists only of an ending has no unit.
 pub fn split_unit(name: &str) -> (&str, Option<&'static str>) {
     let split = UNITS.iter().find_map(|(ending, unit)| {
         let quantity = name.strip_suffix(ending)?;

@@ -1,5 +1,5 @@
-//! Questions to the other end of a link. Its session answers by itself, however busy its node is: a link over which no
-//! answer comes is deaf.
+//! Questions to the other end of a link. Its session answers by itself, however busy its node is: a link without
+//! answers is deaf.
 
 use super::put;
 use sidestep::kernel::EntityId;
@@ -33,8 +33,8 @@ impl Default for Echoes {
 }
 
 impl Echoes {
-    /// Returns the function of node `me` that answers questions, takes answers, and leaves mail alone: whether it was no
-    /// mail. It is called by a thread of the session.
+    /// Returns the function of node `me` that answers questions, takes answers, and leaves mail alone; it returns
+    /// whether the frame was no mail. It is called by a thread of the session.
     pub(super) fn taking(
         &self,
         me: EntityId,
@@ -49,7 +49,7 @@ impl Echoes {
                 (QUESTION, Ok(from)) => send(&session, me, from, ANSWER),
                 // The receiver is gone when the wire is.
                 (ANSWER, Ok(from)) => drop(answers.send(from)),
-                // From a build of another day.
+                // From another build.
                 _ => {}
             }
             true
@@ -75,7 +75,7 @@ impl Echoes {
         now.duration_since(*first) > within
     }
 
-    /// Forgets all questions, as where links are new.
+    /// Forgets all questions, as needed where links are new.
     pub(super) fn forget(&mut self) {
         self.asked.clear();
     }

@@ -1,4 +1,4 @@
-//! Traps of Zenoh that this wire goes around, each shown to be one, on loopback.
+//! Pitfalls of Zenoh that this wire avoids, each shown to be one, on loopback.
 
 use super::*;
 use crate::mail::{Heard, Mail};
@@ -9,10 +9,10 @@ use std::net::{TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Time that nothing here takes.
+/// Time longer than anything here takes.
 const LONG: Duration = Duration::from_secs(30);
 
-/// Time in which a frame on loopback has come a hundred times over.
+/// A hundred times the time that a frame on loopback takes.
 const SOON: Duration = Duration::from_millis(300);
 
 const A: Party = Party::Node(1);
@@ -43,7 +43,8 @@ fn reaches(from: &mut Line, to: Party, arrived: &Receiver<Vec<u8>>) {
     }
 }
 
-/// A hub that is a peer hears both leaves, and they do not hear each other: nobody says so. Through a router they do.
+/// A hub that is a peer hears both leaves, and they do not hear each other, without any notice. Through a router they
+/// do.
 #[test]
 fn a_peer_does_not_relay_and_a_router_does() {
     for (hub, leaf, relays) in [("peer", "peer", false), ("router", "client", true)] {
@@ -110,7 +111,7 @@ fn a_frame_for_all_others_comes_once_to_each_of_them_and_to_nobody_else() {
     }
 }
 
-/// A way between two ends that can be cut: then it takes what is sent, as a network without a cable does, and
+/// A cable between two ends that can be cut: then it takes all bytes, as a network without a cable does, and
 /// nothing arrives.
 struct Cable {
     endpoint: String,
@@ -159,7 +160,7 @@ fn carry(mut from: TcpStream, mut to: TcpStream, is_cut: &AtomicBool) -> Option<
 }
 
 /// In a partition a put succeeds and its frame is gone; letters come when it is over. The link is given up within its
-/// lease, and opened again within seconds, as both time limits of opening are one: Zenoh's own are ten.
+/// lease, and opened again within seconds, because both time limits of opening are short: Zenoh's own are ten.
 #[test]
 fn frames_vanish_in_a_partition_and_letters_do_not() {
     let server = free();
@@ -195,15 +196,15 @@ fn frames_vanish_in_a_partition_and_letters_do_not() {
     assert!(!hear(&mut node, Word::Hello, SOON), "a note that was cut off is gone");
 }
 
-/// Carries what one end of a link sends, but from the third frame on only those of one byte, signs of life, while the link
-/// is deaf.
+/// Carries the frames of one end of a link, but from the third on only those of one byte, signs of life, while the
+/// link is deaf.
 fn carry_deaf(mut from: TcpStream, mut to: TcpStream, is_deaf: bool) -> std::io::Result<()> {
     for k in 0.. {
         let mut length = [0; 2];
         from.read_exact(&mut length)?;
         let mut frame = vec![0; usize::from(u16::from_le_bytes(length))];
         from.read_exact(&mut frame)?;
-        // Two open the link.
+        // Two frames open the link.
         if k < 2 || frame.len() == 1 || !is_deaf {
             to.write_all(&length)?;
             to.write_all(&frame)?;
@@ -235,8 +236,8 @@ fn deaf_at_first(server: &str) -> String {
     endpoint
 }
 
-/// Returns a server's endpoint with two nodes in a mesh, and what each is to the other; the second sees the first at an
-/// endpoint that is made of its own.
+/// Returns a server's endpoint with two nodes in a mesh, and each as a member for the other; the second sees the
+/// first at an endpoint made from its own.
 fn two_in_a_mesh(seen: impl Fn(&str) -> String) -> ([ZenohWire; 3], Vec<Member>) {
     let at = [free()];
     let hub = ZenohWire::server(&at, None).expect("a server");
@@ -264,7 +265,7 @@ fn is_open(wire: &ZenohWire, member: &Member) -> bool {
     wire.mesh.as_ref().is_some_and(|mesh| mesh.is_open_to(member))
 }
 
-/// Waits until something is so, which it is at some time.
+/// Waits until something holds, as it will at some time.
 fn until(mut is_so: impl FnMut() -> bool) {
     let until = Instant::now() + LONG;
     while !is_so() {
@@ -273,7 +274,8 @@ fn until(mut is_so: impl FnMut() -> bool) {
     }
 }
 
-/// A link over which signs of life come and nothing else: Zenoh keeps it for good, and the wire sees it and opens it anew.
+/// A link over which signs of life come and nothing else: Zenoh keeps it for good, and the wire notices it and opens
+/// it again.
 #[test]
 fn a_link_that_lives_and_is_deaf_is_found_out_and_opened_anew() {
     let ([_hub, mut first, mut second], members) = two_in_a_mesh(deaf_at_first);
@@ -330,7 +332,7 @@ fn links_that_could_not_be_opened_are_opened_at_another_time() {
     assert_eq!(first.receive(LONG).as_deref(), Some(&b"frame"[..]));
 }
 
-/// An end that takes connections and answers nobody, as one behind a cut cable, holds up nobody for long.
+/// An end that takes connections and never answers, as one behind a cut cable, holds up no other for long.
 #[test]
 fn a_link_that_is_not_answered_is_tried_again_soon() {
     let server = free();

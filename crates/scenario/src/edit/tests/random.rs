@@ -1,4 +1,4 @@
-//! Random edits of all scenarios of this repository: the text outside of what they name stays, and the values become
+//! Random edits of all scenarios of this repository: the text that they do not name stays, and the values become
 //! those that a second, plain way of editing gives.
 
 use super::{insert, relocate, remove, rename, set};
@@ -28,7 +28,7 @@ fn texts() -> Vec<String> {
     texts
 }
 
-/// A way into values: keys, and numbers of elements.
+/// A path into values: keys, and numbers of elements.
 type Way = Vec<Result<String, usize>>;
 
 fn ways(value: &Value, way: &mut Way, found: &mut Vec<Way>) {
@@ -131,7 +131,7 @@ fn any_value() -> impl Strategy<Value = serde_json::Value> {
     ]
 }
 
-/// Returns an edit of a random kind at a random place, with its way; nothing where it does not fit.
+/// Returns an edit of a random kind at a random place, with its way; `None` where it does not fit.
 fn edit_at(root: &mut Value, pick: &(usize, u8, usize, serde_json::Value)) -> Option<(Way, Edit)> {
     let (place, kind, at, value) = pick;
     let mut all = Vec::new();
@@ -140,7 +140,7 @@ fn edit_at(root: &mut Value, pick: &(usize, u8, usize, serde_json::Value)) -> Op
     let count = get(root, &way).as_array().map(Vec::len);
     let is_list = get(root, &way).as_array().is_some_and(|items| items.iter().all(Value::is_table));
     let edit = match kind {
-        // A section of a list can be nothing but a table.
+        // A section of a list can only be a table.
         0 | 1 if way.last().is_some_and(Result::is_err) && get(root, &way).is_table() => {
             return None;
         }
@@ -200,7 +200,7 @@ proptest! {
             let edited = edited.unwrap_or_else(|error| panic!("{edit:?}: {error}\n{}", source.text));
             edit_values(&mut root, &way, &edit);
             prop_assert_eq!(plain(&parsed(&edited.text)), plain(&root), "{:?}\n{}", edit, edited.text);
-            // What is not TOML at all: comments that stand apart from what is below them.
+            // Text that is no TOML at all: comments set apart from the lines below them.
             let lines: Vec<&str> = source.text.lines().collect();
             let is_apart = |at: &usize| lines[*at].starts_with('#')
                 && lines[at + 1..].iter().find(|line| !line.starts_with('#')).is_none_or(|line| line.is_empty());
@@ -264,7 +264,7 @@ proptest! {
                 (insert(&key(way), Some(at), value), format!("{}.{at}", key(way)))
             }
             Value::Table(_) => {
-                // A header that is made for it stays.
+                // A header that was made for it stays.
                 let document = source.text.parse::<toml_edit::DocumentMut>().expect("TOML");
                 let item = way.iter().fold(document.as_item(), |item, step| match step {
                     Ok(name) => &item[name.as_str()],

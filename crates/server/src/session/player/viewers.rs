@@ -1,4 +1,4 @@
-//! Viewers beside the page: what they are shown, and what they want.
+//! Viewers beside the page: their views, and their wishes.
 
 use super::Player;
 use crate::SPEEDS;
@@ -16,7 +16,7 @@ impl Player {
         self.showing.begin(run, &self.scenery, end_s).map_err(|e| stopped(&e))
     }
 
-    /// Shows the run to viewers beside the page, and does what they want.
+    /// Shows the run to viewers beside the page, and follows their wishes.
     pub(super) fn attend_viewers(&mut self, now: Instant) {
         let playback = self.playback();
         let run = self.stage.run.as_mut();
@@ -35,7 +35,7 @@ impl Player {
         }
     }
 
-    /// Returns what viewers beside the page are told.
+    /// Returns the state of playback for viewers beside the page.
     fn playback(&self) -> Playback {
         let goes_on = self.errand.is_some_and(|errand| errand.then.is_some());
         let playing = match self.state {

@@ -8,7 +8,7 @@ use std::time::Instant;
 /// A way to a cycle that a page waits for.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Errand {
-    /// The request that is answered on arrival; none of a viewer's.
+    /// The request that is answered on arrival; none for a viewer's.
     pub(super) id: Option<u32>,
     pub(super) target: Cycle,
     /// The speed at which the run goes on from there.
@@ -16,7 +16,7 @@ pub(super) struct Errand {
 }
 
 impl Player {
-    /// Answers the request of a way that is not gone to its end.
+    /// Answers the request for a way that is given up before its end.
     pub(in super::super) fn give_up(&mut self, cause: &str) {
         if let Some(Errand { id: Some(id), target, .. }) = self.errand.take() {
             let place = format!("cycle {target}");
@@ -24,7 +24,7 @@ impl Player {
         }
     }
 
-    /// Goes some cycles on from where it is, or is going to: steps that are asked for faster than they are gone add up.
+    /// Goes some cycles on from where it is, or is going to: steps requested faster than they are done add up.
     pub(super) fn step(&mut self, id: u32, cycles: u32) {
         let from = self.errand.map_or(self.cycle(), |errand| errand.target);
         if let Some(Errand { id: Some(earlier), .. }) = self.errand.take() {
@@ -43,7 +43,7 @@ impl Player {
         if target < here || at > here {
             let run = self.stage.run.as_mut();
             self.viewer.drain(run, &mut self.memory.log, Instant::now());
-            // A bug ends the session, with what it says.
+            // A bug ends the session, with its message.
             run.restore(checkpoint).unwrap_or_else(|error| panic!("a keyframe: {error}"));
             self.digest = None;
             self.viewer.moved();

@@ -1,4 +1,4 @@
-//! Fleets that fly elsewhere: each view once, events once, no order taken, and the loss told.
+//! Fleets that fly elsewhere: each view once, events once, no order taken, and the loss reported.
 
 use super::*;
 use crate::screen::Screen;
@@ -8,7 +8,7 @@ use sidestep_session::fleet::{FleetNow, NodeNow, Seen, Staged};
 
 const AT: &str = "tcp/127.0.0.1:7600";
 
-/// A flight that somebody else computes.
+/// A flight that is computed elsewhere.
 struct Elsewhere {
     run: Box<dyn Simulation>,
     screen: Arc<Screen>,
@@ -30,14 +30,14 @@ impl Elsewhere {
         self.screen.begin(staged(self.run.as_ref()));
     }
 
-    /// Flies on and shows it, with all events so far.
+    /// Flies on and shows the flight, with all events so far.
     fn show(&mut self, cycles: u64, is_over: bool) {
         self.run.advance(cycles);
         self.number += 1;
         let mut frame = self.run.frame(Look::BODIES);
         self.events.append(&mut frame.log);
         frame.log.clone_from(&self.events);
-        // As connectors are: the number on the network is not that of the body.
+        // As with connectors: the number on the network is not that of the body.
         let node = |agent| NodeNow { agent, number: 4, part: Some(agent), ..NodeNow::default() };
         let (nodes, noun) = ((0..6).map(node).collect(), "connector".into());
         let fleet = FleetNow { cycle: frame.cycle, cycles: 40, noun, nodes, ..FleetNow::default() };

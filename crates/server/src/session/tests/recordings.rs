@@ -1,4 +1,4 @@
-//! Recordings: computed again by the build that made them, else shown from their own tables.
+//! Recordings: computed again by the build that made them, otherwise shown from their own tables.
 
 use super::*;
 use sidestep::kernel::view::{Frame, Look, Place, Who as Body};
@@ -21,7 +21,7 @@ fn path(folder: &tempfile::TempDir) -> PathBuf {
     folder.path().join("r")
 }
 
-/// Makes a recording one of another version of the program.
+/// Turns a recording into one of another version of the program.
 fn made_by_another(folder: &tempfile::TempDir) {
     let manifest = path(folder).join("run.json");
     let text = std::fs::read_to_string(&manifest).expect("a manifest");
@@ -147,7 +147,7 @@ fn a_film_of_another_build_has_its_events() {
     shown.advance(200);
     let shown = told(shown.frame(Look::BODIES));
     assert!(!shown.is_empty());
-    // The last event may come at the very end, which no frame of the film is behind.
+    // The last event may come at the very end, after the last frame of the film.
     then.retain(|event| event.0 < 200);
     assert_eq!(shown, then);
 }
@@ -183,7 +183,7 @@ fn a_recorded_run_is_computed_again_and_its_digest_confirmed() {
     let (mut page, opened) = opened(recorded(ROBOTS));
     assert_eq!(opened["answer"]["scene"]["is_recording"], true);
     assert!(banner(&opened["answer"]["status"]).contains("at the end"));
-    // Without being played, it is computed ahead: all events are known, and the digest is confirmed.
+    // Even without being played, it is computed ahead: all events are known, and the digest is confirmed.
     page.until("the verdict", |page| {
         let told = page
             .notices

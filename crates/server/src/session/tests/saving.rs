@@ -1,4 +1,4 @@
-//! Saves of a page: they read nothing elsewhere, make nothing but scenarios, and lose nobody's changes.
+//! Saves of a page: they read nothing elsewhere, make only scenarios, and never lose the changes of others.
 
 use super::*;
 use std::fs;
@@ -55,7 +55,7 @@ fn nothing_elsewhere_is_read_by_a_text_that_is_saved_and_opened() {
     let reply = page.save(&naming("../out/secret.map"), Some(&stolen), None, false);
     assert_eq!(reply["problem"]["place"], "../out/secret.map", "{reply}");
     assert!(!stolen.exists());
-    // What is named where the session is, is named elsewhere from a folder below.
+    // From a folder below, the same name leads elsewhere.
     let deep = inside.join("deep/x.toml");
     fs::create_dir(inside.join("deep")).expect("made");
     let reply = page.save(&naming("../../out/secret.map"), Some(&deep), None, false);
@@ -100,7 +100,7 @@ fn what_is_saved_is_a_scenario_or_a_text_that_cannot_be_read_yet() {
     };
     refuse(&mut page);
     assert!(!other.exists());
-    // Nor in two saves, over what may be saved.
+    // Nor in two saves, over a text that may be saved.
     for first in ["world = = 1", ROBOTS] {
         assert_eq!(page.save(first, Some(&other), None, true)["answer"]["is"], "saved");
         refuse(&mut page);
@@ -115,7 +115,7 @@ fn no_text_that_is_saved_is_read_as_a_map_or_a_floor_that_names_files_elsewhere(
     fs::write(inside.join("../out/secret.inc"), "speedup 3").expect("written");
     let map = "image: ../out/secret.pgm\nresolution: 0.05\norigin: [9, 9, 0]\nnegate: 0\n\
                occupied_thresh: 0.65\nfree_thresh: 0.196\n";
-    // A scenario by its `world`, and a map as well.
+    // A text that is a scenario, by its `world`, and a map as well.
     let both = format!("name = \"\"\": 1\n{map}last: |\n  \"\"\"\n  world = \"chain\"\n");
     let floor = "model ( bitmap \"../out/secret.pgm\" size [1 1 1] pose [9 9 0 0] )\n";
     let part = "include \"../out/secret.inc\"\n";
@@ -134,7 +134,7 @@ fn no_text_that_is_saved_is_read_as_a_map_or_a_floor_that_names_files_elsewhere(
 fn a_file_that_changed_while_its_page_was_cut_off_is_not_replaced_unasked() {
     let (mut page, inside) = page();
     let path = inside.join("s.toml");
-    // The session has read what another program has written since the page read the file.
+    // The session has read the text that another program has written since the page read the file.
     let before = ROBOTS.replace("seed = 5", "seed = 4");
     let mine = ROBOTS.replace("seed = 5", "seed = 6");
     let reply = page.save(&mine, None, Some(&before), false);

@@ -1,4 +1,4 @@
-//! Ways to a cycle that follow each other faster than they are gone.
+//! Ways to a cycle that follow each other faster than they are completed.
 
 use super::*;
 

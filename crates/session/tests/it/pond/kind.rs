@@ -10,7 +10,7 @@ use sidestep_scenario::{Compiled, Kind, Resolved, Source};
 use std::any::Any;
 use std::sync::Arc;
 
-/// The world of frogs on lily pads, as the list of worlds names it.
+/// The world of frogs on lily pads, an entry of the list of worlds.
 pub(crate) struct Pond;
 
 /// The sections of a scenario file.

@@ -34,7 +34,7 @@ pub(crate) struct PondState {
     frog: Column<u32>,
 }
 
-/// The state as it is saved.
+/// The state as saved.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Saved {
     pads: Vec<u32>,

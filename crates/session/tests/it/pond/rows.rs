@@ -1,4 +1,4 @@
-//! The tables that are recorded of a pond.
+//! The tables recorded of a pond.
 
 use super::{PondState, PondWorld};
 use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
