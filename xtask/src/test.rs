@@ -24,8 +24,12 @@ struct Part {
     environment: &'static [(&'static str, &'static str)],
 }
 
-/// Tests beside the code. `.ci/soak` runs all others with checks as well.
-const BESIDE: Part = Part { targets: &["--lib", "--bins"], environment: &CHECKS };
+/// Tests beside the code. Of the programs, only those with tests: each other one would be compiled for nothing,
+/// together with its library. `.ci/soak` runs all others with checks as well.
+const BESIDE: Part = Part {
+    targets: &["--lib", "--bin", "sidestep-fuzz", "--bin", "xtask"],
+    environment: &CHECKS,
+};
 
 /// Tests from outside, some of which run examples: the promises of the library, too, so that its golden digests
 /// are those of the shipped build.
@@ -125,4 +129,18 @@ fn command(words: &[&str]) -> Command {
 fn reasons_for_skips_are_counted() {
     let counts = counted("no data\nno browser\nno data\n");
     assert_eq!(Vec::from_iter(counts), [("no browser", 1), ("no data", 2)]);
+}
+
+#[test]
+fn every_program_with_tests_is_among_those_that_are_run() {
+    let members = crate::members::read(&house()).expect("a workspace");
+    let main = std::path::Path::new("src/main.rs");
+    for member in members {
+        let own = member.sources.iter().filter(|source| {
+            source.path == main || source.module.as_ref().is_some_and(|place| place.root == main)
+        });
+        let is_tested = own.flat_map(|source| &source.lines).any(|line| line.text == "#[test]");
+        let is_run = BESIDE.targets.contains(&member.name.as_str());
+        assert_eq!(is_tested, is_run, "{}: name it in BESIDE if its program has tests", member.name);
+    }
 }

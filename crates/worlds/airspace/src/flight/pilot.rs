@@ -51,20 +51,31 @@ impl Passing {
         if square < self.tolerance_m * self.tolerance_m {
             return true;
         }
-        if self.passes && step_m > radius_m && is_flown_over((before, pose), goal, step_m) {
-            return true;
-        }
-        // No point farther than a diameter lies in a turning circle.
-        if !self.passes || square >= 4.0 * radius_m * radius_m {
-            return false;
-        }
-        // The circles' centers are a radius to the left and right: the goal is inside when its
-        // distance to the nearer center is below the radius.
-        let [ahead, left] = seen_from(pose, goal);
-        let is_inside = square < 2.0 * radius_m * left.abs();
-        // Abeam since the last look: on a circle, ahead changes by less than a step per step.
-        is_inside && left.abs() < radius_m && (-step_m..=0.0).contains(&ahead)
+        // No point farther than a diameter lies in a turning circle. Nearly always it is farther, and predictions
+        // ask in every step: the rest stands elsewhere, so that this much is inlined.
+        let is_far = step_m <= radius_m && square >= 4.0 * radius_m * radius_m;
+        self.passes && !is_far && is_passed((before, pose), goal, radius_m, step_m)
     }
+}
+
+/// Returns whether an airplane has passed a way-point in its last step: flown over it, or had it abeam inside a
+/// turning circle.
+#[inline(never)]
+fn is_passed((before, pose): (Pose, Pose), goal: Point, radius_m: f64, step_m: f64) -> bool {
+    let (dx, dy) = (goal[0] - pose.at[0], goal[1] - pose.at[1]);
+    let square = dx * dx + dy * dy;
+    if step_m > radius_m && is_flown_over((before, pose), goal, step_m) {
+        return true;
+    }
+    if square >= 4.0 * radius_m * radius_m {
+        return false;
+    }
+    // The circles' centers are a radius to the left and right: the goal is inside when its
+    // distance to the nearer center is below the radius.
+    let [ahead, left] = seen_from(pose, goal);
+    let is_inside = square < 2.0 * radius_m * left.abs();
+    // Abeam since the last look: on a circle, ahead changes by less than a step per step.
+    is_inside && left.abs() < radius_m && (-step_m..=0.0).contains(&ahead)
 }
 
 /// Returns how far ahead of an airplane a place is, and how far to its left.
