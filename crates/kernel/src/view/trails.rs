@@ -71,7 +71,7 @@ impl PlaceRows {
         let rows = self.rows(frame.cycle, whose, column)?;
         let trail = |(of, rows): (Who, Vec<Row>)| {
             let here = frame.bodies.iter().find(|body| body.who() == of);
-            let way = self.way(rows, scenery, here.map(|body| (frame.cycle, body)), of);
+            let way = self.way(rows, scenery, here.map(|body| (frame.cycle, body)), of.1);
             way.map(|way| Trail { of, way })
         };
         Some(rows.into_iter().filter_map(trail).collect())
@@ -114,7 +114,7 @@ impl PlaceRows {
         rows: Vec<Row>,
         scenery: &Scenery,
         here: Option<(Cycle, &Body)>,
-        (_, number, _): Who,
+        number: u32,
     ) -> Option<Vec<(Cycle, Place)>> {
         let &(last, ..) = rows.last()?;
         if here.is_some_and(|(now, _)| last + self.every < now) {
