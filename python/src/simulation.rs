@@ -164,11 +164,12 @@ impl Simulation {
     fn perceived<'py>(
         &self,
         py: Python<'py>,
-        (number, team): &Numbered,
+        number: usize,
+        team: &Arc<control::Team>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let mut room = Room::of(team);
         let written = self.with(py, |journey| {
-            let written = journey.simulation().observe(*number, &mut room.cells());
+            let written = journey.simulation().observe(number, &mut room.cells());
             written.map_err(|e| error::order(&e)).map(|()| room)
         });
         written?.into_dict(py, team)
@@ -413,8 +414,8 @@ impl Simulation {
         py: Python<'py>,
         team: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let team = self.named(team)?;
-        self.perceived(py, &team)
+        let (number, team) = self.named(team)?;
+        self.perceived(py, number, &team)
     }
 
     /// Orders something of agents for the next cycle: `order("action", [0, 2])`. `values` has a row for each
@@ -726,7 +727,7 @@ impl Deciding for Simulation {
     }
 
     fn observed<'py>(&self, py: Python<'py>, team: &Numbered) -> PyResult<Bound<'py, PyDict>> {
-        self.perceived(py, team)
+        self.perceived(py, team.0, &team.1)
     }
 
     fn give(
