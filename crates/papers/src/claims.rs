@@ -1,6 +1,6 @@
 //! Words of the reports, shared by all papers, and verdicts over several results.
 
-use crate::cells::{Cell, Share};
+use crate::cells::{CaseResults, Share};
 use serde::Deserialize;
 use sidestep::statistics::{Interval, holm, share_p_value};
 use sidestep_document::claim::{Claim, Verdict};
@@ -174,8 +174,8 @@ pub(crate) fn in_every_run(runs: usize, holds: bool) -> Verdict {
 
 /// Judges what is to hold in every run of every cell.
 pub(crate) fn every<'a>(
-    cells: impl IntoIterator<Item = &'a Cell>,
-    holds: impl Fn(&Cell) -> bool,
+    cells: impl IntoIterator<Item = &'a CaseResults>,
+    holds: impl Fn(&CaseResults) -> bool,
 ) -> Verdict {
     let (mut runs, mut all) = (0, true);
     for cell in cells {

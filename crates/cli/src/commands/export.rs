@@ -201,9 +201,8 @@ fn report(form: Form, written: &Written, console: Console) -> Result<(), Failure
             paths.iter().filter_map(|path| Some(std::fs::metadata(path).ok()?.len())).sum();
         let size = format!("  {} bytes\n", grouped(bytes));
         let size = if paths.iter().all(|path| path.is_file()) { size } else { String::new() };
-        let film = film.map_or(String::new(), |(pictures, fps)| {
-            film_words(form, pictures, fps, &paths[0])
-        });
+        let film = film
+            .map_or(String::new(), |(pictures, fps)| film_words(form, pictures, fps, &paths[0]));
         format!("{names}{size}{confirmed}{film}")
     })
 }

@@ -398,8 +398,7 @@ impl<'p> Interpreter<'p> {
         match name {
             "ZONER" => traffic.zone_radius_nm = zone_size(place, value, &ZONE_RADII_NM, "NM")?,
             "ZONEDH" => {
-                traffic.zone_half_height_ft =
-                    zone_size(place, value, &ZONE_HALF_HEIGHTS_FT, "ft")?;
+                traffic.zone_half_height_ft = zone_size(place, value, &ZONE_HALF_HEIGHTS_FT, "ft")?;
             }
             "DTLOOK" => traffic.lookahead_s = positive(place, value)?,
             "NOISE" => traffic.noise = switch(place, value)?,

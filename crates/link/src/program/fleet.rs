@@ -235,13 +235,7 @@ impl<'a> Captain<'a> {
     }
 
     /// Returns a node as it is now, so many seconds after the last look.
-    fn node(
-        &mut self,
-        fleet: &Look<'_>,
-        agent: EntityId,
-        seat: &Seat,
-        passed_s: f64,
-    ) -> NodeNow {
+    fn node(&mut self, fleet: &Look<'_>, agent: EntityId, seat: &Seat, passed_s: f64) -> NodeNow {
         let status = &seat.status;
         let before = self.before.insert(agent, (status.packets, status.bytes));
         let (packets, bytes) = before.unwrap_or_default();

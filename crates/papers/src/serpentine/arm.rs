@@ -1,8 +1,8 @@
 //! An arm of six joints, whose tool is sent to places (slides K1 to K4, E3): in the open and between pillars, by local
 //! rules alone and with a planner. Every cycle is looked at: whether a joint is outside its limits or too fast.
 
-use super::{DT_S, Plan, draws};
-use crate::cells::{Cell, Columns, Value, column};
+use super::{DT_S, SerpentinePlan, draws};
+use crate::cells::{CaseResults, Columns, Value, column};
 use crate::study::{Progress, Study, finish, known, number, outcome, setting};
 use serde::Serialize;
 use serde_json::{Value as Json, json};
@@ -56,7 +56,7 @@ const COLUMNS: Columns = Columns {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Arms {
     /// Results by case.
-    pub(super) cells: Vec<Cell>,
+    pub(super) cells: Vec<CaseResults>,
 }
 
 /// Returns the arm of the scenario.
@@ -175,7 +175,10 @@ fn watched(source: &Source) -> Result<Json, InputError> {
 }
 
 impl Arms {
-    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
+    pub(super) fn run(
+        plan: &SerpentinePlan,
+        progress: &mut Progress<'_>,
+    ) -> Result<Self, InputError> {
         let study = Study::of_variants(SCENARIO, cases()).sized(plan.seeds, None);
         let settings =
             |case: &Variant, seed| settings(case, seed).expect("the arm of this experiment");
@@ -187,7 +190,7 @@ impl Arms {
     }
 
     /// Returns the cells with a planner, or those by local rules alone.
-    pub(super) fn with(&self, planner: &'static str) -> impl Iterator<Item = &Cell> {
+    pub(super) fn with(&self, planner: &'static str) -> impl Iterator<Item = &CaseResults> {
         self.cells.iter().filter(move |c| c.says("planner", planner))
     }
 

@@ -3,8 +3,8 @@
 //! wall, and discs that move as fast as it.
 
 use super::corridor::CLEARANCE;
-use super::{Plan, SPEED_M_S, draws};
-use crate::cells::{Cell, Columns, column, figure, series};
+use super::{SPEED_M_S, SerpentinePlan, draws};
+use crate::cells::{CaseResults, Columns, column, figure, series};
 use crate::study::{Progress, Study, number, setting};
 use serde::Serialize;
 use sidestep::experiment::sweep::{Setting, Variant, start};
@@ -59,7 +59,7 @@ fn case(discs: usize, speed_ratio: f64, (leaving, leave_rule): (&str, bool)) -> 
     ]
 }
 
-fn cases(plan: &Plan) -> Vec<Vec<Setting>> {
+fn cases(plan: &SerpentinePlan) -> Vec<Vec<Setting>> {
     let discs = || std::iter::once(0).chain(plan.discs.iter().copied());
     let standing = READINGS.into_iter().flat_map(|of| discs().map(move |n| case(n, 0.0, of)));
     let most = plan.discs.iter().max().copied().unwrap_or(0);
@@ -110,11 +110,14 @@ fn disc(draws: &mut Draws, speed_ratio: f64) -> Option<Value> {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Fields {
     /// Results by case.
-    pub(super) cells: Vec<Cell>,
+    pub(super) cells: Vec<CaseResults>,
 }
 
 impl Fields {
-    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
+    pub(super) fn run(
+        plan: &SerpentinePlan,
+        progress: &mut Progress<'_>,
+    ) -> Result<Self, InputError> {
         let study = Study::of_variants(SCENARIO, cases(plan))
             .sized(plan.field_seeds, Some(plan.field_cycles));
         let results =
@@ -125,14 +128,18 @@ impl Fields {
     }
 
     /// Returns cells with discs at rest, for a reading with or without the rule.
-    pub(super) fn at_rest(&self, leaving: &str, leave_rule: bool) -> impl Iterator<Item = &Cell> {
+    pub(super) fn at_rest(
+        &self,
+        leaving: &str,
+        leave_rule: bool,
+    ) -> impl Iterator<Item = &CaseResults> {
         let is_its =
-            move |c: &&Cell| c.says("leaving", leaving) && c.is("leave_rule") == leave_rule;
+            move |c: &&CaseResults| c.says("leaving", leaving) && c.is("leave_rule") == leave_rule;
         self.cells.iter().filter(|c| c.number("speed_ratio") == 0.0).filter(is_its)
     }
 
     /// Returns cells with discs that move.
-    pub(super) fn moving(&self) -> impl Iterator<Item = &Cell> {
+    pub(super) fn moving(&self) -> impl Iterator<Item = &CaseResults> {
         self.cells.iter().filter(|c| c.number("speed_ratio") > 0.0)
     }
 

@@ -1,7 +1,7 @@
 //! Tests of which parts may start a motion, and which may object (slides R4, R5, R7, R8), and
 //! whether bends keep their limits (slide F1).
 
-use super::{Plan, draws};
+use super::{SerpentinePlan, draws};
 use crate::cells::{Share, table};
 use crate::study::{Progress, all_of, finish, known, setting, source};
 use serde::Serialize;
@@ -197,7 +197,10 @@ fn bent<const D: usize>(limit_rad: f64, seed: u64) -> Result<Bent, InputError> {
 }
 
 impl Initiators {
-    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
+    pub(super) fn run(
+        plan: &SerpentinePlan,
+        progress: &mut Progress<'_>,
+    ) -> Result<Self, InputError> {
         let seeds: Vec<u64> = (1..=plan.seeds as u64).collect();
         let mut report = |share| progress("who begins, who objects", share);
         let all = all_of(&seeds, plan.workers, &mut report, |seed| seen(*seed))?;
