@@ -13,7 +13,7 @@
 mod sockets;
 
 use crate::cells::{CaseResults, Columns, Run, Runs, Value, column, figure, series};
-use crate::claims::{Comparison, File, Words, both, judged, listed};
+use crate::claims::{Comparison, File, Parts, Words, both, judged, listed};
 use crate::study::{Progress, Study, finish, known, number, setting, source};
 use serde::Serialize;
 use sidestep::kernel::{InputError, Simulation};
@@ -200,7 +200,7 @@ fn spent(case: &Runs<'_>, run: &Run<'_>) -> Spent {
 pub fn run(plan: &AgentflyPlan, progress: &mut Progress<'_>) -> Result<Report, InputError> {
     let study = Study::of_file(SWEEP, SCENARIO)?.sized(plan.seeds, Some(plan.cycles));
     let study = study.keep(|v| plan.airplanes.contains(&(number(v, AIRPLANES) as usize)));
-    let cells = COLUMNS.cells(&study.run((plan.workers, "super-conflicts"), progress)?);
+    let cells = COLUMNS.cells(&study.run(plan.workers, "super-conflicts", progress)?);
     let claims = judge(&cells);
     let largest = plan.airplanes.iter().copied().max().unwrap_or(0);
     let tracks_m = tracks_m(plan, largest)?;
@@ -236,33 +236,55 @@ fn pairs(cells: &[CaseResults]) -> impl Iterator<Item = (&CaseResults, &CaseResu
     both.filter(move |(team, pim)| talks(team) && talks(pim))
 }
 
+/// A quantity of the flights of one case.
+#[derive(Clone, Copy)]
+struct Quantity<'a> {
+    of: &'a CaseResults,
+    name: &'a str,
+}
+
+impl Quantity<'_> {
+    fn by_seed(&self) -> Vec<Option<f64>> {
+        self.of.by_seed("by_seed", self.name)
+    }
+}
+
+/// Returns a quantity of the coordinator above one of the team, at each number of airplanes.
+fn fractions<'a>(
+    cells: &'a [CaseResults],
+    of_pim: &'a str,
+    of_team: &'a str,
+) -> Vec<[Quantity<'a>; 2]> {
+    let pim_over_team =
+        |(team, pim)| [Quantity { of: pim, name: of_pim }, Quantity { of: team, name: of_team }];
+    pairs(cells).map(pim_over_team).collect()
+}
+
 /// Returns a value of the coordinator divided by one of the team, seed by seed, if both are there
 /// and not 0.
 fn ratios(cells: &[CaseResults], of_pim: &str, of_team: &str) -> Vec<Estimate> {
-    pairs(cells).map(|(team, pim)| ratio((pim, of_pim), (team, of_team))).collect()
+    fractions(cells, of_pim, of_team).into_iter().map(ratio).collect()
 }
 
-fn ratio((a, of_a): (&CaseResults, &str), (b, of_b): (&CaseResults, &str)) -> Estimate {
-    let values = |cell: &CaseResults, of: &str| -> Vec<Option<f64>> {
-        cell.by_seed("by_seed", of).into_iter().map(|v| v.filter(|v| *v > 0.0)).collect()
+fn ratio([a, b]: [Quantity<'_>; 2]) -> Estimate {
+    let values = |of: Quantity<'_>| -> Vec<Option<f64>> {
+        of.by_seed().into_iter().map(|v| v.filter(|v| *v > 0.0)).collect()
     };
-    Estimate::ratio(&values(a, of_a), &values(b, of_b))
+    Estimate::ratio(&values(a), &values(b))
 }
 
 /// Returns the power of the number of airplanes with which a ratio grows: its slope over that number,
 /// both on logarithmic scales, seed by seed. Nothing with fewer than two numbers of airplanes.
-fn power((a, of_a): (&[&CaseResults], &str), (b, of_b): (&[&CaseResults], &str)) -> Estimate {
-    let seeds = a.iter().map(|cell| cell.runs()).max().unwrap_or(0);
+fn power(fractions: &[[Quantity<'_>; 2]]) -> Estimate {
+    let seeds = fractions.iter().map(|[a, _]| a.of.runs()).max().unwrap_or(0);
     let slope = |seed: usize| {
-        let point = |(a, b): (&&CaseResults, &&CaseResults)| {
-            let value = |cell: &CaseResults, of: &str| {
-                cell.by_seed("by_seed", of).get(seed).copied().flatten()
-            };
-            let ratio = value(a, of_a)? / value(b, of_b)?;
+        let point = |[a, b]: &[Quantity<'_>; 2]| {
+            let value = |of: &Quantity<'_>| of.by_seed().get(seed).copied().flatten();
+            let ratio = value(a)? / value(b)?;
             (ratio.is_finite() && ratio > 0.0)
-                .then(|| ((a.count("airplanes") as f64).ln(), ratio.ln()))
+                .then(|| ((a.of.count("airplanes") as f64).ln(), ratio.ln()))
         };
-        let (x, y): (Vec<f64>, Vec<f64>) = a.iter().zip(b).filter_map(point).unzip();
+        let (x, y): (Vec<f64>, Vec<f64>) = fractions.iter().filter_map(point).unzip();
         let rows: Vec<Vec<f64>> = x.iter().map(|x| vec![1.0, *x]).collect();
         Fit::new(&rows, &y).map(|fit| fit.coefficients[1])
     };
@@ -315,8 +337,7 @@ fn moves_far_more_bytes(cells: &[CaseResults], id: &str, of_team: &str) -> Claim
 }
 
 fn bytes_grow_faster(cells: &[CaseResults], id: &str, of_team: &str) -> Claim {
-    let (teams, pims): (Vec<&CaseResults>, Vec<&CaseResults>) = pairs(cells).unzip();
-    let power = power((&pims, "bytes"), (&teams, of_team));
+    let power = power(&fractions(cells, "bytes", of_team));
     let ends = ends(&ratios(cells, "bytes", of_team));
     let ours = format!(
         "pim / team grows with the power {power} of the number of airplanes; with the fewest and the most: {}",
@@ -335,11 +356,11 @@ fn ends(ratios: &[Estimate]) -> Vec<Estimate> {
 
 fn multicast_saves(cells: &[CaseResults]) -> Claim {
     // To the only other one of two, a multicast is an ordinary message.
-    let (teams, _): (Vec<&CaseResults>, Vec<&CaseResults>) =
-        pairs(cells).filter(|(team, _)| team.count("airplanes") > 2).unzip();
-    let saved = |team: &&CaseResults| ratio((team, "bytes"), (team, "multicast_bytes"));
-    let saved: Vec<Estimate> = teams.iter().map(saved).collect();
-    let power = power((&teams, "bytes"), (&teams, "multicast_bytes"));
+    let teams = pairs(cells).map(|(team, _)| team).filter(|team| team.count("airplanes") > 2);
+    let saved = |of| ["bytes", "multicast_bytes"].map(|name| Quantity { of, name });
+    let fractions: Vec<_> = teams.map(saved).collect();
+    let saved: Vec<Estimate> = fractions.iter().copied().map(ratio).collect();
+    let power = power(&fractions);
     let verdict = both(&[
         judged(saved.iter().map(|saved| Comparison::above(saved, 1.0))),
         judged([Comparison::above(&power, 0.0)]),
@@ -439,7 +460,8 @@ impl Report {
         let results = (self.figures(), vec![self.table(), self.links_table()]);
         let sockets = self.sockets.iter().map(|sockets| (Vec::new(), vec![sockets.table()]));
         let experiments = WORDS.experiments([results].into_iter().chain(sockets));
-        WORDS.document(lead, plan.quick, (&self.claims, Vec::new(), experiments), command)
+        let parts = Parts { claims: &self.claims, pictures: Vec::new(), experiments };
+        WORDS.document(lead, plan.quick, parts, command)
     }
 }
 

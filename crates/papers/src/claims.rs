@@ -29,8 +29,12 @@ struct About {
     about: String,
 }
 
-/// Claims, pictures and experiments of a report.
-pub(crate) type Parts<'a> = (&'a [Claim], Vec<Picture>, Vec<Experiment>);
+/// The parts of a report.
+pub(crate) struct Parts<'a> {
+    pub(crate) claims: &'a [Claim],
+    pub(crate) pictures: Vec<Picture>,
+    pub(crate) experiments: Vec<Experiment>,
+}
 
 /// A claim in words.
 #[derive(Debug, Deserialize)]
@@ -68,14 +72,14 @@ impl File {
         &self,
         lead: String,
         quick: bool,
-        (claims, pictures, experiments): Parts<'_>,
+        parts: Parts<'_>,
         command: String,
     ) -> Document {
-        let mut document = document::of_paper(&self.title, lead, quick, claims);
-        if !pictures.is_empty() {
-            document.section("Pictures").pictures(pictures);
+        let mut document = document::of_paper(&self.title, lead, quick, parts.claims);
+        if !parts.pictures.is_empty() {
+            document.section("Pictures").pictures(parts.pictures);
         }
-        for experiment in experiments {
+        for experiment in parts.experiments {
             document.experiment(experiment);
         }
         document.section("How to run it again").commands("In a shell", command);

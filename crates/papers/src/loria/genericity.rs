@@ -44,8 +44,7 @@ impl Genericity {
         let build = |(camera, size)| Variant { size, camera, ..Variant::new(&floor, Regime::Both) };
         let builds = [false, true].into_iter().flat_map(|camera| SIZES.map(|size| (camera, size)));
         let variants: Vec<Variant> = builds.map(build).collect();
-        let runs = (plan.seeds, plan.cycles);
-        let outcomes = measure_all(&variants, runs, plan.workers, "genericity", report);
+        let outcomes = measure_all(&variants, plan, "genericity", report);
         let builds = variants.iter().zip(outcomes);
         let builds = builds.map(|(v, outcomes)| Build { size: v.size, camera: v.camera, outcomes });
         Self { builds: builds.collect(), cycles: plan.cycles }

@@ -26,6 +26,7 @@ pub mod scenes;
 mod strategies;
 mod timing;
 
+use crate::claims::Parts;
 use crate::study::{Progress, stage};
 use cost_model::CostModel;
 use genericity::Genericity;
@@ -240,7 +241,8 @@ impl Report {
             plan.repeats,
             self.performance.processors,
         );
-        let parts = (&self.claims[..], pictures, self.experiments());
+        let experiments = self.experiments();
+        let parts = Parts { claims: &self.claims, pictures, experiments };
         claims::WORDS.document(lead, plan.quick, parts, self.command())
     }
 

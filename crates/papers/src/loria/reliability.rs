@@ -83,8 +83,7 @@ impl Reliability {
     pub(super) fn run(plan: &LoriaPlan, report: &mut Progress<'_>) -> Self {
         let floors = [Floor::medium(), Floor::small(), Floor::large()].map(Arc::new);
         let variants = variants(&floors, plan);
-        let size = (plan.seeds, plan.cycles);
-        let outcomes = measure_all(&variants, size, plan.workers, "reliability", report);
+        let outcomes = measure_all(&variants, plan, "reliability", report);
         let cell = |(variant, outcomes): (Variant, _)| VariantOutcomes {
             floor: variant.floor.name.into(),
             variant,
@@ -299,7 +298,7 @@ impl Reliability {
                 STRAIGHTNESS,
             ),
         ];
-        let sweeps = SweepCase::MINDS.map(|mind| self.sweep_figure(mind));
+        let sweeps = SweepCase::MINDS.map(|(mind, beams)| self.sweep_figure(mind, beams));
         bars.into_iter().chain(sweeps).collect()
     }
 
@@ -319,7 +318,7 @@ impl Reliability {
         }
     }
 
-    fn sweep_figure(&self, (mind, beams): (Mind, Beams)) -> Figure {
+    fn sweep_figure(&self, mind: Mind, beams: Beams) -> Figure {
         let line = |name: &str, regime, spread| {
             let case = SweepCase { mind, beams, spread };
             let at = |&e: &f64| self.estimate(case.key(e), regime, CONTACTS).point(e);

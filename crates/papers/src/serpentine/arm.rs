@@ -182,8 +182,8 @@ impl Arms {
         let study = Study::of_variants(SCENARIO, cases()).sized(plan.seeds, None);
         let settings =
             |case: &Variant, seed| settings(case, seed).expect("the arm of this experiment");
-        let what = (plan.workers, "an arm of joints");
-        let results = study.run_with(what, progress, settings, |source, cell| {
+        let what = "an arm of joints";
+        let results = study.run_with(plan.workers, what, progress, settings, |source, cell| {
             Ok(outcome(cell, watched(source)?))
         })?;
         Ok(Self { cells: COLUMNS.cells(&results) })

@@ -154,8 +154,8 @@ impl Broken {
             cases.extend([false, true].map(|may_come| case(10.0, 2, may_come)));
         }
         let study = Study::of_variants("", cases).sized(plan.breaks, None);
-        let what = (plan.workers, "broken chains");
-        let results = study.run_by(what, progress, |_, case, cell| {
+        let what = "broken chains";
+        let results = study.run_by(plan.workers, what, progress, |_, case, cell| {
             Ok(outcome(cell, joined(&Case::of(case), cell.seed)?))
         })?;
         Ok(Self { cells: COLUMNS.cells(&results) })

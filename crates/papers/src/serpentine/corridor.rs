@@ -98,8 +98,8 @@ impl Corridor {
         plan: &SerpentinePlan,
         progress: &mut Progress<'_>,
     ) -> Result<Self, InputError> {
-        let what = (plan.workers, "swarm in the corridor");
-        let results = study(plan)?.run_by(what, progress, |scenario, _, cell| {
+        let what = "swarm in the corridor";
+        let results = study(plan)?.run_by(plan.workers, what, progress, |scenario, _, cell| {
             let mut run = chain_run(&scenario()?, 1)?;
             let mut in_band = 0_u64;
             finish(&mut *run, |run| in_band += u64::from(is_in_band(run)));

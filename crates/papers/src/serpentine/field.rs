@@ -27,8 +27,21 @@ const ENDS_M: [Point<2>; 2] = [[-8.5, -8.5], [8.5, 8.5]];
 const AIR_M: f64 = 1.5;
 
 /// Readings of "leaving a wall", and whether the leave rule is added.
-const READINGS: [(&str, bool); 5] =
-    [("latched", true), ("latched", false), ("range", true), ("range", false), ("level", false)];
+const READINGS: [Reading; 5] = [
+    Reading { leaving: "latched", leave_rule: true },
+    Reading { leaving: "latched", leave_rule: false },
+    Reading { leaving: "range", leave_rule: true },
+    Reading { leaving: "range", leave_rule: false },
+    Reading { leaving: "level", leave_rule: false },
+];
+
+/// A reading of the slides: when a wall counts as being left, and whether a free way to the target
+/// ends following a wall.
+#[derive(Clone, Copy)]
+struct Reading {
+    leaving: &'static str,
+    leave_rule: bool,
+}
 
 const COLUMNS: Columns = Columns {
     case: &[
@@ -48,14 +61,13 @@ const COLUMNS: Columns = Columns {
 };
 
 /// Returns the settings of a case: discs of 0.2 to 0.5 m, their speed divided by the robot's (0 if
-/// they stand), when a wall counts as being left, and whether a free way to the target ends
-/// following a wall.
-fn case(discs: usize, speed_ratio: f64, (leaving, leave_rule): (&str, bool)) -> Vec<Setting> {
+/// they stand), and a reading.
+fn case(discs: usize, speed_ratio: f64, reading: Reading) -> Vec<Setting> {
     vec![
         setting("discs", discs as i64),
         setting("speed_ratio", speed_ratio),
-        setting("leaving", leaving),
-        setting("leave_rule", leave_rule),
+        setting("leaving", reading.leaving),
+        setting("leave_rule", reading.leave_rule),
     ]
 }
 
@@ -121,7 +133,7 @@ impl Fields {
         let study = Study::of_variants(SCENARIO, cases(plan))
             .sized(plan.field_seeds, Some(plan.field_cycles));
         let results =
-            study.run_with((plan.workers, "open field"), progress, settings, |source, cell| {
+            study.run_with(plan.workers, "open field", progress, settings, |source, cell| {
                 Ok(start(WORLDS, *cell, source, 1)?.run(&|| true).expect("nobody stops it"))
             })?;
         Ok(Self { cells: COLUMNS.cells(&results) })

@@ -122,31 +122,40 @@ fn seen(seed: u64) -> Result<Seen, InputError> {
         for other in (0..CONNECTORS).filter(|&other| other != k) {
             let mut failing = free.clone();
             failing.set_failed(other, true);
-            let objected = objects(&mut failing, (k, to), (other, Reason::Failed), &mut seen)?;
+            let expected = Expected { by: other, reason: Reason::Failed };
+            let objected = objects(&mut failing, k, to, expected, &mut seen)?;
             seen.failed_objected.push(objected);
         }
         if k > 0 {
             let mut arm = free.clone();
             arm.set_mobility(0, Mobility::Fixed)?;
-            let objected = objects(&mut arm, (k, to), (0, Reason::Fixed), &mut seen)?;
+            let expected = Expected { by: 0, reason: Reason::Fixed };
+            let objected = objects(&mut arm, k, to, expected, &mut seen)?;
             seen.base_objected.push(objected);
         }
     }
     Ok(seen)
 }
 
-/// Returns whether a motion is vetoed by the expected connector, for the expected reason.
+/// The veto that is expected.
+struct Expected {
+    by: usize,
+    reason: Reason,
+}
+
+/// Returns whether the motion of connector `k` is vetoed by the expected connector, for the expected reason.
 fn objects(
     chain: &mut Chain<3>,
-    (k, to): (usize, Point<3>),
-    (by, reason): (usize, Reason),
+    k: usize,
+    to: Point<3>,
+    expected: Expected,
     seen: &mut Seen,
 ) -> Result<bool, InputError> {
     let before = chain.points().to_vec();
     let outcome = propagated(chain, k, to)?;
     let Some(veto) = outcome.veto() else { return Ok(false) };
     seen.kept.push(chain.points() == before);
-    Ok(veto.by == by && veto.reason == reason)
+    Ok(veto.by == expected.by && veto.reason == expected.reason)
 }
 
 /// Lets an operator lead a chain of which a connector fails; returns whether the veto names it.
@@ -213,7 +222,7 @@ impl Initiators {
                 true => bent::<3>(limit_rad, seed),
                 false => bent::<2>(limit_rad, seed),
             })?;
-            Ok(bend((limit_deg, in_space), &runs))
+            Ok(bend(limit_deg, in_space, &runs))
         });
         let bends: Vec<Bend> = bends.collect::<Result<_, InputError>>()?;
         Ok(Self {
@@ -266,7 +275,7 @@ impl Initiators {
     }
 }
 
-fn bend((limit_deg, in_space): (f64, bool), runs: &[Bent]) -> Bend {
+fn bend(limit_deg: f64, in_space: bool, runs: &[Bent]) -> Bend {
     Bend {
         limit_deg,
         in_space,

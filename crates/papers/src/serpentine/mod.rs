@@ -28,6 +28,7 @@ mod scaling;
 mod scenes;
 mod snake;
 
+use crate::claims::Parts;
 use crate::study::{Progress, stage};
 use serde::Serialize;
 use sidestep::kernel::stream::{Draws, Purpose, Streams};
@@ -269,7 +270,8 @@ impl Report {
         let quick = if plan.quick { " --quick" } else { "" };
         let seeds = plan.seeds;
         let command = format!("sidestep reproduce serpentine{quick} --seeds {seeds} --out DIR");
-        let parts = (&self.claims[..], pictures, self.experiments());
+        let experiments = self.experiments();
+        let parts = Parts { claims: &self.claims, pictures, experiments };
         claims::WORDS.document(lead, plan.quick, parts, command)
     }
 }

@@ -74,7 +74,7 @@ impl Movers {
         plan: &SerpentinePlan,
         progress: &mut Progress<'_>,
     ) -> Result<Self, InputError> {
-        let results = study(plan)?.run((plan.workers, "discs that move"), progress)?;
+        let results = study(plan)?.run(plan.workers, "discs that move", progress)?;
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 

@@ -177,8 +177,8 @@ impl Postures {
             }
         }
         let study = Study::of_variants("", cases).sized(plan.ik_targets, None);
-        let what = (plan.workers, "targets of tips");
-        let results = study.run_by(what, progress, |_, case, cell| {
+        let what = "targets of tips";
+        let results = study.run_by(plan.workers, what, progress, |_, case, cell| {
             Ok(outcome(cell, solved(&Case::of(case), cell.seed)?))
         })?;
         Ok(Self { cells: COLUMNS.cells(&results) })

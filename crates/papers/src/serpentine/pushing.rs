@@ -117,7 +117,7 @@ impl Pushing {
     ) -> Result<Self, InputError> {
         let study = Study::of_variants("", cases()).sized(plan.seeds, None);
         let results =
-            study.run_by((plan.workers, "pushed and pulled"), progress, |_, case, cell| {
+            study.run_by(plan.workers, "pushed and pulled", progress, |_, case, cell| {
                 Ok(outcome(cell, pushed(case, cell.seed)?))
             })?;
         Ok(Self { cells: COLUMNS.cells(&results) })

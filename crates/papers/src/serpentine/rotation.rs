@@ -60,8 +60,8 @@ impl Rotations {
         plan: &SerpentinePlan,
         progress: &mut Progress<'_>,
     ) -> Result<Self, InputError> {
-        let what = (plan.workers, "rules of rotation");
-        let results = study(plan)?.run_by(what, progress, |scenario, _, cell| {
+        let what = "rules of rotation";
+        let results = study(plan)?.run_by(plan.workers, what, progress, |scenario, _, cell| {
             let mut run = chain_run(&scenario()?, 1)?;
             let mut furthest = 0.0_f64;
             finish(&mut *run, |run| {

@@ -65,7 +65,7 @@ impl Snakes {
         plan: &SerpentinePlan,
         progress: &mut Progress<'_>,
     ) -> Result<Self, InputError> {
-        let results = study(plan)?.run((plan.workers, "snake in space"), progress)?;
+        let results = study(plan)?.run(plan.workers, "snake in space", progress)?;
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
