@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
 use sidestep::kernel::control::{self, Orders};
 use sidestep::kernel::ports::{TableSchema, Values};
-use sidestep::kernel::view::{Body, Kind, Look};
+use sidestep::kernel::view::{Body, Kind, Look, Who};
 use sidestep::kernel::{Cycle, EntityId, Plan, Simulation as AnySimulation};
 use sidestep::scenario::{Resolved, Source};
 use sidestep_draw::{DrawError, Film, Still};
@@ -564,7 +564,7 @@ impl Simulation {
             )
         })?;
         let told = self.ask(py, |run| {
-            let told = run.inspect((known, number, part));
+            let told = run.inspect(Who::new(known, number, part));
             told.and_then(|told| serde_json::to_value(told).ok()).unwrap_or_default()
         })?;
         to_python(py, &told)

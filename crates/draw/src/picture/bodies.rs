@@ -187,7 +187,7 @@ fn fill(scene: &Scene<'_>, canvas: &Canvas, body: &Body) -> (Color, f64) {
 impl Scene<'_> {
     /// Returns whether others have a trail and this body has none.
     fn is_beside_trails(&self, body: &Body) -> bool {
-        !self.trails.is_empty() && self.trails.iter().all(|trail| trail.of.1 != body.number)
+        !self.trails.is_empty() && self.trails.iter().all(|trail| trail.of.number != body.number)
     }
 }
 

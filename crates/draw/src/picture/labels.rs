@@ -46,8 +46,8 @@ pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect
         let clear_px = if body.is_some() { radius_px.max(mark_px) } else { mark_px };
         taken.push(around(end, clear_px));
         // Parts of a body have no name of their own.
-        if trail.of.2.is_none() && contains(room, end) {
-            wanted.push((end, clear_px, key::name(scene, trail.of.0, trail.of.1)));
+        if trail.of.part.is_none() && contains(room, end) {
+            wanted.push((end, clear_px, key::name(scene, trail.of.kind, trail.of.number)));
         }
     }
     if wanted.len() > MOST_LABELS {

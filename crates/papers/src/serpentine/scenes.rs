@@ -5,7 +5,7 @@ use super::{broken, corridor, snake};
 use crate::Scene;
 use crate::study::{known, setting, source};
 use sidestep::experiment::sweep::Setting;
-use sidestep::kernel::view::{Body, Frame, Kind, Look, Place, Pose, Scenery, Shape, Trail};
+use sidestep::kernel::view::{Body, Frame, Kind, Look, Place, Pose, Scenery, Shape, Trail, Who};
 use sidestep::kernel::{InputError, Simulation};
 use sidestep::worlds::chain::geometry::Point;
 use sidestep::worlds::chain::{ChainRun, chain_run};
@@ -33,7 +33,7 @@ fn traced<const D: usize>(
 ) -> Result<Traced, InputError> {
     let mut run = chain_run(&source(text, settings)?, 1)?;
     let last = run.agents() as u32 - 1;
-    let trail = |part| Trail { of: (Kind::Connector, 0, Some(part)), way: Vec::new() };
+    let trail = |part| Trail { of: Who::new(Kind::Connector, 0, Some(part)), way: Vec::new() };
     let mut trails: Vec<Trail> = [0, last].map(trail).to_vec();
     while run.cycle() < cycles && !run.is_over() {
         if run.cycle().is_multiple_of(EVERY) {

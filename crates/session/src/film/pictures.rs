@@ -196,7 +196,10 @@ mod tests {
             }
         }
         assert!(
-            pictures.trail((sidestep::kernel::view::Kind::Robot, 9, None), last).way.is_empty()
+            pictures
+                .trail(Who::new(sidestep::kernel::view::Kind::Robot, 9, None), last)
+                .way
+                .is_empty()
         );
     }
 }
