@@ -311,13 +311,14 @@ class Learned:
     def profile(self, name: str, text: str | None = None) -> str: ...
 
 def learn_effector(
-    text: str | None, run: str | PathLike[str] | None, options: tuple[float, int]
+    text: str | None, run: str | PathLike[str] | None, alpha: float, hold_out_every: int
 ) -> Learned: ...
 def learn_sensor(
     text: str | None,
     run: str | PathLike[str] | None,
     shape: Mapping[str, Any],
-    options: tuple[float, int],
+    alpha: float,
+    hold_out_every: int,
 ) -> Learned: ...
 def minimize_pairs(
     own: Sequence[_Reals], pairs: Sequence[tuple[int, int, _Reals]], options: Mapping[str, Any]

@@ -58,7 +58,7 @@ def effector(moves: Columns, *, alpha: float = 0.5, hold_out: int = 2) -> Learne
     True
     """
     text, run = _table(moves, MOTIONS)
-    return _native.learn_effector(text, run, (alpha, hold_out))
+    return _native.learn_effector(text, run, alpha, hold_out)
 
 
 def sensor(
@@ -98,7 +98,7 @@ def sensor(
         "range_m": range_m,
         "sensor": name,
     }
-    return _native.learn_sensor(text, run, shape, (alpha, hold_out))
+    return _native.learn_sensor(text, run, shape, alpha, hold_out)
 
 
 def _table(columns: Columns, known: Sequence[str]) -> tuple[str | None, str | None]:

@@ -80,7 +80,7 @@ fn table(text: Option<&str>, run: Option<PathBuf>, name: &str) -> Result<CsvTabl
     }
 }
 
-fn estimate((alpha, hold_out_every): (f64, usize)) -> EstimateOptions {
+fn estimate(alpha: f64, hold_out_every: usize) -> EstimateOptions {
     EstimateOptions { alpha, hold_out_every, ..EstimateOptions::default() }
 }
 
@@ -90,11 +90,12 @@ pub(crate) fn learn_effector(
     py: Python<'_>,
     text: Option<String>,
     run: Option<PathBuf>,
-    options: (f64, usize),
+    alpha: f64,
+    hold_out_every: usize,
 ) -> PyResult<Learned> {
-    let learned = py.detach(|| {
-        effector::learn_csv(&table(text.as_deref(), run, "motions")?, &estimate(options))
-    });
+    let options = estimate(alpha, hold_out_every);
+    let learned =
+        py.detach(|| effector::learn_csv(&table(text.as_deref(), run, "motions")?, &options));
     let model = learned.map_err(|e| error::input(&e))?;
     Ok(Learned(Model::Effector(Box::new(model))))
 }
@@ -117,11 +118,12 @@ pub(crate) fn learn_sensor(
     text: Option<String>,
     run: Option<PathBuf>,
     shape: Shape,
-    options: (f64, usize),
+    alpha: f64,
+    hold_out_every: usize,
 ) -> PyResult<Learned> {
     let default = SensorOptions::default();
     let options = SensorOptions {
-        estimate: estimate(options),
+        estimate: estimate(alpha, hold_out_every),
         distance_edges_m: shape.edges_m.unwrap_or(default.distance_edges_m),
         distance_classes: shape.classes,
         bearings_deg: shape.bearings_deg.unwrap_or(default.bearings_deg),

@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
 use sidestep::kernel::control::{self, Orders};
 use sidestep::kernel::ports::{TableSchema, Values};
-use sidestep::kernel::view::{Body, Kind, Look};
+use sidestep::kernel::view::{Body, Kind, Look, Who};
 use sidestep::kernel::{Cycle, EntityId, Plan, Simulation as AnySimulation};
 use sidestep::scenario::{Resolved, Source};
 use sidestep_draw::{DrawError, Film, Still};
@@ -165,11 +165,12 @@ impl Simulation {
     fn perceived<'py>(
         &self,
         py: Python<'py>,
-        (number, team): &Numbered,
+        number: usize,
+        team: &Arc<control::Team>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let mut room = Room::of(team);
         let written = self.with(py, |journey| {
-            let written = journey.simulation().observe(*number, &mut room.cells());
+            let written = journey.simulation().observe(number, &mut room.cells());
             written.map_err(|e| error::order(&e)).map(|()| room)
         });
         written?.into_dict(py, team)
@@ -415,8 +416,8 @@ impl Simulation {
         py: Python<'py>,
         team: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let team = self.named(team)?;
-        self.perceived(py, &team)
+        let (number, team) = self.named(team)?;
+        self.perceived(py, number, &team)
     }
 
     /// Gives agents an order for the next cycle: `order("action", [0, 2])`. `values` has a row for each
@@ -566,7 +567,7 @@ impl Simulation {
             )
         })?;
         let told = self.ask(py, |run| {
-            let told = run.inspect((known, number, part));
+            let told = run.inspect(Who::new(known, number, part));
             told.and_then(|told| serde_json::to_value(told).ok()).unwrap_or_default()
         })?;
         to_python(py, &told)
@@ -729,7 +730,7 @@ impl Deciding for Simulation {
     }
 
     fn observed<'py>(&self, py: Python<'py>, team: &Numbered) -> PyResult<Bound<'py, PyDict>> {
-        self.perceived(py, team)
+        self.perceived(py, team.0, &team.1)
     }
 
     fn give(

@@ -325,19 +325,19 @@ pub(crate) fn compare_methods(
         let cause = "methods of collision avoidance are of the world `airspace` alone";
         return Err(wrong("scenario", cause, "give a scenario with world = \"airspace\""));
     };
-    let span = (seed.unwrap_or(compiled.seed), runs);
+    let seeds = methods::SeedSpan { first: seed.unwrap_or(compiled.seed), runs };
     let workers = if workers == 0 { available() } else { workers };
     let results = attended(py, |watcher| {
         let heeded = watcher.interrupt();
         let run = || {
             let progress = &mut |_: &str, _: f64| ();
-            methods::compare_heeding(source, &methods, span, workers, (progress, &heeded))
+            methods::compare_heeding(source, &methods, seeds, workers, progress, &heeded)
         };
         catch_unwind(AssertUnwindSafe(run))
             .unwrap_or_else(|payload| resume_unless(payload, &heeded))
     })?;
     let results = results.map_err(|e| error::input(&e))?;
-    to_python(py, &json!({ "name": compiled.name, "seed": span.0, "methods": results }))
+    to_python(py, &json!({ "name": compiled.name, "seed": seeds.first, "methods": results }))
 }
 
 /// Goes on unwinding, unless the interrupt explains it: then the results are not used.

@@ -20,7 +20,7 @@ use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict, PyList, PyTuple};
 use sidestep::experiment::sweep::{Role, RunColumn};
-use sidestep::kernel::ports::{ColumnSpec, ColumnType, TableSchema, Values};
+use sidestep::kernel::ports::{Cells, ColumnSpec, ColumnType, TableSchema, Values};
 use sidestep::scenario::{Meaning, told};
 use sidestep::worlds::WORLDS;
 use std::collections::HashMap;
@@ -246,11 +246,11 @@ fn field(spec: &ColumnSpec) -> Field {
 
 fn array(spec: &ColumnSpec, values: Values) -> Result<ArrayRef, ArrowError> {
     Ok(match values {
-        Values::U32(cells) => numbers::<_, UInt32Type>(cells.into_parts()),
-        Values::U64(cells) => numbers::<_, UInt64Type>(cells.into_parts()),
-        Values::I32(cells) => numbers::<_, Int32Type>(cells.into_parts()),
-        Values::I64(cells) => numbers::<_, Int64Type>(cells.into_parts()),
-        Values::F64(cells) => numbers::<_, Float64Type>(cells.into_parts()),
+        Values::U32(cells) => numbers::<_, UInt32Type>(cells),
+        Values::U64(cells) => numbers::<_, UInt64Type>(cells),
+        Values::I32(cells) => numbers::<_, Int32Type>(cells),
+        Values::I64(cells) => numbers::<_, Int64Type>(cells),
+        Values::F64(cells) => numbers::<_, Float64Type>(cells),
         Values::Bool(cells) => {
             Arc::new(cells.options().map(|cell| cell.copied()).collect::<BooleanArray>())
         }
@@ -265,11 +265,12 @@ fn array(spec: &ColumnSpec, values: Values) -> Result<ArrayRef, ArrowError> {
 }
 
 /// Returns numbers as an Arrow array, without a copy.
-fn numbers<T, A>((values, valid): (Vec<T>, Option<Vec<bool>>)) -> ArrayRef
+fn numbers<T, A>(cells: Cells<T>) -> ArrayRef
 where
     A: arrow_array::ArrowPrimitiveType<Native = T>,
     T: arrow_buffer::ArrowNativeType,
 {
+    let (values, valid) = cells.into_parts();
     let nulls = valid.map(NullBuffer::from);
     Arc::new(PrimitiveArray::<A>::new(ScalarBuffer::from(values), nulls))
 }

@@ -9,7 +9,7 @@ use sidestep_draw::{
     Axis, Bar, BarChart, BarSeries, DrawError, Options, Plot, Point, Series, Style, draw, to_png,
 };
 use sidestep_kernel::view::{
-    Body, Condition, Floor, Frame, Kind, Occupancy, Plane, Pose, Scenery, Shape, Trail,
+    Body, Condition, Floor, Frame, Kind, Occupancy, Plane, Pose, Scenery, Shape, Trail, Who,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -73,8 +73,10 @@ fn corridor() -> Result<String, DrawError> {
         &[(14.0, 12.0), (21.0, 12.0), (21.0, 11.0), (15.0, 11.0)],
     ];
     let way = |way: &[(f64, f64)]| (0..).zip(way.iter().map(|&(x, y)| [x, y, 0.0])).collect();
-    let trail =
-        |(k, places): (u32, &&[(f64, f64)])| Trail { of: (Kind::Robot, k, None), way: way(places) };
+    let trail = |(k, places): (u32, &&[(f64, f64)])| Trail {
+        of: Who::new(Kind::Robot, k, None),
+        way: way(places),
+    };
     let robot = |(k, places): (u32, &&[(f64, f64)])| {
         body(Kind::Robot, k, places[places.len() - 1], (2.0, 2.0))
     };

@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 use resvg::usvg::{Group, Node, Rect};
 
-use sidestep_kernel::view::{Body, Floor, Frame, Kind, Plane, Pose, Scenery, Shape, Trail};
+use sidestep_kernel::view::{Body, Floor, Frame, Kind, Plane, Pose, Scenery, Shape, Trail, Who};
 
 use crate::raster::parse;
 use crate::testing::{ball, moment, open, plane};
@@ -95,7 +95,7 @@ fn bodies(dimensions: u8, n: u32, style: Style) -> String {
         |k: u32| (0..=k).map(move |part| ball(Kind::Connector, k, at(part), 0.2).part(part));
     let frame = moment((0..n).flat_map(chain).collect());
     let trail = |k: u32| Trail {
-        of: (Kind::Connector, k, Some(0)),
+        of: Who::new(Kind::Connector, k, Some(0)),
         way: (0..20).map(|cycle| (cycle, at(k + cycle as u32))).collect(),
     };
     let trails: Vec<Trail> = (0..n).map(trail).collect();
@@ -110,7 +110,8 @@ fn meeting(dimensions: u8, n: u32, apart_m: f64) -> String {
     let zone = |k| ball(Kind::Zone, k, at(k), 2000.0);
     let frame = moment((0..n).flat_map(|k| [airplane(k), zone(k)]).collect());
     let from = |k: u32| [30_000.0 - 900.0 * f64::from(k), 20_000.0 * f64::from(k % 2), 3000.0];
-    let trail = |k| Trail { of: (Kind::Airplane, k, None), way: vec![(0, from(k)), (90, at(k))] };
+    let trail =
+        |k| Trail { of: Who::new(Kind::Airplane, k, None), way: vec![(0, from(k)), (90, at(k))] };
     let trails: Vec<Trail> = (0..n).map(trail).collect();
     let scenery = open(dimensions);
     draw(&scenery, &frame, &trails, &options(Style::MAP, &scenery)).unwrap()
@@ -271,8 +272,8 @@ proptest! {
         };
         let way = |k: usize| (0..).zip(points.iter().skip(k).copied()).collect();
         let trails = [
-            Trail { of: (Kind::Robot, 0, None), way: way(0) },
-            Trail { of: (Kind::Connector, 2, None), way: way(1) },
+            Trail { of: Who::new(Kind::Robot, 0, None), way: way(0) },
+            Trail { of: Who::new(Kind::Connector, 2, None), way: way(1) },
         ];
         let drawn = draw(&scenery, &moment(bodies), &trails, &options(Style::MAP, &scenery));
         if let Ok(svg) = drawn {

@@ -73,7 +73,7 @@ pub(crate) enum Symbol {
     /// A stretch of line, perhaps with its marker, and its dashes as an attribute.
     Line { color: Paint, marker: Option<Marker>, dash: &'static str },
     /// A marker alone.
-    Marker { color: &'static str, marker: Marker },
+    Marker { color: Paint, marker: Marker },
     /// The dashes of a reference line.
     Dashes { color: &'static str },
     /// A filled box.

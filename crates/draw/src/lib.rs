@@ -51,4 +51,4 @@ pub use error::DrawError;
 pub use film::{Film, Still};
 pub use picture::{Options, describe, draw, worth_a_trail};
 pub use raster::to_png;
-pub use style::{SERIES_COLORS, Style};
+pub use style::{Style, series_colors};

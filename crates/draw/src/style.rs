@@ -4,10 +4,14 @@ use crate::error::DrawError;
 use sidestep_kernel::view::{COLORS, Color};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Okabe and Ito's palette without its yellow, which is unreadable on white: distinct for every
-/// common color blindness.
-pub const SERIES_COLORS: [&str; 7] =
-    ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"];
+/// Number of colors of series.
+const SERIES: usize = COLORS.len() + 1;
+
+/// Returns the colors of series in SVG notation, those of bodies and black: Okabe and Ito's palette without its
+/// yellow, which is unreadable on white; distinct for every common color blindness.
+pub fn series_colors() -> Vec<String> {
+    (0..SERIES).map(series_color).collect()
+}
 
 /// Text and axes.
 pub(crate) const INK: &str = "#222222";
@@ -17,8 +21,9 @@ pub(crate) const FAINT_INK: &str = "#555555";
 pub(crate) const GRID: &str = "#E4E4E4";
 
 /// Returns the color of the series (or track) with this number; colors repeat after seven.
-pub(crate) fn series_color(index: usize) -> &'static str {
-    SERIES_COLORS[index % SERIES_COLORS.len()]
+pub(crate) fn series_color(index: usize) -> String {
+    const BLACK: Color = [0; 3];
+    hex(COLORS.get(index % SERIES).copied().unwrap_or(BLACK))
 }
 
 /// Dashes of lines, as attributes: the first time through the colors they have none.
@@ -31,7 +36,7 @@ const DASHES: [&str; 4] = [
 
 /// Returns the dashes of the line of a series, which differ where colors repeat.
 pub(crate) fn series_dash(index: usize) -> &'static str {
-    DASHES[index / SERIES_COLORS.len() % DASHES.len()]
+    DASHES[index / SERIES % DASHES.len()]
 }
 
 /// Returns the dashes of the ways of bodies with these numbers, which differ where colors repeat.
@@ -49,7 +54,7 @@ pub(crate) fn body_dashes(numbers: &BTreeSet<u32>) -> BTreeMap<u32, &'static str
 /// Returns the opacity of the bars of a series, and the color of their rim: bars of one color differ in
 /// both.
 pub(crate) fn series_fill(index: usize) -> (f64, &'static str) {
-    match index / SERIES_COLORS.len() {
+    match index / SERIES {
         0 => (1.0, "none"),
         1 => (0.5, INK),
         _ => (0.15, INK),
@@ -127,8 +132,10 @@ mod tests {
     }
 
     #[test]
-    fn series_have_the_colors_of_bodies() {
-        let of_bodies = sidestep_kernel::view::COLORS.map(hex);
-        assert_eq!(of_bodies.as_slice(), &SERIES_COLORS[..of_bodies.len()]);
+    fn series_have_the_colors_of_bodies_and_black() {
+        let colors = series_colors();
+        assert_eq!(colors[..COLORS.len()], COLORS.map(hex));
+        assert_eq!((colors.len(), &*colors[6]), (7, "#000000"));
+        assert_eq!([0, 7, 8].map(series_color), ["#0072B2", "#0072B2", "#D55E00"]);
     }
 }

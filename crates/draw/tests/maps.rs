@@ -5,7 +5,7 @@ use sidestep_draw::{Options, draw, to_png};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{
     Body, Condition, DOOR, Floor, Frame, Kind, MOBILE, Occupancy, Place, Plane, Pose, Scenery,
-    Shape, Trail, WALL,
+    Shape, Trail, WALL, Who,
 };
 
 const WHITE: [u8; 3] = [255, 255, 255];
@@ -111,7 +111,7 @@ fn went(number: u32, width: f64, way: &[(f64, f64)]) -> (Body, Trail) {
     // All in one cycle, so that the whole trail has one shade.
     let places = way.iter().map(|&at| (0 as Cycle, place(at))).collect();
     let robot = body(Kind::Robot, number, way[way.len() - 1], (width, width), 0);
-    (robot, Trail { of: (Kind::Robot, number, None), way: places })
+    (robot, Trail { of: Who::new(Kind::Robot, number, None), way: places })
 }
 
 /// Returns the room with robots that have gone ways.

@@ -13,7 +13,7 @@
 mod error;
 mod world;
 
-use crate::control::{CellsMut, OrderError, Orders, Team};
+use crate::control::{CellsMut, OrderError, Orders, Space, Team};
 use crate::digest::Digest;
 use crate::error::InputError;
 use crate::simulation::Simulation;
@@ -22,7 +22,7 @@ use crate::workers::Waiting;
 pub use error::BatchError;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use world::World;
+use world::{Extent, World};
 
 /// Makes a simulation at its start from a seed.
 pub type Start = dyn Fn(u64) -> Result<Box<dyn Simulation>, InputError> + Send + Sync;
@@ -178,8 +178,11 @@ impl Batch {
             shared.note(&world);
         };
         let theirs = Arc::clone(&self.shared);
-        let spaces: Vec<(bool, usize)> =
-            its.observed.iter().map(|space| space.is_whole()).zip(lengths.clone()).collect();
+        let extent = |(space, &length): (&Space, &usize)| {
+            let is_whole = space.is_whole();
+            Extent { is_whole, length }
+        };
+        let spaces: Vec<Extent> = its.observed.iter().zip(&lengths).map(extent).collect();
         self.crew.run(
             n,
             own,

@@ -159,19 +159,28 @@ pub(crate) struct Ran {
     pub(crate) times: PhaseTimes,
 }
 
-/// Runs a stretch of at least one cycle with one worker per element of `crew`, on `team` where
-/// there are several.
+/// The parts of an engine that run a stretch.
+pub(crate) struct Parts<'a, S, C> {
+    pub(crate) groups: &'a Groups,
+    /// One worker per element.
+    pub(crate) crew: &'a Crew<S>,
+    /// The threads of the crew, where it has several workers.
+    pub(crate) team: Option<&'a mut Team>,
+    pub(crate) clock: &'a C,
+    pub(crate) interrupt: &'a Interrupt,
+}
+
+/// Runs a stretch of at least one cycle.
 ///
-/// The result is the same bits for every length of `crew`.
+/// The result is the same bits for every length of the crew.
 pub(crate) fn advance<W: Phases, C: Clock>(
     world: &W,
     state: &W::State,
-    groups: &Groups,
-    (crew, team): (&Crew<W::Scratch>, Option<&mut Team>),
+    parts: Parts<'_, W::Scratch, C>,
     stretch: Stretch,
-    (clock, interrupt): (&C, &Interrupt),
     mut observer: Option<&mut dyn Observer<W>>,
 ) -> Ran {
+    let Parts { groups, crew, team, clock, interrupt } = parts;
     let started_ns = clock.now_ns();
     if let Some(observer) = &mut observer {
         observer.before_cycle(stretch.from, state);
@@ -253,9 +262,9 @@ impl<W: Phases> Shared<'_, W> {
 
     fn all_cycles<C: Clock>(&self, worker: &Worker<'_>, mut lead: Option<&mut Lead<'_, '_, W, C>>) {
         let mut held = None;
-        for (round, now) in (0..).zip(self.stretch.from..) {
+        for now in self.stretch.from.. {
             let mate = held.get_or_insert_with(|| lock(&self.crew[worker.index()]));
-            self.one_cycle(worker, mate, (now, round), lead.as_deref_mut());
+            self.one_cycle(worker, mate, now, lead.as_deref_mut());
             if self.is_observed {
                 // The observer locks the scratches of all workers, so each releases its own first.
                 held = None;
@@ -306,14 +315,15 @@ impl<W: Phases> Shared<'_, W> {
         &self,
         worker: &Worker<'_>,
         mate: &mut Mate<W::Scratch>,
-        (now, round): (Cycle, u64),
+        now: Cycle,
         mut lead: Option<&mut Lead<'_, '_, W, C>>,
     ) {
-        let &Self { world, state, groups, clock, .. } = self;
+        let &Self { world, state, groups, clock, stretch, .. } = self;
         let Mate { scratch, tally } = mate;
+        let pool = 3 * (now - stretch.from);
         let turn = &mut Turn { world, state, now, clock, scratch };
         let n = world.bodies(state);
-        worker.for_each_chunk(3 * round, n, |bodies| {
+        worker.for_each_chunk(pool, n, |bodies| {
             interrupt::look();
             bodies.clone().for_each(|body| groups.reset(body as Slot));
             W::claim(turn, bodies);
@@ -322,7 +332,7 @@ impl<W: Phases> Shared<'_, W> {
         if let Some(lead) = &mut lead {
             lead.end_phase(|times| &mut times.claim_ns);
         }
-        worker.for_each_chunk(3 * round + 1, n, |bodies| {
+        worker.for_each_chunk(pool + 1, n, |bodies| {
             interrupt::look();
             W::join(turn, bodies, groups);
         });
@@ -331,7 +341,7 @@ impl<W: Phases> Shared<'_, W> {
             lead.end_phase(|times| &mut times.join_ns);
         }
         let auction = world.auction();
-        worker.for_each_chunk(3 * round + 2, n, |bodies| {
+        worker.for_each_chunk(pool + 2, n, |bodies| {
             interrupt::look();
             bodies.for_each(|body| {
                 act_as_leader(turn, groups, tally, auction.is_some(), body as Slot);

@@ -4,7 +4,7 @@
 //! guessing, see `Pace`. Results do not depend on its choice.
 
 use crate::conflict::Groups;
-use crate::cycle::{Mate, Observer, PhaseTimes, Ran, Stretch, advance, lock};
+use crate::cycle::{Mate, Observer, Parts, PhaseTimes, Ran, Stretch, advance, lock};
 use crate::interrupt::Interrupt;
 use crate::ports::Clock;
 use crate::units::Cycle;
@@ -15,6 +15,15 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Bodies are rearranged after at least this many cycles, because they have not gone far by then,
 /// and sorting is below 1 % of the work.
 const ARRANGE_EVERY: u64 = 64;
+
+/// Cycles in a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Span {
+    /// The first cycle.
+    pub from: Cycle,
+    /// Their number.
+    pub cycles: u64,
+}
 
 /// Runs a world with as many workers as asked for, and keeps their shared data.
 #[derive(Debug)]
@@ -75,26 +84,20 @@ impl<W: Phases> Engine<W> {
         self.groups.heap_bytes()
     }
 
-    /// Runs `cycles` cycles from `from` on, for worlds that need no observer in between: events
-    /// carry their cycle, and wait in the scratches.
-    pub fn advance(
-        &mut self,
-        world: &W,
-        state: &mut W::State,
-        span: (Cycle, u64),
-        clock: &impl Clock,
-    ) {
+    /// Runs the cycles of a span, for worlds that need no look in between: events carry
+    /// their cycle, and wait in the scratches.
+    pub fn advance(&mut self, world: &W, state: &mut W::State, span: Span, clock: &impl Clock) {
         self.run(world, state, span, clock, None);
     }
 
-    /// Runs up to `cycles` cycles from `from` on, and returns their number: fewer where `observer`,
+    /// Runs the cycles of a span, and returns how many: fewer where `observer`,
     /// which is called between all cycles, has ended the run. One call with many cycles is cheaper
     /// than many calls, because every call starts the threads anew.
     pub fn advance_observed(
         &mut self,
         world: &W,
         state: &mut W::State,
-        span: (Cycle, u64),
+        span: Span,
         clock: &impl Clock,
         observer: &mut dyn Observer<W>,
     ) -> u64 {
@@ -105,10 +108,11 @@ impl<W: Phases> Engine<W> {
         &mut self,
         world: &W,
         state: &mut W::State,
-        (from, cycles): (Cycle, u64),
+        span: Span,
         clock: &impl Clock,
         mut observer: Option<&mut dyn Observer<W>>,
     ) -> u64 {
+        let Span { from, cycles } = span;
         let mut done = 0;
         while done < cycles {
             if self.since_arranged >= ARRANGE_EVERY {
@@ -142,8 +146,9 @@ impl<W: Phases> Engine<W> {
     ) -> Ran {
         let crew = &self.crew[..workers];
         let team = (workers > 1).then(|| self.team.get_or_insert_with(|| Team::new(workers)));
-        let signs = (clock, &self.interrupt);
-        advance(world, state, &self.groups, (crew, team), stretch, signs, observer)
+        let (groups, interrupt) = (&self.groups, &self.interrupt);
+        let parts = Parts { groups, crew, team, clock, interrupt };
+        advance(world, state, parts, stretch, observer)
     }
 }
 
@@ -485,7 +490,7 @@ mod tests {
         let world = Ticking { clock: &clock, alone_ns: 20_000, helper_ns: 20_000_000 };
         let (mut state, cycles) = (ticks(3), 200_000);
         let mut engine = Engine::new(&world, 3, 2);
-        engine.advance(&world, &mut state, (0, cycles), &clock);
+        engine.advance(&world, &mut state, Span { from: 0, cycles }, &clock);
         assert!(engine.team.is_some(), "it was looked at");
         let took_ns = clock.now_ns() as f64;
         let alone_ns = (cycles * world.alone_ns) as f64;
@@ -499,7 +504,7 @@ mod tests {
         let clock = ManualClock::default();
         let world = Ticking { clock: &clock, alone_ns: 5_000, helper_ns: 1 };
         let mut engine = Engine::new(&world, 3, 2);
-        engine.advance(&world, &mut ticks(3), (0, 200_000), &clock);
+        engine.advance(&world, &mut ticks(3), Span { from: 0, cycles: 200_000 }, &clock);
         assert!(engine.team.is_none());
     }
 
@@ -540,9 +545,10 @@ mod tests {
             let mut engine = Engine::new(&world, 5, workers);
             engine.share_always();
             let (mut state, mut notes) = (ticks(5), Notes { last: 149, ..Notes::default() });
-            for span in [(0, 1), (1, 99), (100, 1000)] {
+            for (from, cycles) in [(0, 1), (1, 99), (100, 1000)] {
+                let span = Span { from, cycles };
                 let done = engine.advance_observed(&world, &mut state, span, &clock, &mut notes);
-                assert_eq!(done, span.1.min(150 - span.0));
+                assert_eq!(done, cycles.min(150 - from));
             }
             assert_eq!(notes.began, (0..150).map(|now| (now, now)).collect::<Vec<_>>());
             let all = (0..150).flat_map(|now| (0..5).map(move |body| (now, body)));

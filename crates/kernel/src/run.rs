@@ -6,7 +6,7 @@ use crate::control::{
 };
 use crate::cycle::{Observer, PhaseTimes, Scratches};
 use crate::digest::Digest;
-use crate::engine::Engine;
+use crate::engine::{Engine, Span};
 use crate::interrupt::Interrupt;
 use crate::plan::{Effort, GroupSizes, Plan};
 use crate::ports::{Buffer, RecordError, Recorder, RowBuffer, SystemClock, TableSchema};
@@ -54,7 +54,8 @@ impl<W: World> Run<W> {
     pub fn new(
         world: Arc<W>,
         plan: Plan,
-        (state, books): (W::State, W::Books),
+        state: W::State,
+        books: W::Books,
         scenario: &str,
         workers: usize,
     ) -> Self {
@@ -158,7 +159,7 @@ impl<W: World> Run<W> {
     fn stretch(&mut self, cycles: u64) -> u64 {
         let cycles = cycles.min(self.room());
         let Self { world, state, books, engine, clock, .. } = self;
-        let span = (self.cycle, cycles);
+        let span = Span { from: self.cycle, cycles };
         let done = match W::LOOKS_EACH_CYCLE {
             false => {
                 engine.advance(world, state, span, clock);

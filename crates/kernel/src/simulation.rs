@@ -13,7 +13,8 @@ use crate::words::{Lines, Said};
 use crate::world::Decides;
 use std::any::Any;
 
-/// A world and a state that advances. [`crate::Run`] is the one implementation; code that knows the world finds its
+/// A world and a state that advances. [`crate::Run`] is the one implementation that computes; a recording that can
+/// only be shown has the same face, without metrics, teams or inspections. Code that knows the world finds its
 /// [`crate::Run`] by [`Any`].
 pub trait Simulation: Any + Send {
     /// Name of the world, e.g. `robots`.

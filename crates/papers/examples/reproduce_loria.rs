@@ -4,7 +4,7 @@
 //! recorded to a temporary folder, column by column.
 
 use sidestep::kernel::ports::{RecordError, Recorder, TableSchema, Values};
-use sidestep_papers::loria::{self, Plan};
+use sidestep_papers::loria::{self, LoriaPlan};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 
@@ -44,7 +44,7 @@ fn columns(schemas: &[TableSchema]) -> Result<Box<dyn Recorder>, RecordError> {
 
 fn main() -> Result<(), loria::LoriaError> {
     let quick = std::env::args().any(|argument| argument == "--quick");
-    let plan = if quick { Plan::quick() } else { Plan::default() };
+    let plan = if quick { LoriaPlan::quick() } else { LoriaPlan::default() };
     let mut last = -1;
     let mut progress = |what: &str, share: f64| {
         let percent = (100.0 * share) as i32;

@@ -12,8 +12,8 @@
 
 mod sockets;
 
-use crate::cells::{Cell, Columns, Run, Runs, Value, column, figure, series};
-use crate::claims::{Comparison, File, Words, both, judged, listed};
+use crate::cells::{CaseResults, Columns, Run, Runs, Value, column, figure, series};
+use crate::claims::{Comparison, File, Parts, Words, both, judged, listed};
 use crate::study::{Progress, Study, finish, known, number, setting, source};
 use serde::Serialize;
 use sidestep::kernel::{InputError, Simulation};
@@ -27,7 +27,7 @@ pub use sockets::{Case, Flies, Measured, Sockets, measure};
 
 /// The amount of work to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Plan {
+pub struct AgentflyPlan {
     /// Numbers of airplanes.
     pub airplanes: Vec<usize>,
     /// Runs of each number, by seed from 1.
@@ -53,7 +53,7 @@ pub struct SocketsPlan {
     pub cycles: u64,
 }
 
-impl Default for Plan {
+impl Default for AgentflyPlan {
     fn default() -> Self {
         let workers = sidestep::kernel::workers::available();
         let sockets = SocketsPlan { airplanes: (2..=10).collect(), seeds: 5, cycles: 400 };
@@ -68,7 +68,7 @@ impl Default for Plan {
     }
 }
 
-impl Plan {
+impl AgentflyPlan {
     /// Returns a rehearsal of minutes at most, long enough for airplanes to meet.
     pub fn quick() -> Self {
         let sockets = SocketsPlan { airplanes: vec![3], seeds: 1, cycles: 20 };
@@ -87,9 +87,9 @@ impl Plan {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// The plan that was run.
-    pub plan: Plan,
+    pub plan: AgentflyPlan,
     /// Results by number of airplanes, the team before the coordinator.
-    cells: Vec<Cell>,
+    cells: Vec<CaseResults>,
     /// The paper's claims and our verdicts.
     pub claims: Vec<Claim>,
     /// Measurements over real sockets, once there are any.
@@ -197,10 +197,10 @@ fn spent(case: &Runs<'_>, run: &Run<'_>) -> Spent {
 ///
 /// # Errors
 /// When the plan asks for an impossible scenario.
-pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, InputError> {
+pub fn run(plan: &AgentflyPlan, progress: &mut Progress<'_>) -> Result<Report, InputError> {
     let study = Study::of_file(SWEEP, SCENARIO)?.sized(plan.seeds, Some(plan.cycles));
     let study = study.keep(|v| plan.airplanes.contains(&(number(v, AIRPLANES) as usize)));
-    let cells = COLUMNS.cells(&study.run((plan.workers, "super-conflicts"), progress)?);
+    let cells = COLUMNS.cells(&study.run(plan.workers, "super-conflicts", progress)?);
     let claims = judge(&cells);
     let largest = plan.airplanes.iter().copied().max().unwrap_or(0);
     let tracks_m = tracks_m(plan, largest)?;
@@ -208,7 +208,7 @@ pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, InputErro
 }
 
 /// Returns the ways of `n` airplanes with the first seed.
-fn tracks_m(plan: &Plan, n: usize) -> Result<Vec<Vec<AirPoint>>, InputError> {
+fn tracks_m(plan: &AgentflyPlan, n: usize) -> Result<Vec<Vec<AirPoint>>, InputError> {
     let settings = [
         setting(AIRPLANES, n as i64),
         setting("airspace.deployment", "direct"),
@@ -230,38 +230,61 @@ fn tracks_m(plan: &Plan, n: usize) -> Result<Vec<Vec<AirPoint>>, InputError> {
 }
 
 /// Returns team and coordinator at each number of airplanes at which either sent any message.
-fn pairs(cells: &[Cell]) -> impl Iterator<Item = (&Cell, &Cell)> {
-    let talks = |cell: &Cell| cell.number("messages") > 0.0;
+fn pairs(cells: &[CaseResults]) -> impl Iterator<Item = (&CaseResults, &CaseResults)> {
+    let talks = |cell: &CaseResults| cell.number("messages") > 0.0;
     let both = cells.chunks_exact(2).map(|pair| (&pair[0], &pair[1]));
     both.filter(move |(team, pim)| talks(team) && talks(pim))
 }
 
-/// Returns a value of the coordinator divided by one of the team, seed by seed, if both are there
-/// and not 0.
-fn ratios(cells: &[Cell], of_pim: &str, of_team: &str) -> Vec<Estimate> {
-    pairs(cells).map(|(team, pim)| ratio((pim, of_pim), (team, of_team))).collect()
+/// A quantity of the flights of one case.
+#[derive(Clone, Copy)]
+struct Quantity<'a> {
+    of: &'a CaseResults,
+    name: &'a str,
 }
 
-fn ratio((a, of_a): (&Cell, &str), (b, of_b): (&Cell, &str)) -> Estimate {
-    let values = |cell: &Cell, of: &str| -> Vec<Option<f64>> {
-        cell.by_seed("by_seed", of).into_iter().map(|v| v.filter(|v| *v > 0.0)).collect()
+impl Quantity<'_> {
+    fn by_seed(&self) -> Vec<Option<f64>> {
+        self.of.by_seed("by_seed", self.name)
+    }
+}
+
+/// Returns a quantity of the coordinator above one of the team, at each number of airplanes.
+fn fractions<'a>(
+    cells: &'a [CaseResults],
+    of_pim: &'a str,
+    of_team: &'a str,
+) -> Vec<[Quantity<'a>; 2]> {
+    let pim_over_team =
+        |(team, pim)| [Quantity { of: pim, name: of_pim }, Quantity { of: team, name: of_team }];
+    pairs(cells).map(pim_over_team).collect()
+}
+
+/// Returns a value of the coordinator divided by one of the team, seed by seed, if both are there
+/// and not 0.
+fn ratios(cells: &[CaseResults], of_pim: &str, of_team: &str) -> Vec<Estimate> {
+    fractions(cells, of_pim, of_team).into_iter().map(ratio).collect()
+}
+
+fn ratio([a, b]: [Quantity<'_>; 2]) -> Estimate {
+    let values = |of: Quantity<'_>| -> Vec<Option<f64>> {
+        of.by_seed().into_iter().map(|v| v.filter(|v| *v > 0.0)).collect()
     };
-    Estimate::ratio(&values(a, of_a), &values(b, of_b))
+    Estimate::ratio(&values(a), &values(b))
 }
 
 /// Returns the power of the number of airplanes with which a ratio grows: its slope over that number,
 /// both on logarithmic scales, seed by seed. Nothing with fewer than two numbers of airplanes.
-fn power((a, of_a): (&[&Cell], &str), (b, of_b): (&[&Cell], &str)) -> Estimate {
-    let seeds = a.iter().map(|cell| cell.runs()).max().unwrap_or(0);
+fn power(fractions: &[[Quantity<'_>; 2]]) -> Estimate {
+    let seeds = fractions.iter().map(|[a, _]| a.of.runs()).max().unwrap_or(0);
     let slope = |seed: usize| {
-        let point = |(a, b): (&&Cell, &&Cell)| {
-            let value =
-                |cell: &Cell, of: &str| cell.by_seed("by_seed", of).get(seed).copied().flatten();
-            let ratio = value(a, of_a)? / value(b, of_b)?;
+        let point = |[a, b]: &[Quantity<'_>; 2]| {
+            let value = |of: &Quantity<'_>| of.by_seed().get(seed).copied().flatten();
+            let ratio = value(a)? / value(b)?;
             (ratio.is_finite() && ratio > 0.0)
-                .then(|| ((a.count("airplanes") as f64).ln(), ratio.ln()))
+                .then(|| ((a.of.count("airplanes") as f64).ln(), ratio.ln()))
         };
-        let (x, y): (Vec<f64>, Vec<f64>) = a.iter().zip(b).filter_map(point).unzip();
+        let (x, y): (Vec<f64>, Vec<f64>) = fractions.iter().filter_map(point).unzip();
         let rows: Vec<Vec<f64>> = x.iter().map(|x| vec![1.0, *x]).collect();
         Fit::new(&rows, &y).map(|fit| fit.coefficients[1])
     };
@@ -280,7 +303,7 @@ fn claim(id: &str, verdict: Verdict, ours: impl Into<String>) -> Claim {
     WORDS.claim(id, verdict, ours.into())
 }
 
-fn judge(cells: &[Cell]) -> Vec<Claim> {
+fn judge(cells: &[CaseResults]) -> Vec<Claim> {
     vec![
         takes_more_time(cells),
         needs_fewer_messages(cells),
@@ -293,13 +316,13 @@ fn judge(cells: &[Cell]) -> Vec<Claim> {
     ]
 }
 
-fn takes_more_time(cells: &[Cell]) -> Claim {
+fn takes_more_time(cells: &[CaseResults]) -> Claim {
     let ratios = ratios(cells, "elapsed_s", "elapsed_s");
     let verdict = judged(ratios.iter().map(|ratio| Comparison::above(ratio, 1.0)));
     claim("A-1", verdict, format!("pim / team: {}", each(&ratios)))
 }
 
-fn needs_fewer_messages(cells: &[Cell]) -> Claim {
+fn needs_fewer_messages(cells: &[CaseResults]) -> Claim {
     let ratios = ratios(cells, "messages", "messages");
     let verdict = judged(ratios.iter().map(|ratio| Comparison::below(ratio, 1.0)));
     claim("A-2", verdict, format!("pim / team: {}", each(&ratios)))
@@ -307,15 +330,14 @@ fn needs_fewer_messages(cells: &[Cell]) -> Claim {
 
 /// Judges the bytes of the coordinator beside those of a team, `of_team`: each message to each
 /// receiver, or once to all.
-fn moves_far_more_bytes(cells: &[Cell], id: &str, of_team: &str) -> Claim {
+fn moves_far_more_bytes(cells: &[CaseResults], id: &str, of_team: &str) -> Claim {
     let ratios = ratios(cells, "bytes", of_team);
     let verdict = judged(ratios.iter().map(|ratio| Comparison::above(ratio, 2.0)));
     claim(id, verdict, format!("pim / team: {}", each(&ratios)))
 }
 
-fn bytes_grow_faster(cells: &[Cell], id: &str, of_team: &str) -> Claim {
-    let (teams, pims): (Vec<&Cell>, Vec<&Cell>) = pairs(cells).unzip();
-    let power = power((&pims, "bytes"), (&teams, of_team));
+fn bytes_grow_faster(cells: &[CaseResults], id: &str, of_team: &str) -> Claim {
+    let power = power(&fractions(cells, "bytes", of_team));
     let ends = ends(&ratios(cells, "bytes", of_team));
     let ours = format!(
         "pim / team grows with the power {power} of the number of airplanes; with the fewest and the most: {}",
@@ -332,13 +354,13 @@ fn ends(ratios: &[Estimate]) -> Vec<Estimate> {
     }
 }
 
-fn multicast_saves(cells: &[Cell]) -> Claim {
+fn multicast_saves(cells: &[CaseResults]) -> Claim {
     // To the only other one of two, a multicast is an ordinary message.
-    let (teams, _): (Vec<&Cell>, Vec<&Cell>) =
-        pairs(cells).filter(|(team, _)| team.count("airplanes") > 2).unzip();
-    let saved = |team: &&Cell| ratio((team, "bytes"), (team, "multicast_bytes"));
-    let saved: Vec<Estimate> = teams.iter().map(saved).collect();
-    let power = power((&teams, "bytes"), (&teams, "multicast_bytes"));
+    let teams = pairs(cells).map(|(team, _)| team).filter(|team| team.count("airplanes") > 2);
+    let saved = |of| ["bytes", "multicast_bytes"].map(|name| Quantity { of, name });
+    let fractions: Vec<_> = teams.map(saved).collect();
+    let saved: Vec<Estimate> = fractions.iter().copied().map(ratio).collect();
+    let power = power(&fractions);
     let verdict = both(&[
         judged(saved.iter().map(|saved| Comparison::above(saved, 1.0))),
         judged([Comparison::above(&power, 0.0)]),
@@ -350,10 +372,10 @@ fn multicast_saves(cells: &[Cell]) -> Claim {
     claim("A-5", verdict, ours)
 }
 
-fn hardly_in_time(cells: &[Cell]) -> Claim {
+fn hardly_in_time(cells: &[CaseResults]) -> Claim {
     let coordinators =
         || pairs(cells).map(|(_, pim)| pim).filter(|pim| pim.count("airplanes") >= MANY);
-    let slow = |pim: &Cell| Comparison::above(pim.estimate("optimization_s"), DT_S);
+    let slow = |pim: &CaseResults| Comparison::above(pim.estimate("optimization_s"), DT_S);
     let ours = listed(coordinators(), |pim| {
         format!("{} airplanes: {} s", pim.count("airplanes"), pim.estimate("optimization_s"))
     });
@@ -438,7 +460,8 @@ impl Report {
         let results = (self.figures(), vec![self.table(), self.links_table()]);
         let sockets = self.sockets.iter().map(|sockets| (Vec::new(), vec![sockets.table()]));
         let experiments = WORDS.experiments([results].into_iter().chain(sockets));
-        WORDS.document(lead, plan.quick, (&self.claims, Vec::new(), experiments), command)
+        let parts = Parts { claims: &self.claims, pictures: Vec::new(), experiments };
+        WORDS.document(lead, plan.quick, parts, command)
     }
 }
 
@@ -458,7 +481,7 @@ mod tests {
     #[test]
     fn a_rehearsal_judges_every_claim() {
         // Up to the first cycles in which they must avoid each other.
-        let short = Plan { seeds: 1, cycles: 16, ..Plan::quick() };
+        let short = AgentflyPlan { seeds: 1, cycles: 16, ..AgentflyPlan::quick() };
         let report = run(&short, &mut |_, _| ()).expect("a valid plan");
         assert_eq!((report.cells.len(), report.claims.len()), (6, 8));
         assert!(report.cells.iter().all(|cell| cell.number("messages") > 0.0), "all have talked");
@@ -479,10 +502,10 @@ mod tests {
         multicast_bytes: f64,
     }
 
-    fn made(airplanes: u64, deployment: &str, of: &Made) -> Cell {
+    fn made(airplanes: u64, deployment: &str, of: &Made) -> CaseResults {
         // As they differ by seed in a real experiment, but little.
         let spread = |value: f64, seed: usize| value * (1.0 + 0.001 * seed as f64);
-        let seeds = Plan::default().seeds;
+        let seeds = AgentflyPlan::default().seeds;
         let estimate =
             |value| Value::Estimate(Estimate::of((0..seeds).map(|s| Some(spread(value, s)))));
         let of_run = |seed: usize| {
@@ -502,11 +525,11 @@ mod tests {
             ("messages", estimate(of.messages)),
             ("by_seed", Value::BySeed((0..seeds).map(of_run).collect())),
         ];
-        Cell::new([], came)
+        CaseResults::new([], came)
     }
 
     /// Team and coordinator with numbers that the paper would be right with, or wrong.
-    fn paper(is_right: bool, airplanes: u64) -> [Cell; 2] {
+    fn paper(is_right: bool, airplanes: u64) -> [CaseResults; 2] {
         let n = airplanes as f64;
         let multicast_bytes = if is_right { n } else { n * n };
         let team = Made {
@@ -535,7 +558,7 @@ mod tests {
         [made(airplanes, BOTH[0], &team), made(airplanes, BOTH[1], &pim)]
     }
 
-    fn verdicts(cells: &[[Cell; 2]]) -> Vec<Verdict> {
+    fn verdicts(cells: &[[CaseResults; 2]]) -> Vec<Verdict> {
         judge(&cells.concat()).iter().map(|claim| claim.verdict).collect()
     }
 

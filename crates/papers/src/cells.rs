@@ -138,7 +138,7 @@ pub(crate) struct Column {
     /// Its head in the table; a column without one is not shown there.
     head: &'static str,
     of: fn(&Runs<'_>) -> Value,
-    show: Option<fn(&Cell) -> String>,
+    show: Option<fn(&CaseResults) -> String>,
 }
 
 /// Returns a column that is shown as its value prints.
@@ -152,7 +152,7 @@ pub(crate) const fn column(
 
 impl Column {
     /// Sets how the column is shown.
-    pub(crate) const fn shown(self, show: fn(&Cell) -> String) -> Self {
+    pub(crate) const fn shown(self, show: fn(&CaseResults) -> String) -> Self {
         Self { show: Some(show), ..self }
     }
 }
@@ -165,12 +165,12 @@ pub(crate) struct Columns {
 
 impl Columns {
     /// Returns a cell for every case.
-    pub(crate) fn cells(&self, results: &Results) -> Vec<Cell> {
+    pub(crate) fn cells(&self, results: &Results) -> Vec<CaseResults> {
         let named = |columns: &[Column], runs: &Runs<'_>| {
             columns.iter().map(|c| (c.name, (c.of)(runs))).collect()
         };
         runs(results)
-            .map(|r| Cell {
+            .map(|r| CaseResults {
                 case: named(self.case, &r),
                 came: named(self.came, &r),
                 runs: r.rows.len(),
@@ -179,7 +179,7 @@ impl Columns {
     }
 
     /// Returns the cells as a table.
-    pub(crate) fn table(&self, title: &str, note: &str, cells: &[Cell]) -> Table {
+    pub(crate) fn table(&self, title: &str, note: &str, cells: &[CaseResults]) -> Table {
         let shown: Vec<&Column> =
             self.case.iter().chain(self.came).filter(|c| !c.head.is_empty()).collect();
         let heads: Vec<&str> = shown.iter().map(|c| c.head).collect();
@@ -251,13 +251,13 @@ impl fmt::Display for Value {
 
 /// Results of one case.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Cell {
+pub(crate) struct CaseResults {
     case: Vec<(&'static str, Value)>,
     came: Vec<(&'static str, Value)>,
     runs: usize,
 }
 
-impl Cell {
+impl CaseResults {
     /// Returns a made-up cell of 10 runs.
     #[cfg(test)]
     pub(crate) fn new(
@@ -371,7 +371,7 @@ impl Cell {
     }
 }
 
-impl Serialize for Cell {
+impl Serialize for CaseResults {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         struct Case<'a>(&'a [(&'static str, Value)]);
         impl Serialize for Case<'_> {
@@ -410,7 +410,7 @@ pub(crate) fn table<T>(
 /// Returns a series of cells: column `y` over column `x`.
 pub(crate) fn series<'a>(
     name: impl Into<String>,
-    cells: impl IntoIterator<Item = &'a Cell>,
+    cells: impl IntoIterator<Item = &'a CaseResults>,
     [x, y]: [&str; 2],
 ) -> Series {
     let points = cells.into_iter().filter_map(|c| c.point(c.number(x), y)).collect();
@@ -420,7 +420,7 @@ pub(crate) fn series<'a>(
 /// Returns a series over the numbers of categories.
 pub(crate) fn bars<'a>(
     name: impl Into<String>,
-    cells: impl IntoIterator<Item = &'a Cell>,
+    cells: impl IntoIterator<Item = &'a CaseResults>,
     y: &str,
 ) -> Series {
     let points = (0..).zip(cells).filter_map(|(k, c)| c.point(f64::from(k), y)).collect();

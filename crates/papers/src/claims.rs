@@ -1,6 +1,6 @@
 //! Words of the reports, shared by all papers, and verdicts over several results.
 
-use crate::cells::{Cell, Share};
+use crate::cells::{CaseResults, Share};
 use serde::Deserialize;
 use sidestep::statistics::{Interval, holm, share_p_value};
 use sidestep_document::claim::{Claim, Verdict};
@@ -29,8 +29,12 @@ struct About {
     about: String,
 }
 
-/// Claims, pictures and experiments of a report.
-pub(crate) type Parts<'a> = (&'a [Claim], Vec<Picture>, Vec<Experiment>);
+/// The parts of a report.
+pub(crate) struct Parts<'a> {
+    pub(crate) claims: &'a [Claim],
+    pub(crate) pictures: Vec<Picture>,
+    pub(crate) experiments: Vec<Experiment>,
+}
 
 /// A claim in words.
 #[derive(Debug, Deserialize)]
@@ -68,14 +72,14 @@ impl File {
         &self,
         lead: String,
         quick: bool,
-        (claims, pictures, experiments): Parts<'_>,
+        parts: Parts<'_>,
         command: String,
     ) -> Document {
-        let mut document = document::of_paper(&self.title, lead, quick, claims);
-        if !pictures.is_empty() {
-            document.section("Pictures").pictures(pictures);
+        let mut document = document::of_paper(&self.title, lead, quick, parts.claims);
+        if !parts.pictures.is_empty() {
+            document.section("Pictures").pictures(parts.pictures);
         }
-        for experiment in experiments {
+        for experiment in parts.experiments {
             document.experiment(experiment);
         }
         document.section("How to run it again").commands("In a shell", command);
@@ -174,8 +178,8 @@ pub(crate) fn in_every_run(runs: usize, holds: bool) -> Verdict {
 
 /// Judges a rule for every run of every cell.
 pub(crate) fn every<'a>(
-    cells: impl IntoIterator<Item = &'a Cell>,
-    holds: impl Fn(&Cell) -> bool,
+    cells: impl IntoIterator<Item = &'a CaseResults>,
+    holds: impl Fn(&CaseResults) -> bool,
 ) -> Verdict {
     let (mut runs, mut all) = (0, true);
     for cell in cells {

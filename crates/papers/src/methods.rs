@@ -46,7 +46,16 @@ pub struct MethodResult {
     pub shield_overrides: Estimate,
 }
 
-/// Runs `source` with each method and `runs` seeds, starting at its own, until all airplanes have
+/// The runs of each method, by seeds that follow one another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SeedSpan {
+    /// The seed of the first run.
+    pub first: u64,
+    /// Number of runs.
+    pub runs: usize,
+}
+
+/// Runs `source` with each method and each seed, until all airplanes have
 /// arrived or its cycles are over; once where no random number is drawn, and where two runs with
 /// different seeds end in the same state.
 ///
@@ -55,11 +64,11 @@ pub struct MethodResult {
 pub fn compare(
     source: &Source,
     methods: &[Method],
-    (seed, runs): (u64, usize),
+    seeds: SeedSpan,
     workers: usize,
     progress: &mut Progress<'_>,
 ) -> Result<Vec<MethodResult>, InputError> {
-    compare_heeding(source, methods, (seed, runs), workers, (progress, &Interrupt::default()))
+    compare_heeding(source, methods, seeds, workers, progress, &Interrupt::default())
 }
 
 /// Compares methods like [`compare`], and unwinds when the interrupt is raised.
@@ -69,11 +78,12 @@ pub fn compare(
 pub fn compare_heeding(
     source: &Source,
     methods: &[Method],
-    (seed, runs): (u64, usize),
+    seeds: SeedSpan,
     workers: usize,
-    (progress, interrupt): (&mut Progress<'_>, &Interrupt),
+    progress: &mut Progress<'_>,
+    interrupt: &Interrupt,
 ) -> Result<Vec<MethodResult>, InputError> {
-    check_seeds(seed, runs as u64).map_err(|cause| {
+    check_seeds(seeds.first, seeds.runs as u64).map_err(|cause| {
         let remedy = "begin with a smaller seed, or run less often";
         InputError::new(source.file_place(), cause, remedy)
     })?;
@@ -83,8 +93,8 @@ pub fn compare_heeding(
             source.clone().with(&[setting("airspace.method", method.name()).to_override()])?;
         let report = |share| progress(method.name(), share);
         let flights = Flights { source: &source, workers, interrupt };
-        let (seeds, all) = flights.all((seed, runs), report)?;
-        results.push(result(method.name(), seeds, &all));
+        let (change, all) = flights.all(seeds, report)?;
+        results.push(result(method.name(), change, &all));
     }
     Ok(results)
 }
@@ -103,10 +113,10 @@ impl Flights<'_> {
     /// Flies with as many seeds as are of use, and returns the effect of seeds.
     fn all(
         &self,
-        (seed, runs): (u64, usize),
+        SeedSpan { first, runs }: SeedSpan,
         mut report: impl FnMut(f64),
     ) -> Result<(Seeds, Vec<Metrics>), InputError> {
-        let seeds: Vec<u64> = (seed..seed + runs as u64).collect();
+        let seeds: Vec<u64> = (first..first + runs as u64).collect();
         let first = match Compiled::new(self.source)?.seeds {
             Seeds::Nothing => return Ok((Seeds::Nothing, ends(&self.fly(&seeds[..1], report)?))),
             Seeds::Perhaps if runs > TRIALS => self.fly(&seeds[..TRIALS], &mut report)?,
@@ -255,13 +265,17 @@ fn note(results: &[MethodResult]) -> String {
 mod tests {
     use super::*;
 
+    fn seeds(runs: usize) -> SeedSpan {
+        SeedSpan { first: 1, runs }
+    }
+
     #[test]
     fn traffic_that_no_seed_changes_is_flown_once_and_has_no_interval() {
         let text = "format = 1\nworld = \"airspace\"\n[airspace]\nshield = \"off\"\n\
                     [[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[9000, 0]]\n\
                     [[airplanes]]\nat_m = [9000, 500]\nheading_deg = 180\nway_points_m = [[0, 500]]\n";
         let source = Source::new("two", text, "");
-        let found = compare(&source, &Method::ALL, (1, 5), 2, &mut |_, _| ()).expect("valid");
+        let found = compare(&source, &Method::ALL, seeds(5), 2, &mut |_, _| ()).expect("valid");
         let table = table("t", &found);
         for (result, row) in found.iter().zip(&table.rows) {
             assert_eq!((result.runs, result.losses.n), (1, 1), "{}", result.method);
@@ -280,7 +294,7 @@ mod tests {
                     [airspace.generator]\nkind = \"superconflict\"\nn = 4\n";
         let source = Source::new("four", text, "");
         let methods = [Method::Pc, Method::None];
-        let found = compare(&source, &methods, (1, 3), 2, &mut |_, _| ()).expect("valid");
+        let found = compare(&source, &methods, seeds(3), 2, &mut |_, _| ()).expect("valid");
         assert_eq!((found[0].loss_free, found[1].loss_free), (3, 0));
         assert_eq!(found[0].arrived.mean, Some(1.0));
         let table = table("t", &found);
@@ -295,7 +309,7 @@ mod tests {
         let text = "format = 1\nworld = \"airspace\"\n\
                     [airspace.generator]\nkind = \"superconflict\"\nn = 4\n";
         let source = Source::new("four", text, "");
-        let found = compare(&source, &[Method::None], (1, 2), 2, &mut |_, _| ()).expect("valid");
+        let found = compare(&source, &[Method::None], seeds(2), 2, &mut |_, _| ()).expect("valid");
         assert_eq!(found[0].loss_free, 2);
         let note = table("t", &found).note;
         assert!(note.contains("The shield changed commands of none:"), "{note}");

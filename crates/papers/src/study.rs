@@ -124,10 +124,11 @@ impl Study {
     /// When a scenario is wrong.
     pub(crate) fn run(
         &self,
-        (workers, what): (usize, &str),
+        workers: usize,
+        what: &str,
         progress: &mut Progress<'_>,
     ) -> Result<Results, InputError> {
-        self.run_by((workers, what), progress, |scenario, _, cell| {
+        self.run_by(workers, what, progress, |scenario, _, cell| {
             let run = start(WORLDS, *cell, &scenario()?, 1)?;
             Ok(run.run(&|| true).expect("nobody stops it"))
         })
@@ -139,12 +140,13 @@ impl Study {
     /// The first error that `run` returns.
     pub(crate) fn run_with(
         &self,
-        what: (usize, &str),
+        workers: usize,
+        what: &str,
         progress: &mut Progress<'_>,
         settings: impl Fn(&Variant, u64) -> Vec<Setting> + Sync,
         run: impl Fn(&Source, &Cell) -> Result<Outcome, InputError> + Sync,
     ) -> Result<Results, InputError> {
-        self.run_by(what, progress, |_, variant, cell| {
+        self.run_by(workers, what, progress, |_, variant, cell| {
             let all = [&self.sweep.fixed[..], &settings(variant, cell.seed)].concat();
             run(&source(self.scenario, &all)?, cell)
         })
@@ -157,7 +159,8 @@ impl Study {
     /// The first error that `run` returns.
     pub(crate) fn run_by(
         &self,
-        (workers, what): (usize, &str),
+        workers: usize,
+        what: &str,
         progress: &mut Progress<'_>,
         run: impl Fn(&Scenario<'_>, &Variant, &Cell) -> Result<Outcome, InputError> + Sync,
     ) -> Result<Results, InputError> {
@@ -257,7 +260,7 @@ mod tests {
         let run = |_: &Scenario<'_>, v: &Variant, cell: &Cell| {
             Ok(outcome(cell, json!({ "x": 10.0 * number(v, "n") + cell.seed as f64 })))
         };
-        let results = study.run_by((2, ""), &mut |_, _| (), run).expect("valid");
+        let results = study.run_by(2, "", &mut |_, _| (), run).expect("valid");
         let x = results.table.column("x").expect("there");
         let values: Vec<_> = (0..4).filter_map(|row| x.values.number(row)).collect();
         assert_eq!(values, [21.0, 22.0, 31.0, 32.0]);

@@ -25,7 +25,7 @@ impl Source {
     pub fn keys(&self, path: &str) -> Vec<Key> {
         let Ok(root) = DeTable::parse(&self.text) else { return Vec::new() };
         let (span, root) = (root.span(), DeValue::Table(root.into_inner()));
-        let found = find(&Spanned::new(span, root), path).map(|(_, value)| keys_of(value));
+        let found = find(&Spanned::new(span, root), path).map(|found| keys_of(found.value));
         let mut keys = found.unwrap_or_default();
         keys.sort_by_key(|key| key.span.start);
         keys
@@ -76,7 +76,7 @@ impl Source {
     fn place_of(&self, path: &str) -> Option<Range<usize>> {
         let root = DeTable::parse(&self.text).ok()?;
         let (span, root) = (root.span(), DeValue::Table(root.into_inner()));
-        find(&Spanned::new(span, root), path).map(|(key, _)| key)
+        find(&Spanned::new(span, root), path).map(|found| found.span)
     }
 
     /// Creates the error for a key that has no effect; `because` completes the
@@ -93,33 +93,38 @@ fn keys_of(value: &Spanned<DeValue<'_>>) -> Vec<Key> {
     keys.map(|key| Key { name: key.get_ref().to_string(), span: key.span() }).collect()
 }
 
-/// Returns the place of a key (or of the element itself, in an array) and its value.
-fn find<'t, 'i>(
-    root: &'t Spanned<DeValue<'i>>,
-    path: &str,
-) -> Option<(Range<usize>, &'t Spanned<DeValue<'i>>)> {
-    let mut found = (root.span(), root);
+/// A value, and the place of its key; that of an element of an array is its own.
+struct Found<'t, 'i> {
+    span: Range<usize>,
+    value: &'t Spanned<DeValue<'i>>,
+}
+
+impl<'t, 'i> Found<'t, 'i> {
+    fn without_key(value: &'t Spanned<DeValue<'i>>) -> Self {
+        Self { span: value.span(), value }
+    }
+}
+
+/// Returns the value at a path.
+fn find<'t, 'i>(root: &'t Spanned<DeValue<'i>>, path: &str) -> Option<Found<'t, 'i>> {
+    let mut found = Found::without_key(root);
     for part in parts(path).ok()? {
         found = step(found, &part)?;
     }
     Some(found)
 }
 
-fn step<'t, 'i>(
-    (span, value): (Range<usize>, &'t Spanned<DeValue<'i>>),
-    part: &Part,
-) -> Option<(Range<usize>, &'t Spanned<DeValue<'i>>)> {
-    match (value.get_ref(), part.number()) {
-        (DeValue::Array(many), Some(index)) => many.get(index).map(|value| (value.span(), value)),
+fn step<'t, 'i>(found: Found<'t, 'i>, part: &Part) -> Option<Found<'t, 'i>> {
+    match (found.value.get_ref(), part.number()) {
+        (DeValue::Array(many), Some(index)) => many.get(index).map(Found::without_key),
         // An array of one may be passed without a number, as in overrides.
         (DeValue::Array(many), None) if many.len() == 1 => {
-            let only = many.first()?;
-            step((only.span(), only), part)
+            step(Found::without_key(many.first()?), part)
         }
-        (DeValue::Table(_), Some(0)) => Some((span, value)),
+        (DeValue::Table(_), Some(0)) => Some(found),
         (DeValue::Table(table), _) => {
             let (key, value) = table.iter().find(|(key, _)| *key.get_ref() == part.name)?;
-            Some((key.span(), value))
+            Some(Found { span: key.span(), value })
         }
         _ => None,
     }

@@ -116,11 +116,11 @@ impl Chronicle {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep::kernel::view::{Entry, Happening, Kind, Level};
+    use sidestep::kernel::view::{Entry, Happening, Kind, Level, Who};
 
     fn frame(cycle: Cycle, happened: &[Cycle]) -> Frame {
         let entry = |&cycle: &Cycle| {
-            let (kind, who) = (Happening::Contact, (Kind::Robot, 3, None));
+            let (kind, who) = (Happening::Contact, Who::new(Kind::Robot, 3, None));
             let (with, at_m, value, words) = (None, None, None, format!("at {cycle}"));
             Entry { cycle, level: Level::Info, kind, who, with, at_m, value, words }
         };

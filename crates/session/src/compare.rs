@@ -49,15 +49,13 @@ pub(crate) fn compare(
     different.dedup();
     match different.first() {
         None => Ok(recorded.iter().map(|(rows, table)| bodies(rows, table)).sum()),
-        Some(first) => Err(differs(cycle, different.len(), first)),
+        Some(&first) => Err(differs(cycle, different.len(), first)),
     }
 }
 
-fn differs(cycle: u64, bodies: usize, (kind, number, part): &Who) -> Error {
-    let part = part.map_or(String::new(), |part| format!("/{part}"));
+fn differs(cycle: u64, bodies: usize, first: Who) -> Error {
     let cause = format!(
-        "at cycle {cycle} the poses of {bodies} bodies differ from what was recorded, first of \
-         {kind}/{number}{part}"
+        "at cycle {cycle} the poses of {bodies} bodies differ from what was recorded, first of {first}"
     );
     let remedy = "the folder was changed, or this is a bug: please report it with the folder";
     Error::stopped(cause, remedy)
@@ -93,7 +91,7 @@ fn by_body<'a>(
     let mut all: BTreeMap<Who, Vec<u64>> = BTreeMap::new();
     for row in 0..count {
         let number = word(rows.number, row).unwrap_or(u32::MAX);
-        let of = (rows.kind, number, rows.part.and_then(|part| word(part, row)));
+        let of = Who::new(rows.kind, number, rows.part.and_then(|part| word(part, row)));
         // A missing value has bits that differ from those of every other value.
         let cells = columns.iter().flat_map(|values| match values {
             Some(values) if !values.is_missing(row) => [1, bits(values, row)],
@@ -150,6 +148,9 @@ mod tests {
         let (was, is) = (bodies(2.0), bodies(2.0 + f64::EPSILON * 2.0));
         assert_eq!(was, bodies(2.0));
         let same = |of: &Who| was[of] == is[of];
-        assert!(same(&(Kind::Connector, 0, Some(3))) && !same(&(Kind::Connector, 0, Some(4))));
+        assert!(
+            same(&Who::new(Kind::Connector, 0, Some(3)))
+                && !same(&Who::new(Kind::Connector, 0, Some(4)))
+        );
     }
 }

@@ -11,7 +11,7 @@ use sidestep::worlds::robots::heap_bytes;
 use sidestep::worlds::robots::{RobotsRun, RobotsWorld, robots_run};
 use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::ports::{Recorder, SystemClock};
-use sidestep_kernel::view::{Kind, Look};
+use sidestep_kernel::view::{Kind, Look, Who};
 use sidestep_kernel::{Phases, Simulation, Turn};
 use sidestep_record::{Origin, ParquetRecorder};
 use std::hint::black_box;
@@ -266,7 +266,7 @@ fn looking() {
     };
     advance(&mut run, 20);
     let frame_ms = best_ms(40, Box::new(|_| drop(black_box(run.frame(Look::BODIES)))));
-    let asked = |k: u32| (Kind::Robot, 97 * k, None);
+    let asked = |k: u32| Who::new(Kind::Robot, 97 * k, None);
     let inspect_ms = best_ms(20, Box::new(|k| drop(black_box(run.inspect(asked(k))))));
     println!("{}: a frame in {frame_ms:.2} ms, an inspection in {inspect_ms:.1} ms", case.name);
     let traffic = |kind: &str, n: u32, more: &str| {

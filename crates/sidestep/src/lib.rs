@@ -83,13 +83,41 @@ pub use sidestep_statistics as statistics;
 /// The version of this crate.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// The build: the version and a digest over the sources that results follow from, as
-/// `0.1.0+0123456789ab`. Only the build that started a run or a sweep continues it.
+/// The build: the version and a digest over what results follow from (sources, `Cargo.lock`, the compiler's
+/// version), as `0.1.0+0123456789ab`. Only the build that started a run or a sweep continues it.
 pub const BUILD: &str = env!("SIDESTEP_BUILD");
+
+#[cfg(test)]
+#[path = "../build.rs"]
+#[allow(dead_code, reason = "cargo calls its `main`")]
+mod build_script;
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn libraries_and_compiler_are_part_of_a_builds_identity() {
+        let found = build_script::ingredients(Path::new(env!("CARGO_MANIFEST_DIR")))
+            .expect("the repository");
+        let text = |name: &str| {
+            let found = found.iter().find(|(own, _)| own == name);
+            found.map(|(_, text)| text.as_str()).unwrap_or_else(|| panic!("{name} is missing"))
+        };
+        assert!(text("Cargo.lock").contains("name = \"libm\""));
+        assert!(text("rustc --version").starts_with("rustc 1."));
+        assert!(
+            text("kernel/Cargo.toml").contains("libm") && !text("kernel/src/math.rs").is_empty()
+        );
+        let digest = build_script::digest(found.clone());
+        for name in ["Cargo.lock", "rustc --version", "worlds/chain/src/lib.rs"] {
+            let mut changed = found.clone();
+            changed.iter_mut().filter(|(own, _)| own == name).for_each(|(_, text)| text.push('1'));
+            assert_ne!(build_script::digest(changed), digest, "{name}");
+        }
+        assert!(BUILD.ends_with(&digest), "{BUILD} is not {digest}");
+    }
 
     #[test]
     fn a_build_out_of_the_repository_has_an_identity() {

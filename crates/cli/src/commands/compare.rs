@@ -9,7 +9,7 @@ use serde_json::json;
 use sidestep::worlds::airspace::scenario::Compiled;
 use sidestep::worlds::airspace::world::Method;
 use sidestep_document::Table;
-use sidestep_papers::methods::{compare as run_all, table};
+use sidestep_papers::methods::{SeedSpan, compare as run_all, table};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -68,10 +68,10 @@ pub(crate) fn compare(args: &CompareArgs, console: Console) -> Result<ExitCode, 
     let compiled: &Compiled = of_world(compiled.as_ref(), &source, "airspace")?;
     let methods: Vec<Method> = args.methods.iter().map(|name| name.method()).collect();
     let stages = Stages::new(console);
-    let span = (compiled.seed, args.runs as usize);
+    let seeds = SeedSpan { first: compiled.seed, runs: args.runs as usize };
     let workers = args.workers.count();
     let results =
-        run_all(&source, &methods, span, workers, &mut |what, share| stages.at(what, share));
+        run_all(&source, &methods, seeds, workers, &mut |what, share| stages.at(what, share));
     stages.clear();
     let results = results?;
     let json = json!({ "name": compiled.name, "seed": compiled.seed, "methods": results });

@@ -201,13 +201,14 @@ fn report(form: Form, written: &Written, console: Console) -> Result<(), Failure
             paths.iter().filter_map(|path| Some(std::fs::metadata(path).ok()?.len())).sum();
         let size = format!("  {} bytes\n", grouped(bytes));
         let size = if paths.iter().all(|path| path.is_file()) { size } else { String::new() };
-        let film = film.map_or(String::new(), |film| film_words(form, film, &paths[0]));
+        let film = film
+            .map_or(String::new(), |(pictures, fps)| film_words(form, pictures, fps, &paths[0]));
         format!("{names}{size}{confirmed}{film}")
     })
 }
 
 /// Returns how long a film is, or how to join its frames.
-fn film_words(form: Form, (pictures, fps): (usize, u16), path: &Path) -> String {
+fn film_words(form: Form, pictures: usize, fps: u16, path: &Path) -> String {
     if form == Form::Gif {
         return format!("  {pictures} pictures, {:.1} s\n", pictures as f64 / f64::from(fps));
     }

@@ -86,7 +86,7 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
         }
         let workers = args.workers.count();
         let ScenarioArgs { file, changes } = &args.scenario;
-        return many_runs((file, changes), &args.many, args.out.as_deref(), workers, console);
+        return many_runs(file, changes, &args.many, args.out.as_deref(), workers, console);
     }
     args.many.check_one_run()?;
     let (source, compiled) = args.scenario.compile()?;

@@ -126,7 +126,7 @@ pub(crate) fn sweep(args: &SweepArgs, console: Console) -> Result<ExitCode, Fail
         (Some(Step::Status(args)), _) => status(args, console),
         (Some(Step::Collect(args)), _) => collect(args, console),
         (None, Some(file)) => {
-            many_runs((file, changes), many, out.as_deref(), workers.count(), console)
+            many_runs(file, changes, many, out.as_deref(), workers.count(), console)
         }
         (None, None) => {
             let remedy = "name a sweep file or a scenario; see `sidestep sweep --help`";
@@ -140,7 +140,8 @@ pub(crate) fn sweep(args: &SweepArgs, console: Console) -> Result<ExitCode, Fail
 /// # Errors
 /// When the sweep or the folder is wrong, or results cannot be stored.
 pub(super) fn many_runs(
-    (file, changes): (&Path, &ChangeArgs),
+    file: &Path,
+    changes: &ChangeArgs,
     many: &ManyArgs,
     out: Option<&Path>,
     workers: usize,

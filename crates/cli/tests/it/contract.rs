@@ -38,6 +38,35 @@ fn run_says_what_was_promised() {
 }
 
 #[test]
+fn the_book_has_every_word_of_a_summary_and_aliases_have_its_values() {
+    let place = Place::new();
+    place.json(&["run", "s.toml", "--cycles", "50", "--out", "r", "--mcap", "r.mcap"]);
+    let text = place.read("r/summary.json");
+    let summary: Value = serde_json::from_str(&text).expect("JSON");
+    let chapter = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/columns.md");
+    let chapter = std::fs::read_to_string(chapter).expect("the chapter");
+    let (_, section) = chapter.split_once("## Summaries\n").expect("a section");
+    let (section, _) = section.split_once("\n## ").expect("another one");
+    let keys = |value: &Value| -> Vec<String> {
+        value.as_object().expect("an object").keys().cloned().collect()
+    };
+    let words: Vec<String> = [keys(&summary), keys(&summary["phases_s"])].concat();
+    for word in &words {
+        assert!(section.contains(&format!("`{word}`")), "{word} is not in the book");
+    }
+    let phases = &summary["phases_s"];
+    for (alias, word) in [
+        (&summary["robots"], &summary["agents"]),
+        (&summary["robot_cycles_per_cpu_s"], &summary["agent_cycles_per_cpu_s"]),
+        (&phases["perceive_decide"], &phases["claim"]),
+        (&phases["conflicts"], &phases["join"]),
+        (&phases["react"], &phases["act"]),
+    ] {
+        assert!(alias == word && !word.is_null(), "{alias} is not {word}");
+    }
+}
+
+#[test]
 fn check_says_what_it_found() {
     let found = Place::new().json(&["check", "s.toml"]);
     assert_keys(&found, &["name", "seed", "cycles", "regime", "map", "sensors", "memory_bytes"]);

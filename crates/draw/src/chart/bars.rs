@@ -173,15 +173,15 @@ impl BarChart {
 /// Draws `bar` around `center`; a little of its `width` stays free beside the next one.
 fn draw_bar(frame: &mut Frame, bar: &Bar, center: f64, width: f64, index: usize) {
     let filled = width - (0.06 * width).min(1.5);
-    column(frame, (center - filled / 2.0, filled), bar.value, index);
+    column(frame, center - filled / 2.0, filled, bar.value, index);
     if let Some((low, high)) = bar.interval.filter(|(l, h)| l.is_finite() && h.is_finite()) {
         let ends = (frame.y.px(low), frame.y.px(high));
         error_bar(&mut frame.svg, center, ends, (0.2 * width).min(5.0), INK);
     }
 }
 
-/// Draws a filled column from the axis's base to `value`.
-pub(crate) fn column(frame: &mut Frame, (x, width): (f64, f64), value: f64, index: usize) {
+/// Draws a filled column from the axis's base to `value`, its left edge at `x`.
+fn column(frame: &mut Frame, x: f64, width: f64, value: f64, index: usize) {
     let (base, end) = (frame.y.base_px(), frame.y.px(value));
     let column = Rect { x, y: base.min(end), width, height: (base - end).abs() };
     let (color, (opacity, rim)) = (series_color(index), series_fill(index));

@@ -200,12 +200,12 @@ impl Plot {
     /// Returns one entry per series and ideal line.
     fn legend(&self) -> Vec<Entry> {
         let series = self.series.iter().enumerate().map(|(index, series)| {
-            let (color, marker) = (series_color(index), Marker::of_series(index));
+            let (color, marker) = (series_color(index).into(), Marker::of_series(index));
             let symbol = match series.mark {
                 Mark::Points => Symbol::Marker { color, marker },
                 Mark::Line | Mark::Band | Mark::Way => {
                     let marker = series.shows_markers().then_some(marker);
-                    Symbol::Line { color: color.into(), marker, dash: series_dash(index) }
+                    Symbol::Line { color, marker, dash: series_dash(index) }
                 }
             };
             Entry::new(symbol, &series.label)
@@ -222,7 +222,7 @@ impl Plot {
         series: &Series,
         style: &Style,
     ) {
-        let color = series_color(index);
+        let color = &series_color(index);
         let y = frame.y;
         if series.mark == Mark::Band {
             self.draw_band(frame, x, color, series);

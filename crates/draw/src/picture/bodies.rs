@@ -3,10 +3,11 @@
 use std::fmt::Write as _;
 
 use super::Scene;
-use super::canvas::{Canvas, Px, corners, dot};
+use super::canvas::{Canvas, Px, corners};
 use crate::legend::leader_mark;
 use crate::style::{INK, hex};
 use crate::svg::{Anchor, Num, Svg, TextLook};
+use sidestep_kernel::geometry::dot;
 use sidestep_kernel::view::{
     Body, Color, Condition, Kind, Place, Pose, Scenery, Shape, WALL, color_of,
 };
@@ -80,6 +81,14 @@ pub(super) fn draw_layers(
     shown.into_iter().for_each(|body| draw_body(svg, scene, canvas, body));
 }
 
+/// A body in space, or one stretch of a line with many points.
+struct Part<'a> {
+    depth_m: f64,
+    body: &'a Body,
+    /// The first point of the stretch.
+    from: Option<usize>,
+}
+
 /// Draws bodies in space, far ones first; a line with many points is drawn part by part.
 pub(super) fn draw_by_depth<'a>(
     svg: &mut Svg,
@@ -87,44 +96,40 @@ pub(super) fn draw_by_depth<'a>(
     canvas: &Canvas,
     bodies: impl Iterator<Item = &'a Body>,
 ) {
-    let mut parts: Vec<(f64, &Body, Option<usize>)> = Vec::new();
+    let mut parts: Vec<Part<'_>> = Vec::new();
     for body in bodies {
         match &body.shape {
             Shape::Line { points_m, .. } => {
                 let depth_m =
                     |pair: &[Place]| 0.5 * (depth(canvas, pair[0]) + depth(canvas, pair[1]));
                 let pairs = points_m.windows(2).enumerate();
-                parts.extend(pairs.map(|(k, pair)| (depth_m(pair), body, Some(k))));
+                let part = |(k, pair)| Part { depth_m: depth_m(pair), body, from: Some(k) };
+                parts.extend(pairs.map(part));
             }
-            _ => parts.push((depth(canvas, body.pose.at_m), body, None)),
+            _ => parts.push(Part { depth_m: depth(canvas, body.pose.at_m), body, from: None }),
         }
     }
     // The sort is stable: of bodies at the same depth, the one named first is drawn first.
-    parts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let are_many = parts.iter().filter(|(_, body, _)| is_ball(body)).count() > MOST_BALLS;
+    parts.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m));
+    let are_many = parts.iter().filter(|part| is_ball(part.body)).count() > MOST_BALLS;
     let like =
         |a: &Body, b: &Body| is_ball(a) && is_ball(b) && dot_look(canvas, a) == dot_look(canvas, b);
     svg.raw(format_args!(r#"<g class="parts" {LINE_LOOK}>"#));
-    for alike in parts.chunk_by(|(_, a, _), (_, b, _)| are_many && like(a, b)) {
+    for alike in parts.chunk_by(|a, b| are_many && like(a.body, b.body)) {
         match alike {
-            [(_, first, _), ..] if are_many && is_ball(first) => draw_dots(svg, canvas, alike),
+            [first, ..] if are_many && is_ball(first.body) => draw_dots(svg, canvas, alike),
             _ => alike.iter().for_each(|part| draw_part(svg, scene, canvas, part)),
         }
     }
     svg.close_group();
 }
 
-fn draw_part(
-    svg: &mut Svg,
-    scene: &Scene<'_>,
-    canvas: &Canvas,
-    (_, body, segment): &(f64, &Body, Option<usize>),
-) {
-    match (&body.shape, segment) {
-        (Shape::Line { points_m, .. }, &Some(k)) => {
-            draw_line(svg, scene, canvas, body, &points_m[k..k + 2]);
+fn draw_part(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, part: &Part<'_>) {
+    match (&part.body.shape, part.from) {
+        (Shape::Line { points_m, .. }, Some(k)) => {
+            draw_line(svg, scene, canvas, part.body, &points_m[k..k + 2]);
         }
-        _ => draw_body(svg, scene, canvas, body),
+        _ => draw_body(svg, scene, canvas, part.body),
     }
 }
 
@@ -144,10 +149,10 @@ fn dot_look(canvas: &Canvas, body: &Body) -> String {
 }
 
 /// Draws balls of one look as one path: thousands of circles would be most of a picture's bytes.
-fn draw_dots(svg: &mut Svg, canvas: &Canvas, balls: &[(f64, &Body, Option<usize>)]) {
+fn draw_dots(svg: &mut Svg, canvas: &Canvas, balls: &[Part<'_>]) {
     let mut data = String::new();
-    for (_, ball, _) in balls {
-        let (x, y) = canvas.at(ball.pose.at_m);
+    for ball in balls {
+        let (x, y) = canvas.at(ball.body.pose.at_m);
         // A stroke of no length is not drawn. Writing into a String cannot fail.
         let _ = write!(
             data,
@@ -156,7 +161,7 @@ fn draw_dots(svg: &mut Svg, canvas: &Canvas, balls: &[(f64, &Body, Option<usize>
             Num((y * 10.0).round() / 10.0)
         );
     }
-    svg.path(&data, dot_look(canvas, balls[0].1));
+    svg.path(&data, dot_look(canvas, balls[0].body));
 }
 
 fn depth(canvas: &Canvas, at: Place) -> f64 {
@@ -182,7 +187,7 @@ fn fill(scene: &Scene<'_>, canvas: &Canvas, body: &Body) -> (Color, f64) {
 impl Scene<'_> {
     /// Returns whether others have a trail and this body has none.
     fn is_beside_trails(&self, body: &Body) -> bool {
-        !self.trails.is_empty() && self.trails.iter().all(|trail| trail.of.1 != body.number)
+        !self.trails.is_empty() && self.trails.iter().all(|trail| trail.of.number != body.number)
     }
 }
 

@@ -1,6 +1,7 @@
 //! The map from places in meters to pixels, with the same scale in all directions.
 
 use crate::svg::Rect;
+use sidestep_kernel::geometry::dot;
 use sidestep_kernel::view::Place;
 
 /// A point in pixels, y downward.
@@ -41,10 +42,6 @@ impl Camera {
         let least = along.into_iter().fold(f64::INFINITY, f64::min);
         [least, along.into_iter().fold(f64::NEG_INFINITY, f64::max)]
     }
-}
-
-pub(crate) fn dot(a: Place, b: Place) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Returns the corners of a box; bit k of a corner's number says at which end of axis k it is.

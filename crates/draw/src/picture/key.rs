@@ -24,7 +24,7 @@ pub fn describe(scenery: &Scenery, frame: &Frame, trails: &[Trail]) -> String {
     let agents = agents(scenery, frame);
     let Some((kind, _)) = agents.first() else { return String::new() };
     let (scene, all, to) = (Scene::new(scenery, frame, trails), agents.len(), frame.cycle);
-    let of: BTreeSet<u32> = scene.trails.iter().map(|trail| trail.of.1).collect();
+    let of: BTreeSet<u32> = scene.trails.iter().map(|trail| trail.of.number).collect();
     let from = scene.trails.first().map_or(0, |trail| trail.span[0]);
     let said = |cycle: Cycle| grouped(&cycle.to_string());
     let (plural, to, from) = (plural(*kind, all), said(to), said(from));
@@ -84,12 +84,12 @@ pub(super) fn entries(scene: &Scene<'_>) -> Vec<Entry> {
 
 /// Returns an entry for everything with a color of its own: agents with a trail, and chains.
 fn named(scene: &Scene<'_>) -> Vec<Entry> {
-    let trails = scene.trails.iter().map(|trail| (trail.of.1, (trail.of.0, trail.width_m)));
+    let trails = scene.trails.iter().map(|trail| (trail.of.number, (trail.of.kind, trail.width_m)));
     let is_first = |body: &&Body| body.kind == Kind::Connector && body.part == Some(0);
     let chains = scene.frame.bodies.iter().filter(is_first);
     let chains = chains
         .filter(|body| {
-            scene.trails.is_empty() || scene.trails.iter().any(|t| t.of.1 == body.number)
+            scene.trails.is_empty() || scene.trails.iter().any(|t| t.of.number == body.number)
         })
         .map(|body| (body.number, (body.kind, None)));
     let all: BTreeMap<u32, (Kind, Option<f64>)> = chains.chain(trails).collect();

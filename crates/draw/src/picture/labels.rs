@@ -46,8 +46,8 @@ pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect
         let clear_px = if body.is_some() { radius_px.max(mark_px) } else { mark_px };
         taken.push(around(end, clear_px));
         // Parts of a body have no name of their own.
-        if trail.of.2.is_none() && contains(room, end) {
-            wanted.push((end, clear_px, key::name(scene, trail.of.0, trail.of.1)));
+        if trail.of.part.is_none() && contains(room, end) {
+            wanted.push((end, clear_px, key::name(scene, trail.of.kind, trail.of.number)));
         }
     }
     if wanted.len() > MOST_LABELS {
@@ -55,7 +55,8 @@ pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, room: Rect
     }
     taken.extend(bodies_to_spare(scene, canvas));
     for (at, clear_px, words) in wanted {
-        write(svg, (at, clear_px), &words, room, &mut taken, style);
+        let label = Label { at, clear_px, words: &words };
+        write(svg, label, room, &mut taken, style);
     }
 }
 
@@ -103,15 +104,17 @@ fn contains(room: Rect, (x, y): Px) -> bool {
     (room.x..=room.right()).contains(&x) && (room.y..=room.bottom()).contains(&y)
 }
 
+/// Words for a point.
+struct Label<'a> {
+    at: Px,
+    /// The distance from the point that stays clear.
+    clear_px: f64,
+    words: &'a str,
+}
+
 /// Writes words beside a point if there is room; otherwise nothing.
-fn write(
-    svg: &mut Svg,
-    ((x, y), clear_px): (Px, f64),
-    words: &str,
-    room: Rect,
-    taken: &mut Vec<Rect>,
-    style: &Style,
-) {
+fn write(svg: &mut Svg, label: Label<'_>, room: Rect, taken: &mut Vec<Rect>, style: &Style) {
+    let Label { at: (x, y), clear_px, words } = label;
     let size = style.small_px();
     let look = TextLook { halo: true, weight: Weight::Bold, ..TextLook::new(size, Anchor::Start) };
     let width = text::width(words, size, Weight::Bold);

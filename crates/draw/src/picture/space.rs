@@ -80,7 +80,7 @@ fn draw_box(svg: &mut Svg, canvas: &Canvas, box_m: [Place; 2], style: &Style) {
         svg.text(at.0, at.1 + look.middle_px(), &format!("{name} ({})", unit(longest_m).0), &look);
         taken.push((at, 2.5 * style.font_px));
     }
-    (0..3).for_each(|k| draw_numbers(svg, canvas, (box_m, k), style, &mut taken));
+    (0..3).for_each(|k| draw_numbers(svg, canvas, box_m, k, style, &mut taken));
 }
 
 /// Writes numbers along the edge `k` of the box, on the side where nothing is. Those that would lie on a place
@@ -88,7 +88,8 @@ fn draw_box(svg: &mut Svg, canvas: &Canvas, box_m: [Place; 2], style: &Style) {
 fn draw_numbers(
     svg: &mut Svg,
     canvas: &Canvas,
-    (box_m, k): ([Place; 2], usize),
+    box_m: [Place; 2],
+    k: usize,
     style: &Style,
     taken: &mut Vec<((f64, f64), f64)>,
 ) {

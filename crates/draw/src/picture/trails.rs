@@ -50,12 +50,14 @@ pub fn worth_a_trail(scenery: &Scenery, frame: &Frame) -> Vec<Who> {
         None => Vec::new(),
         Some(Kind::Airplane) => {
             let first = numbers.into_iter().take(MOST_LINES);
-            first.map(|number| (Kind::Airplane, number, None)).collect()
+            first.map(|number| Who::new(Kind::Airplane, number, None)).collect()
         }
         Some(Kind::Connector) => {
             numbers.into_iter().take(COLORS.len()).flat_map(|n| ends(frame, n)).collect()
         }
-        Some(kind) => of_each_color(&numbers).into_iter().map(|n| (kind, n, None)).collect(),
+        Some(kind) => {
+            of_each_color(&numbers).into_iter().map(|n| Who::new(kind, n, None)).collect()
+        }
     }
 }
 
@@ -103,7 +105,7 @@ pub(super) fn shown<'a>(scenery: &Scenery, frame: &Frame, trails: &'a [Trail]) -
     let drawn = |trail: &'a Trail| Shown {
         of: trail.of,
         way: &trail.way,
-        color: color_of(trail.of.1),
+        color: color_of(trail.of.number),
         width_m: sizes.get(&trail.of).map(|size_m| size_m[0]),
         span: [0, 0],
         dash: "",
@@ -115,11 +117,11 @@ pub(super) fn shown<'a>(scenery: &Scenery, frame: &Frame, trails: &'a [Trail]) -
     }
     let cycles = || shown.iter().flat_map(|trail| trail.way).map(|(cycle, _)| *cycle);
     let span = [cycles().min().unwrap_or(0), cycles().max().unwrap_or(0)];
-    let dashes = body_dashes(&shown.iter().map(|trail| trail.of.1).collect());
+    let dashes = body_dashes(&shown.iter().map(|trail| trail.of.number).collect());
     for trail in &mut shown {
         trail.span = span;
         if trail.width_m.is_none() {
-            trail.dash = dashes[&trail.of.1];
+            trail.dash = dashes[&trail.of.number];
         }
     }
     shown

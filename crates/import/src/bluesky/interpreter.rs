@@ -260,7 +260,7 @@ impl<'p> Interpreter<'p> {
         }
         let way_point = self.way_point(time_s, arguments)?;
         let after = arguments.next();
-        self.insert(index, way_point, after, (arguments.command, id))
+        self.insert(index, way_point, after, arguments.command, id)
     }
 
     /// `AFTER aircraft,after,ADDWPT,place[,altitude[,speed]]`
@@ -273,7 +273,7 @@ impl<'p> Interpreter<'p> {
             return Ok(Outcome::NotUnderstood(format!("AFTER {what}")));
         }
         let way_point = self.way_point(time_s, arguments)?;
-        self.insert(index, way_point, Some(after), (arguments.command, id))
+        self.insert(index, way_point, Some(after), arguments.command, id)
     }
 
     fn way_point(&self, added_s: f64, arguments: &mut Arguments) -> Result<WayPoint, InputError> {
@@ -291,7 +291,8 @@ impl<'p> Interpreter<'p> {
         index: usize,
         way_point: WayPoint,
         after: Option<Word>,
-        (command, id): (Word, Option<&str>),
+        command: Word,
+        id: Option<&str>,
     ) -> Done {
         let route = &self.drafts[index].aircraft.way_points;
         if route.len() >= MAX_WAY_POINTS {
@@ -395,10 +396,9 @@ impl<'p> Interpreter<'p> {
         }
         let traffic = &mut self.file.traffic;
         match name {
-            "ZONER" => traffic.zone_radius_nm = zone_size(place, value, (&ZONE_RADII_NM, "NM"))?,
+            "ZONER" => traffic.zone_radius_nm = zone_size(place, value, &ZONE_RADII_NM, "NM")?,
             "ZONEDH" => {
-                traffic.zone_half_height_ft =
-                    zone_size(place, value, (&ZONE_HALF_HEIGHTS_FT, "ft"))?;
+                traffic.zone_half_height_ft = zone_size(place, value, &ZONE_HALF_HEIGHTS_FT, "ft")?;
             }
             "DTLOOK" => traffic.lookahead_s = positive(place, value)?,
             "NOISE" => traffic.noise = switch(place, value)?,

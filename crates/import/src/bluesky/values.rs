@@ -223,7 +223,8 @@ pub(super) fn vertical_speed_fpm(place: &dyn fmt::Display, word: Word) -> Result
 pub(super) fn zone_size(
     place: &dyn fmt::Display,
     word: Word,
-    (range, unit): (&RangeInclusive<f64>, &str),
+    range: &RangeInclusive<f64>,
+    unit: &str,
 ) -> Result<f64, InputError> {
     let value = word.number(place)?;
     if range.contains(&value) {
@@ -339,7 +340,7 @@ mod tests {
             ("1", ZONE_HALF_HEIGHTS_FT, false),
             ("1e300", ZONE_HALF_HEIGHTS_FT, false),
         ] {
-            let found = zone_size(&"f.scn", word(text), (&range, "u"));
+            let found = zone_size(&"f.scn", word(text), &range, "u");
             assert_eq!(found.is_ok(), is_right, "{text}");
         }
     }

@@ -18,6 +18,13 @@ pub(super) struct World {
     has_observed: bool,
 }
 
+/// The values of one space: what they are, and how many.
+#[derive(Clone, Copy)]
+pub(super) struct Extent {
+    pub(super) is_whole: bool,
+    pub(super) length: usize,
+}
+
 /// Values of one space.
 enum Cells {
     Whole(Vec<i64>),
@@ -88,7 +95,7 @@ impl World {
     }
 
     /// Observes into its own room.
-    pub(super) fn look(&mut self, index: usize, team: usize, spaces: &[(bool, usize)]) {
+    pub(super) fn look(&mut self, index: usize, team: usize, spaces: &[Extent]) {
         let mut room = std::mem::take(&mut self.room);
         if room.len() != spaces.len() || !room.iter().zip(spaces).all(|(room, &s)| room.fits(s)) {
             room = spaces.iter().map(|&space| Cells::new(space)).collect();
@@ -114,14 +121,17 @@ impl World {
 }
 
 impl Cells {
-    fn new((is_whole, length): (bool, usize)) -> Self {
-        if is_whole { Self::Whole(vec![0; length]) } else { Self::Real(vec![0.0; length]) }
+    fn new(space: Extent) -> Self {
+        match space.is_whole {
+            true => Self::Whole(vec![0; space.length]),
+            false => Self::Real(vec![0.0; space.length]),
+        }
     }
 
-    fn fits(&self, (is_whole, length): (bool, usize)) -> bool {
+    fn fits(&self, space: Extent) -> bool {
         match self {
-            Self::Whole(cells) => is_whole && cells.len() == length,
-            Self::Real(cells) => !is_whole && cells.len() == length,
+            Self::Whole(cells) => space.is_whole && cells.len() == space.length,
+            Self::Real(cells) => !space.is_whole && cells.len() == space.length,
         }
     }
 

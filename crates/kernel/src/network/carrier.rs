@@ -33,7 +33,8 @@ impl<'a> Carrier<'a, MemoryTransport> {
     /// Returns a network in memory with some faults; without any it loses nothing. The talks of the cycle, at least
     /// one, are given by their first ticks and the times of those in seconds after the start of the run.
     pub fn in_memory(
-        (network, draws): (Option<&'a Network>, FaultStreams),
+        network: Option<&'a Network>,
+        draws: FaultStreams,
         places: Option<&'a dyn Apart>,
         talks: &'a [(u64, f64)],
     ) -> Self {

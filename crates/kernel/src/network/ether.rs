@@ -34,8 +34,8 @@ impl Ether {
     /// tick in which all of the packet is on its way, and the tick in which it arrives. Its `cycle` is the tick in
     /// which it is sent. Distances do not matter here.
     pub fn arrivals(&mut self, packet: Envelope) -> Vec<(u64, u64)> {
-        let faults = (Some(&self.network), self.draws);
-        let mut carrier = Carrier::in_memory(faults, None, &self.talks);
+        let network = Some(&self.network);
+        let mut carrier = Carrier::in_memory(network, self.draws, None, &self.talks);
         carrier.free_at = std::mem::take(&mut self.free_at);
         let receiver = packet.receiver;
         carrier.send(packet);

@@ -4,14 +4,44 @@ use super::pose::{Place, Pose};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// The name of a body: its kind, its number, and, for things that have parts, its part.
-pub type Who = (Kind, u32, Option<u32>);
+/// The name of a body, which it keeps during the run; shown as `robot/3` or `connector/0/7`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(from = "Parts", into = "Parts")]
+pub struct Who {
+    /// Its kind.
+    pub kind: Kind,
+    /// Its number among the bodies of its kind.
+    pub number: u32,
+    /// Its part, of things that have parts.
+    pub part: Option<u32>,
+}
 
-/// Returns the name of a body, which it keeps during the run, such as `robot/3` or `connector/0/7`.
-pub fn name_of((kind, number, part): Who) -> String {
-    match part {
-        Some(part) => format!("{kind}/{number}/{part}"),
-        None => format!("{kind}/{number}"),
+/// A name as it is written: kind, number and part.
+type Parts = (Kind, u32, Option<u32>);
+
+impl Who {
+    /// Returns the name of a body.
+    pub fn new(kind: Kind, number: u32, part: Option<u32>) -> Self {
+        Self { kind, number, part }
+    }
+}
+
+impl From<Parts> for Who {
+    fn from((kind, number, part): Parts) -> Self {
+        Self { kind, number, part }
+    }
+}
+
+impl From<Who> for Parts {
+    fn from(Who { kind, number, part }: Who) -> Self {
+        (kind, number, part)
+    }
+}
+
+impl fmt::Display for Who {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.kind, self.number)?;
+        self.part.map_or(Ok(()), |part| write!(f, "/{part}"))
     }
 }
 
@@ -73,12 +103,12 @@ impl Body {
 
     /// Returns its identity.
     pub fn who(&self) -> Who {
-        (self.kind, self.number, self.part)
+        Who::new(self.kind, self.number, self.part)
     }
 
     /// Returns a name that it keeps during the run, such as `robot/3` or `connector/0/7`.
     pub fn name(&self) -> String {
-        name_of(self.who())
+        self.who().to_string()
     }
 }
 

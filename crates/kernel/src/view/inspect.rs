@@ -303,7 +303,7 @@ mod tests {
 
     #[test]
     fn what_was_told_is_found_again_and_empty_sections_are_left_out() {
-        let who = (Kind::Robot, 3, None);
+        let who = Who::new(Kind::Robot, 3, None);
         let mut told = Inspection::new(who, 7, "robot 3");
         told.tell(Section::new("nothing").table(Table::new(["a"])));
         let mut table = Table::new(["other", "apart"]);

@@ -1,6 +1,6 @@
 //! The events of a run, for viewers.
 
-use super::body::{Who, name_of};
+use super::body::Who;
 use super::pose::Place;
 use crate::units::Cycle;
 use serde::{Deserialize, Serialize};
@@ -30,7 +30,7 @@ pub struct Entry {
 impl Entry {
     /// Returns the name of the body it happened to.
     pub fn name(&self) -> String {
-        name_of(self.who)
+        self.who.to_string()
     }
 }
 

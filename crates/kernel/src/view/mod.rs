@@ -12,7 +12,7 @@ mod pose;
 mod trails;
 
 pub use appearance::{ALERT, Appearance, COLORS, Color, DOOR, MOBILE, UNKNOWN, WALL, color_of};
-pub use body::{Body, Condition, Kind, Shape, Who, name_of};
+pub use body::{Body, Condition, Kind, Shape, Who};
 pub use inspect::{Fact, Inspection, Mark, MarkShape, Role, Section, Table, Value};
 pub use log::{Amount, Entry, Happening, Level, Log};
 pub use pose::{Place, Plane, Pose, TurnedPlane};
@@ -154,7 +154,7 @@ pub struct Scan {
 impl Scan {
     /// Returns the name of the body with the sensor, followed by the sensor's.
     pub fn name(&self) -> String {
-        format!("{}/{}", name_of(self.of), self.sensor)
+        format!("{}/{}", self.of, self.sensor)
     }
 
     /// Returns the first and last bearing, and ranges at equal steps between them. Beams that are not
@@ -192,7 +192,7 @@ mod tests {
 
     fn scan(bearings_rad: &[f64], ranges_m: &[f64]) -> Scan {
         Scan {
-            of: (Kind::Robot, 0, None),
+            of: Who::new(Kind::Robot, 0, None),
             sensor: "eye".into(),
             pose: Pose::at([0.0; 3]),
             bearings_rad: bearings_rad.to_vec(),

@@ -71,7 +71,7 @@ impl PlaceRows {
         let rows = self.rows(frame.cycle, whose, column)?;
         let trail = |(of, rows): (Who, Vec<Row>)| {
             let here = frame.bodies.iter().find(|body| body.who() == of);
-            let way = self.way(rows, scenery, here.map(|body| (frame.cycle, body)), of);
+            let way = self.way(rows, scenery, here.map(|body| (frame.cycle, body)), of.number);
             way.map(|way| Trail { of, way })
         };
         Some(rows.into_iter().filter_map(trail).collect())
@@ -97,7 +97,7 @@ impl PlaceRows {
         let axes: Vec<(&Axis, &Values)> = axes.collect::<Option<_>>()?;
         let mut rows: BTreeMap<Who, Vec<Row>> = whose.iter().map(|&of| (of, Vec::new())).collect();
         for (k, &cycle) in cycles.iter().enumerate().filter(|(_, cycle)| **cycle < before) {
-            let of = (self.kind, numbers[k], parts.map(|parts| parts[k]));
+            let of = Who::new(self.kind, numbers[k], parts.map(|parts| parts[k]));
             let Some(own) = rows.get_mut(&of) else { continue };
             let mut at_m = [0.0; 3];
             for (x, (axis, values)) in at_m.iter_mut().zip(&axes) {
@@ -114,7 +114,7 @@ impl PlaceRows {
         rows: Vec<Row>,
         scenery: &Scenery,
         here: Option<(Cycle, &Body)>,
-        (_, number, _): Who,
+        number: u32,
     ) -> Option<Vec<(Cycle, Place)>> {
         let &(last, ..) = rows.last()?;
         if here.is_some_and(|(now, _)| last + self.every < now) {
@@ -225,7 +225,7 @@ mod tests {
             bodies: Vec::new(),
             names: Vec::new(),
         };
-        rows().trails(&scenery, &frame, &[(Kind::Robot, 7, None)], column)
+        rows().trails(&scenery, &frame, &[Who::new(Kind::Robot, 7, None)], column)
     }
 
     #[test]
@@ -237,7 +237,7 @@ mod tests {
             (2, [11.5, 10.5, 0.25]),
             (2, [11.5, 11.0, 0.25]),
         ];
-        assert_eq!((trail.of, &trail.way[..]), ((Kind::Robot, 7, None), &way[..]));
+        assert_eq!((trail.of, &trail.way[..]), (Who::new(Kind::Robot, 7, None), &way[..]));
     }
 
     #[test]

@@ -88,7 +88,8 @@ impl Node {
     pub fn new(
         agent: EntityId,
         mail: Mail,
-        (program, channel): (Box<dyn Program>, Option<Box<dyn Channel>>),
+        program: Box<dyn Program>,
+        channel: Option<Box<dyn Channel>>,
         welcome: &Welcome,
         lease: Duration,
     ) -> Self {

@@ -241,12 +241,13 @@ impl Turn {
         for to in packet.to {
             self.sent.packets += 1;
             self.sent.bytes += bytes as u64;
+            let one = Sent { to, tick, sequence, bytes };
             let arrivals = match &mut ends.channel {
                 _ if self.begin.beyond.binary_search(&to).is_ok() => Vec::new(),
-                Some(channel) => channel.arrivals(&Sent { to, tick, sequence, bytes }),
+                Some(channel) => channel.arrivals(&one),
                 None => vec![Arrival { leaves: tick, arrives: tick + 1 }],
             };
-            self.note(to, (tick, sequence, bytes), &arrivals);
+            self.note(one, &arrivals);
             for Arrival { leaves, arrives } in arrivals {
                 let (cycle, payload) = (self.begin.cycle, packet.payload.clone());
                 let [left, arrives] = [leaves, arrives].map(|at| self.tick + (at - tick));
@@ -257,13 +258,9 @@ impl Turn {
         }
     }
 
-    fn note(
-        &mut self,
-        to: EntityId,
-        (tick, sequence, bytes): (u64, u32, usize),
-        arrivals: &[Arrival],
-    ) {
+    fn note(&mut self, packet: Sent, arrivals: &[Arrival]) {
         let Some(log) = &mut self.log else { return };
+        let Sent { to, tick, sequence, bytes } = packet;
         let first = arrivals.iter().map(|one| one.arrives).min();
         log.push(Logged {
             cycle: self.begin.cycle,

@@ -60,13 +60,8 @@ pub(super) fn fly(job: &FleetJob, lifeline: &Lifeline) -> Result<(), Error> {
     let crew = Crew::start(jobs, restarts)?;
     let mut stage = Stage::new(journey, scenario.world, &Watched);
     let plan = stage.run().plan().clone();
-    let mut captain = Captain::new(crew, lifeline, plan.cycles, (told, shown));
-    captain.packets = job
-        .out
-        .as_ref()
-        .filter(|_| job.packets)
-        .map(|folder| Packets::begin(folder, &scenario.source.text, plan.seed))
-        .transpose()?;
+    let mut captain = Captain::new(crew, lifeline, plan.cycles, told, shown);
+    captain.packets = packets(job, &scenario.source.text, plan.seed)?;
     let (flown, _) = Server::new(mail, &mut stage, &mut captain, terms).run();
     captain.crew.end();
     let flown = flown.and_then(|()| captain.finish_packets());
@@ -85,6 +80,12 @@ fn staged(run: &dyn Simulation) -> Staged {
         seed: run.plan().seed,
         scenery: run.scenery(),
     }
+}
+
+/// Begins the table of all packets, if it is wanted.
+fn packets(job: &FleetJob, text: &str, seed: u64) -> Result<Option<Packets>, RecordError> {
+    let folder = job.out.as_ref().filter(|_| job.packets);
+    folder.map(|folder| Packets::begin(folder, text, seed)).transpose()
 }
 
 /// Returns the endpoints at which the server listens, each with a port.
@@ -185,7 +186,8 @@ impl<'a> Captain<'a> {
         crew: Crew,
         lifeline: &'a Lifeline,
         cycles: u64,
-        (board, shown): (metrics::Board, Shown),
+        board: metrics::Board,
+        shown: Shown,
     ) -> Self {
         let now = Instant::now();
         Self {
@@ -215,7 +217,7 @@ impl<'a> Captain<'a> {
         let passed_s = self.reported.elapsed().as_secs_f64().max(1e-3);
         self.reported = Instant::now();
         let nodes =
-            fleet.seats.iter().map(|(&agent, seat)| self.node(fleet, (agent, seat), passed_s));
+            fleet.seats.iter().map(|(&agent, seat)| self.node(fleet, agent, seat, passed_s));
         let nodes = nodes.collect();
         let world = fleet.stage.world();
         let quantile_ms = |q: f64| fleet.tally.talked.quantile(q).map(|s| 1e3 * s);
@@ -234,12 +236,7 @@ impl<'a> Captain<'a> {
     }
 
     /// Returns the present state of a node, a number of seconds after the last look.
-    fn node(
-        &mut self,
-        fleet: &Look<'_>,
-        (agent, seat): (EntityId, &Seat),
-        passed_s: f64,
-    ) -> NodeNow {
+    fn node(&mut self, fleet: &Look<'_>, agent: EntityId, seat: &Seat, passed_s: f64) -> NodeNow {
         let status = &seat.status;
         let before = self.before.insert(agent, (status.packets, status.bytes));
         let (packets, bytes) = before.unwrap_or_default();

@@ -117,49 +117,70 @@ pub(super) fn of_fleet(now: &FleetNow, fleet: &Look<'_>) -> String {
     text.0
 }
 
+/// A metric with a value for each node.
+struct OfNode {
+    name: &'static str,
+    kind: &'static str,
+    help: &'static str,
+    value: fn(&NodeNow) -> f64,
+}
+
+const OF_NODES: [OfNode; 8] = [
+    OfNode {
+        name: "node_up",
+        kind: "gauge",
+        help: "Whether the node of an agent is there.",
+        value: |node| f64::from(!["awaited", "gone"].contains(&&*node.state)),
+    },
+    OfNode {
+        name: "controls_flown_total",
+        kind: "counter",
+        help: "Controls that were flown.",
+        value: |node| node.flown as f64,
+    },
+    OfNode {
+        name: "controls_late_total",
+        kind: "counter",
+        help: "Controls that were not there in time.",
+        value: |node| node.late as f64,
+    },
+    OfNode {
+        name: "node_lives_total",
+        kind: "counter",
+        help: "Times that a node has joined.",
+        value: |node| node.lives as f64,
+    },
+    OfNode {
+        name: "packets_total",
+        kind: "counter",
+        help: "Packets that a node has sent.",
+        value: |node| node.packets as f64,
+    },
+    OfNode {
+        name: "packet_bytes_total",
+        kind: "counter",
+        help: "Bytes of these.",
+        value: |node| node.bytes as f64,
+    },
+    OfNode {
+        name: "epoch",
+        kind: "gauge",
+        help: "Epoch of the coordinator that a node follows.",
+        value: |node| node.epoch as f64,
+    },
+    OfNode {
+        name: "heard",
+        kind: "gauge",
+        help: "Other agents that a node has heard in a cycle.",
+        value: |node| node.heard as f64,
+    },
+];
+
 fn of_nodes(text: &mut Text, now: &FleetNow, fleet: &Look<'_>) {
-    let each = |value: fn(&NodeNow) -> f64| {
-        now.nodes.iter().map(move |node| (label(&now.noun, &node.name), value(node)))
-    };
-    let is_up = |node: &NodeNow| f64::from(!["awaited", "gone"].contains(&&*node.state));
-    text.each("node_up", "gauge", "Whether the node of an agent is there.", each(is_up));
-    text.each(
-        "controls_flown_total",
-        "counter",
-        "Controls that were flown.",
-        each(|node| node.flown as f64),
-    );
-    text.each(
-        "controls_late_total",
-        "counter",
-        "Controls that were not there in time.",
-        each(|node| node.late as f64),
-    );
-    text.each(
-        "node_lives_total",
-        "counter",
-        "Times that a node has joined.",
-        each(|node| node.lives as f64),
-    );
-    text.each(
-        "packets_total",
-        "counter",
-        "Packets that a node has sent.",
-        each(|node| node.packets as f64),
-    );
-    text.each("packet_bytes_total", "counter", "Bytes of these.", each(|node| node.bytes as f64));
-    text.each(
-        "epoch",
-        "gauge",
-        "Epoch of the coordinator that a node follows.",
-        each(|node| node.epoch as f64),
-    );
-    text.each(
-        "heard",
-        "gauge",
-        "Other agents that a node has heard in a cycle.",
-        each(|node| node.heard as f64),
-    );
+    for OfNode { name, kind, help, value } in &OF_NODES {
+        let values = now.nodes.iter().map(|node| (label(&now.noun, &node.name), value(node)));
+        text.each(name, kind, help, values);
+    }
     let statuses = now.nodes.iter().filter_map(|node| {
         Some((label(&now.noun, &node.name), &fleet.seats.get(&node.agent)?.status))
     });

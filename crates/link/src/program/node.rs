@@ -46,11 +46,12 @@ pub(super) fn fly(job: &NodeJob) -> Result<(), Error> {
         return Err(InputError::new("--listen", cause, remedy).into());
     }
     let scenario = scenario.with(&welcome.overrides)?;
-    let ends = (scenario.world.program(agent, build), scenario.world.channel(agent));
+    let program = scenario.world.program(agent, build);
+    let channel = scenario.world.channel(agent);
     let lease = Duration::from_secs_f64(job.common.lease_s);
     let name = job.agent;
     tracing::info!(agent, who = format!("{} {name}", name.noun()), "joined");
-    let node = Node::new(agent, mail, ends, &welcome, lease);
+    let node = Node::new(agent, mail, program, channel, &welcome, lease);
     let node = node.watched(move |status| board.show(|| of_node(name, status)));
     node.run().map(drop).map_err(|e| failed(e, job))
 }

@@ -1,6 +1,6 @@
 //! The muster: nodes join, until every agent has one and all have heard each other.
 
-use super::{Broken, Server};
+use super::{Broken, Seat, Server};
 use crate::wire::Party;
 use crate::words::{Join, Life, Member, Refusal, Word};
 use sidestep::kernel::EntityId;
@@ -53,14 +53,15 @@ impl Server<'_> {
 
     /// Returns the reason why a node may not join, in one word and in detail; none if it may.
     fn refusal(&self, agent: EntityId, life: Life, join: &Join) -> Option<(&'static str, Refusal)> {
-        let refused = |word, cause: String, remedy: &str| {
-            Some((word, Refusal { cause, remedy: remedy.into() }))
-        };
         let Some(seat) = self.seats.get(&agent).filter(|_| join.agent == agent) else {
             let remedy = self.stage.world().which();
             return refused("unknown", format!("the fleet has no agent {agent}"), &remedy);
         };
-        let who = self.stage.called(agent);
+        self.unlike(join).or_else(|| self.taken(agent, seat, life, join))
+    }
+
+    /// Returns why a node of another build or scenario may not join.
+    fn unlike(&self, join: &Join) -> Option<(&'static str, Refusal)> {
         if join.build != self.terms.build {
             let cause = format!(
                 "the server is of sidestep {}, this node of {}",
@@ -79,6 +80,18 @@ impl Server<'_> {
                 "give the node the same file and the same --set, --seed and --cycles as the server",
             );
         }
+        None
+    }
+
+    /// Returns why a node may not have the seat of its agent.
+    fn taken(
+        &self,
+        agent: EntityId,
+        seat: &Seat,
+        life: Life,
+        join: &Join,
+    ) -> Option<(&'static str, Refusal)> {
+        let who = self.stage.called(agent);
         let is_other = seat.life().is_some_and(|taken| taken != life);
         if is_other {
             let cause = format!("{who} has a node already (process {})", seat.process);
@@ -100,4 +113,9 @@ impl Server<'_> {
         }
         None
     }
+}
+
+/// Returns a refusal, in a word and at length.
+fn refused(word: &'static str, cause: String, remedy: &str) -> Option<(&'static str, Refusal)> {
+    Some((word, Refusal { cause, remedy: remedy.into() }))
 }

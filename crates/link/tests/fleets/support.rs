@@ -218,5 +218,5 @@ fn node(
     let welcome = join(&mut mail, &Asked { join: question, patience: LONG })?;
     let program = world.program(agent, "test");
     let program: Box<dyn Program> = if is_liar { Box::new(Liar(program)) } else { program };
-    Node::new(agent, mail, (program, world.channel(agent)), &welcome, lease).run()
+    Node::new(agent, mail, program, world.channel(agent), &welcome, lease).run()
 }

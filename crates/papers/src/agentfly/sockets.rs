@@ -5,7 +5,7 @@
 //! a clock from when all nodes have joined to the end of the flight, so it depends on the machine and on other load
 //! on it.
 
-use super::{AIRPLANES, Plan, SCENARIO, claim};
+use super::{AIRPLANES, AgentflyPlan, SCENARIO, claim};
 use crate::claims::{Comparison, judged, listed};
 use crate::study::{Progress, finish, setting, source};
 use serde::Serialize;
@@ -63,7 +63,7 @@ pub struct Case {
 /// # Errors
 /// When the plan asks for an impossible scenario, and those of `flies`.
 pub fn measure<E: From<InputError>>(
-    plan: &Plan,
+    plan: &AgentflyPlan,
     flies: &mut Flies<'_, E>,
     progress: &mut Progress<'_>,
 ) -> Result<Sockets, E> {
@@ -178,9 +178,9 @@ mod tests {
     use super::*;
     use sidestep_document::claim::Verdict;
 
-    fn plan(seeds: usize) -> Plan {
+    fn plan(seeds: usize) -> AgentflyPlan {
         let sockets = SocketsPlan { airplanes: vec![3], seeds, cycles: 8 };
-        Plan { sockets, ..Plan::quick() }
+        AgentflyPlan { sockets, ..AgentflyPlan::quick() }
     }
 
     /// Returns measurements in which the flights of a deployment take as long as `times` says.

@@ -22,7 +22,7 @@
 //! Both sides are divided by `n + m` before fitting, so that all runs have equal weight; the share
 //! of variance explained is that of the cost *per body*, a harder test than that of whole cycles.
 
-use super::Plan;
+use super::LoriaPlan;
 use super::floor::Floor;
 use super::timing::Load;
 use crate::cells::{figure, table};
@@ -93,7 +93,7 @@ const PARAMETERS: [(&str, &str); 5] = [
 
 impl CostModel {
     /// Measures and fits.
-    pub(super) fn run(plan: &Plan, report: &mut Progress<'_>) -> Self {
+    pub(super) fn run(plan: &LoriaPlan, report: &mut Progress<'_>) -> Self {
         let loads = grid(plan);
         let mut points = Vec::new();
         for (index, load) in loads.iter().enumerate() {
@@ -248,7 +248,7 @@ fn whole_cycles(points: &[Point], first: &Option<Fit>, second: &Option<Fit>) -> 
 const SIZES: [u32; 3] = [1, 2, 3];
 
 /// Returns loads of different numbers, crowding and size.
-fn grid(plan: &Plan) -> Vec<Load> {
+fn grid(plan: &LoriaPlan) -> Vec<Load> {
     let small = (Arc::new(Floor::small()), [20, 50, 80], [0, 30, 80]);
     let large = (Arc::new(Floor::large()), [100, 300, 800], [0, 200, 600]);
     let mut loads = Vec::new();

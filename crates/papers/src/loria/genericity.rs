@@ -3,7 +3,7 @@
 //! The paper changed the number of occupied boxes in its source, and wrote code for the camera.
 //! Here the scenario states both, and the behavior accepts any beams.
 
-use super::Plan;
+use super::LoriaPlan;
 use super::floor::Floor;
 use super::measure::{Outcome, Variant, measure_all, values};
 use super::reliability::{CONTACTS, TRIP};
@@ -39,13 +39,12 @@ pub(super) struct Genericity {
 
 impl Genericity {
     /// Runs the experiment: both sensors and effectors unreliable, medium floor.
-    pub(super) fn run(plan: &Plan, report: &mut Progress<'_>) -> Self {
+    pub(super) fn run(plan: &LoriaPlan, report: &mut Progress<'_>) -> Self {
         let floor = Arc::new(Floor::medium());
         let build = |(camera, size)| Variant { size, camera, ..Variant::new(&floor, Regime::Both) };
         let builds = [false, true].into_iter().flat_map(|camera| SIZES.map(|size| (camera, size)));
         let variants: Vec<Variant> = builds.map(build).collect();
-        let runs = (plan.seeds, plan.cycles);
-        let outcomes = measure_all(&variants, runs, plan.workers, "genericity", report);
+        let outcomes = measure_all(&variants, plan, "genericity", report);
         let builds = variants.iter().zip(outcomes);
         let builds = builds.map(|(v, outcomes)| Build { size: v.size, camera: v.camera, outcomes });
         Self { builds: builds.collect(), cycles: plan.cycles }

@@ -1,5 +1,6 @@
 //! One run of one variant, and its results.
 
+use super::LoriaPlan;
 use super::errors::{self, Beams, Spread};
 use super::floor::{Floor, Mind, ends};
 use crate::study::{Progress, all_of, setting, source};
@@ -125,17 +126,17 @@ pub(super) const WINDOW_CYCLES: usize = 20;
 /// Shortest path of a window that has a meaningful shape, in boxes.
 const SHORTEST_PATH_BOXES: f64 = 10.0;
 
-/// Runs every variant with seeds `1..=seeds`; the outcomes are by variant, then by seed.
+/// Runs every variant with the seeds of a plan, from 1 on; the outcomes are by variant, then by seed.
 ///
 /// All variants use the same seeds: starts, and every draw that a variant does not itself change,
 /// are the same, so that differences between variants are paired by seed.
 pub(super) fn measure_all(
     variants: &[Variant],
-    (seeds, cycles): (usize, u64),
-    workers: usize,
+    plan: &LoriaPlan,
     what: &str,
     report: &mut Progress<'_>,
 ) -> Vec<Vec<Outcome>> {
+    let &LoriaPlan { seeds, cycles, workers, .. } = plan;
     let run = |i: &usize| {
         let (v, seed) = (i / seeds, (i % seeds) as u64 + 1);
         Ok::<_, Infallible>(measure(&variants[v], seed, cycles))
@@ -273,7 +274,8 @@ mod tests {
     fn outcomes_do_not_depend_on_how_many_runs_are_done_at_once() {
         let floor = Arc::new(Floor::small());
         let variants = [Regime::Reliable, Regime::Both].map(|r| Variant::new(&floor, r));
-        let all = |workers| measure_all(&variants, (3, 200), workers, "", &mut |_, _| {});
+        let plan = |workers| LoriaPlan { seeds: 3, cycles: 200, workers, ..LoriaPlan::quick() };
+        let all = |workers| measure_all(&variants, &plan(workers), "", &mut |_, _| {});
         let (one, three) = (all(1), all(3));
         assert_eq!(one, three);
         assert!(one[0] != one[1] && one[1].len() == 3);

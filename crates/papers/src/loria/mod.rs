@@ -26,6 +26,7 @@ pub mod scenes;
 mod strategies;
 mod timing;
 
+use crate::claims::Parts;
 use crate::study::{Progress, stage};
 use cost_model::CostModel;
 use genericity::Genericity;
@@ -41,7 +42,7 @@ use strategies::Strategies;
 
 /// The amount of work to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Plan {
+pub struct LoriaPlan {
     /// Seeds per variant, at least 2 (an interval needs two).
     pub seeds: usize,
     /// Cycles of each run in which behavior is measured.
@@ -64,7 +65,7 @@ pub struct Plan {
     pub quick: bool,
 }
 
-impl Default for Plan {
+impl Default for LoriaPlan {
     /// The full plan: 24 seeds; a few minutes on two processors.
     fn default() -> Self {
         Self {
@@ -85,7 +86,7 @@ impl Default for Plan {
 /// Upper bound of a plan: a machine can do this much in a day.
 const MOST: u64 = 1_000_000;
 
-impl Plan {
+impl LoriaPlan {
     /// Returns a rehearsal of seconds: everything is run once, and nothing is measured well.
     pub fn quick() -> Self {
         Self {
@@ -161,7 +162,7 @@ pub enum LoriaError {
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
     /// The plan that was run.
-    pub plan: Plan,
+    pub plan: LoriaPlan,
     /// Version of the program.
     pub program_version: String,
     reliability: Reliability,
@@ -179,7 +180,7 @@ pub struct Report {
 ///
 /// # Errors
 /// When the plan is out of range.
-pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, LoriaError> {
+pub fn run(plan: &LoriaPlan, progress: &mut Progress<'_>) -> Result<Report, LoriaError> {
     run_recorded(plan, &mut in_memory, progress)
 }
 
@@ -188,7 +189,7 @@ pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, LoriaErro
 /// # Errors
 /// When the plan is out of range, or a recording fails.
 pub fn run_recorded(
-    plan: &Plan,
+    plan: &LoriaPlan,
     recorders: &mut NewRecorder<'_>,
     progress: &mut Progress<'_>,
 ) -> Result<Report, LoriaError> {
@@ -240,7 +241,8 @@ impl Report {
             plan.repeats,
             self.performance.processors,
         );
-        let parts = (&self.claims[..], pictures, self.experiments());
+        let experiments = self.experiments();
+        let parts = Parts { claims: &self.claims, pictures, experiments };
         claims::WORDS.document(lead, plan.quick, parts, self.command())
     }
 
@@ -264,7 +266,7 @@ mod tests {
     #[test]
     fn a_quick_plan_judges_every_claim_and_gives_text_figures_and_json() {
         let mut shares = Vec::new();
-        let report = run(&Plan::quick(), &mut |_, share| shares.push(share)).unwrap();
+        let report = run(&LoriaPlan::quick(), &mut |_, share| shares.push(share)).unwrap();
         assert!(shares.is_sorted() && shares.last() == Some(&1.0));
         for number in 1..=15 {
             let id = format!("E-{number}");
@@ -286,26 +288,26 @@ mod tests {
 
     #[test]
     fn plans_out_of_range_are_refused_before_anything_runs() {
-        let quick = Plan::quick();
+        let quick = LoriaPlan::quick();
         let wrong = [
-            Plan { seeds: 1, ..quick.clone() },
-            Plan { cycles: u64::MAX, ..quick.clone() },
-            Plan { error_levels: vec![f64::NAN], ..quick.clone() },
-            Plan { workers: 0, ..quick.clone() },
-            Plan { robots: vec![4_000_000_000], ..quick.clone() },
-            Plan { operations: Vec::new(), ..quick.clone() },
+            LoriaPlan { seeds: 1, ..quick.clone() },
+            LoriaPlan { cycles: u64::MAX, ..quick.clone() },
+            LoriaPlan { error_levels: vec![f64::NAN], ..quick.clone() },
+            LoriaPlan { workers: 0, ..quick.clone() },
+            LoriaPlan { robots: vec![4_000_000_000], ..quick.clone() },
+            LoriaPlan { operations: Vec::new(), ..quick.clone() },
         ];
         for plan in wrong {
             let outcome = run(&plan, &mut |_, _| panic!("nothing runs"));
             assert!(matches!(outcome, Err(LoriaError::Plan(_))), "{plan:?}");
         }
-        assert!(Plan::default().check().is_ok() && quick.check().is_ok());
+        assert!(LoriaPlan::default().check().is_ok() && quick.check().is_ok());
     }
 
     #[test]
     fn a_failing_recorder_ends_the_experiment_with_its_error() {
         let mut full = |_: &[TableSchema]| Err(RecordError::new("disk", "full"));
-        let outcome = run_recorded(&Plan::quick(), &mut full, &mut |_, _| {});
+        let outcome = run_recorded(&LoriaPlan::quick(), &mut full, &mut |_, _| {});
         assert!(matches!(outcome, Err(LoriaError::Record(e)) if e.cause == "full"));
     }
 }

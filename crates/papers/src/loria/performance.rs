@@ -7,7 +7,7 @@
 
 use super::floor::Floor;
 use super::timing::{Load, STRETCHES, Timed, arithmetic, race, seconds};
-use super::{NewRecorder, Plan};
+use super::{LoriaPlan, NewRecorder};
 use crate::cells::{figure, median, table};
 use crate::study::Progress;
 use serde::Serialize;
@@ -72,7 +72,7 @@ pub(super) struct Performance {
 }
 
 /// Returns the loads of the experiment: sparse and dense, each at every cost of a decision.
-pub(super) fn loads(plan: &Plan) -> Vec<Load> {
+pub(super) fn loads(plan: &LoriaPlan) -> Vec<Load> {
     let floor = Arc::new(Floor::large());
     let load = |&(robots, operations): &(u32, u32)| Load {
         robots,
@@ -101,7 +101,7 @@ impl Performance {
     /// # Errors
     /// When a recording fails.
     pub(super) fn run(
-        plan: &Plan,
+        plan: &LoriaPlan,
         recorders: &mut NewRecorder<'_>,
         report: &mut Progress<'_>,
     ) -> Result<Self, RecordError> {
@@ -286,7 +286,7 @@ enum Contestant {
 /// Returns all contestants of a load: unrecorded, recorded, and arithmetic, each with every number
 /// of workers; each has been run once.
 fn contestants(
-    plan: &Plan,
+    plan: &LoriaPlan,
     load: &Load,
     recorders: &mut NewRecorder<'_>,
 ) -> Result<Vec<Contestant>, RecordError> {
@@ -307,7 +307,7 @@ fn contestants(
 
 /// Times one load, unrecorded and recorded, with every number of workers.
 fn time_load(
-    plan: &Plan,
+    plan: &LoriaPlan,
     load: &Load,
     recorders: &mut NewRecorder<'_>,
 ) -> Result<Vec<Timing>, RecordError> {

@@ -1,7 +1,7 @@
 //! Reliability: the same floors under the four regimes, and sensors against effectors at equal
 //! error level.
 
-use super::Plan;
+use super::LoriaPlan;
 use super::errors::{Beams, Spread};
 use super::floor::{Floor, Mind};
 use super::measure::{Measure, Outcome, Tables, Variant, measure_all, values};
@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 /// A variant and its outcomes by seed.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Cell {
+pub(super) struct VariantOutcomes {
     /// Name of the floor.
     pub(super) floor: String,
     /// The variant that was run.
@@ -31,7 +31,7 @@ pub(super) struct Reliability {
     /// The floors, in words.
     pub(super) floors: Vec<String>,
     /// Every variant with its outcomes.
-    pub(super) cells: Vec<Cell>,
+    pub(super) cells: Vec<VariantOutcomes>,
     /// Error levels of the sweep.
     pub(super) levels: Vec<f64>,
 }
@@ -80,12 +80,11 @@ pub(super) const LATERAL: Measure = MEASURES[5].1;
 
 impl Reliability {
     /// Runs the experiment.
-    pub(super) fn run(plan: &Plan, report: &mut Progress<'_>) -> Self {
+    pub(super) fn run(plan: &LoriaPlan, report: &mut Progress<'_>) -> Self {
         let floors = [Floor::medium(), Floor::small(), Floor::large()].map(Arc::new);
         let variants = variants(&floors, plan);
-        let size = (plan.seeds, plan.cycles);
-        let outcomes = measure_all(&variants, size, plan.workers, "reliability", report);
-        let cell = |(variant, outcomes): (Variant, _)| Cell {
+        let outcomes = measure_all(&variants, plan, "reliability", report);
+        let cell = |(variant, outcomes): (Variant, _)| VariantOutcomes {
             floor: variant.floor.name.into(),
             variant,
             outcomes,
@@ -99,9 +98,9 @@ impl Reliability {
 
     /// Returns made-up outcomes of every variant, by seed.
     #[cfg(test)]
-    pub(super) fn made_up(plan: &Plan, of: impl Fn(&Variant, usize) -> Outcome) -> Self {
+    pub(super) fn made_up(plan: &LoriaPlan, of: impl Fn(&Variant, usize) -> Outcome) -> Self {
         let floors = [Floor::medium(), Floor::small(), Floor::large()].map(Arc::new);
-        let cell = |variant: Variant| Cell {
+        let cell = |variant: Variant| VariantOutcomes {
             floor: variant.floor.name.into(),
             outcomes: (1..=plan.seeds).map(|seed| of(&variant, seed)).collect(),
             variant,
@@ -119,7 +118,7 @@ impl Reliability {
     ) -> Vec<Option<f64>> {
         // A regime that switches an error off does not depend on that error's table, so those cells
         // are run for one table only.
-        let is_cell = |cell: &&Cell| {
+        let is_cell = |cell: &&VariantOutcomes| {
             let v = &cell.variant;
             (cell.floor.as_str(), v.obstacle_rule, v.mind, v.regime)
                 == (key.floor, key.rule, key.mind, regime)
@@ -299,7 +298,7 @@ impl Reliability {
                 STRAIGHTNESS,
             ),
         ];
-        let sweeps = SweepCase::MINDS.map(|mind| self.sweep_figure(mind));
+        let sweeps = SweepCase::MINDS.map(|(mind, beams)| self.sweep_figure(mind, beams));
         bars.into_iter().chain(sweeps).collect()
     }
 
@@ -319,7 +318,7 @@ impl Reliability {
         }
     }
 
-    fn sweep_figure(&self, (mind, beams): (Mind, Beams)) -> Figure {
+    fn sweep_figure(&self, mind: Mind, beams: Beams) -> Figure {
         let line = |name: &str, regime, spread| {
             let case = SweepCase { mind, beams, spread };
             let at = |&e: &f64| self.estimate(case.key(e), regime, CONTACTS).point(e);
@@ -401,7 +400,7 @@ fn same_errors(a: Tables, b: Tables, regime: Regime) -> bool {
     }
 }
 
-fn variants(floors: &[Arc<Floor>; 3], plan: &Plan) -> Vec<Variant> {
+fn variants(floors: &[Arc<Floor>; 3], plan: &LoriaPlan) -> Vec<Variant> {
     let [medium, small, large] = floors;
     let base = |floor, regime| Variant::new(floor, regime);
     let mut variants = Vec::new();

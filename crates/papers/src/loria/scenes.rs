@@ -1,6 +1,6 @@
 //! Ways of robots as pictures: on the medium floor, without errors and with both kinds.
 
-use super::Plan;
+use super::LoriaPlan;
 use super::floor::Floor;
 use super::measure::{Track, Variant, recorded};
 use crate::Scene;
@@ -18,7 +18,7 @@ const SEEN: Cycle = 400;
 const SEED: u64 = 1;
 
 /// Returns all pictures: the same floor and seed, without errors and with both.
-pub fn all(plan: &Plan) -> [Scene; 2] {
+pub fn all(plan: &LoriaPlan) -> [Scene; 2] {
     let floor = Arc::new(Floor::medium());
     let scene =
         |title, regime| scene(title, &Variant::new(&floor, regime), CYCLES.min(plan.cycles));
@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn ways_are_whole_and_end_where_the_robots_are() {
-        let scenes = all(&Plan { cycles: 450, ..Plan::quick() });
+        let scenes = all(&LoriaPlan { cycles: 450, ..LoriaPlan::quick() });
         for scene in &scenes {
             let robots = scene.frame.bodies.iter().filter(|body| body.kind == Kind::Robot).count();
             assert_eq!(scene.trails.len(), robots);

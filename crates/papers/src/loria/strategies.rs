@@ -1,6 +1,6 @@
 //! The double pool against the two strategies that the paper rejects.
 
-use super::Plan;
+use super::LoriaPlan;
 use super::performance::{loads, worker_counts};
 use super::timing::{Load, STRETCHES, arithmetic, race, seconds};
 use crate::cells::{figure, table};
@@ -93,7 +93,7 @@ impl Contestant {
 
 impl Strategies {
     /// Runs the comparison.
-    pub(super) fn run(plan: &Plan, report: &mut Progress<'_>) -> Self {
+    pub(super) fn run(plan: &LoriaPlan, report: &mut Progress<'_>) -> Self {
         let mut loads = loads(plan);
         let extremes = [plan.operations.iter().min(), plan.operations.iter().max()];
         loads.retain(|load| extremes.contains(&Some(&load.operations)));
@@ -178,7 +178,7 @@ fn names() -> [&'static str; 3] {
     [DOUBLE_POOL, Strategy::SpatialPartition.name(), Strategy::OneLock.name()]
 }
 
-fn try_load(plan: &Plan, index: usize, load: &Load) -> Vec<Trial> {
+fn try_load(plan: &LoriaPlan, index: usize, load: &Load) -> Vec<Trial> {
     let cycles = load.cycles(plan.timed_robot_cycles);
     let mut all = contestants(plan, load);
     all.iter_mut().for_each(|contestant| contestant.run.advance(cycles));
@@ -211,7 +211,7 @@ fn try_load(plan: &Plan, index: usize, load: &Load) -> Vec<Trial> {
 }
 
 /// Returns every strategy with every number of workers, and arithmetic.
-fn contestants(plan: &Plan, load: &Load) -> Vec<Contestant> {
+fn contestants(plan: &LoriaPlan, load: &Load) -> Vec<Contestant> {
     let mut all = Vec::new();
     for workers in worker_counts(plan.most_workers) {
         let mut add = |strategy, run| all.push(Contestant { strategy, workers, run });

@@ -2,8 +2,8 @@
 //! by local rules alone and with a planner. Every cycle is looked at: whether a joint is outside its limits or too
 //! fast.
 
-use super::{DT_S, Plan, draws};
-use crate::cells::{Cell, Columns, Value, column};
+use super::{DT_S, SerpentinePlan, draws};
+use crate::cells::{CaseResults, Columns, Value, column};
 use crate::study::{Progress, Study, finish, known, number, outcome, setting};
 use serde::Serialize;
 use serde_json::{Value as Json, json};
@@ -57,7 +57,7 @@ const COLUMNS: Columns = Columns {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Arms {
     /// Results by case.
-    pub(super) cells: Vec<Cell>,
+    pub(super) cells: Vec<CaseResults>,
 }
 
 /// Returns the arm of the scenario.
@@ -176,19 +176,22 @@ fn watched(source: &Source) -> Result<Json, InputError> {
 }
 
 impl Arms {
-    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
+    pub(super) fn run(
+        plan: &SerpentinePlan,
+        progress: &mut Progress<'_>,
+    ) -> Result<Self, InputError> {
         let study = Study::of_variants(SCENARIO, cases()).sized(plan.seeds, None);
         let settings =
             |case: &Variant, seed| settings(case, seed).expect("the arm of this experiment");
-        let what = (plan.workers, "an arm of joints");
-        let results = study.run_with(what, progress, settings, |source, cell| {
+        let what = "an arm of joints";
+        let results = study.run_with(plan.workers, what, progress, settings, |source, cell| {
             Ok(outcome(cell, watched(source)?))
         })?;
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
     /// Returns the cells with a planner, or those by local rules alone.
-    pub(super) fn with(&self, planner: &'static str) -> impl Iterator<Item = &Cell> {
+    pub(super) fn with(&self, planner: &'static str) -> impl Iterator<Item = &CaseResults> {
         self.cells.iter().filter(move |c| c.says("planner", planner))
     }
 

@@ -1,8 +1,8 @@
 //! A chain with middle parts that are thrown about, or partly missing, is joined again between its
 //! two whole ends (slide F3).
 
-use super::{Plan, draws};
-use crate::cells::{Cell, Columns, Value, column};
+use super::{SerpentinePlan, draws};
+use crate::cells::{CaseResults, Columns, Value, column};
 use crate::study::{Progress, Study, number, outcome, setting};
 use serde::Serialize;
 use serde_json::{Value as Json, json};
@@ -77,7 +77,7 @@ impl Case {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Broken {
     /// Results by case.
-    pub(super) cells: Vec<Cell>,
+    pub(super) cells: Vec<CaseResults>,
 }
 
 /// Returns a chain that bends a little at every connector.
@@ -143,7 +143,10 @@ fn joined(case: &Case, seed: u64) -> Result<Json, InputError> {
 }
 
 impl Broken {
-    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
+    pub(super) fn run(
+        plan: &SerpentinePlan,
+        progress: &mut Progress<'_>,
+    ) -> Result<Self, InputError> {
         let mut cases = Vec::new();
         for scattered in [4, 10, 20] {
             let case = |by_m, gone, may_come| Case { scattered, by_m, gone, may_come }.settings();
@@ -151,8 +154,8 @@ impl Broken {
             cases.extend([false, true].map(|may_come| case(10.0, 2, may_come)));
         }
         let study = Study::of_variants("", cases).sized(plan.breaks, None);
-        let what = (plan.workers, "broken chains");
-        let results = study.run_by(what, progress, |_, case, cell| {
+        let what = "broken chains";
+        let results = study.run_by(plan.workers, what, progress, |_, case, cell| {
             Ok(outcome(cell, joined(&Case::of(case), cell.seed)?))
         })?;
         Ok(Self { cells: COLUMNS.cells(&results) })

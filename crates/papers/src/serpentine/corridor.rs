@@ -1,8 +1,8 @@
 //! One robot with a laser finds its way through the winding corridor, others follow as a snake
 //! (slides E2, N1 to N6): widths, numbers of followers, and readings of "leaving a wall".
 
-use super::{DT_S, Plan};
-use crate::cells::{Cell, Column, Columns, Value, column, figure, series};
+use super::{DT_S, SerpentinePlan};
+use crate::cells::{CaseResults, Column, Columns, Value, column, figure, series};
 use crate::study::{Progress, Study, finish, known, number};
 use serde::Serialize;
 use sidestep::experiment::sweep::{Outcome, Variant};
@@ -83,20 +83,23 @@ fn is_in_band(run: &dyn Simulation) -> bool {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Corridor {
     /// Results by case, the fewest followers first.
-    pub(super) cells: Vec<Cell>,
+    pub(super) cells: Vec<CaseResults>,
 }
 
 /// Returns the sweep of a plan.
-pub(super) fn study(plan: &Plan) -> Result<Study, InputError> {
+pub(super) fn study(plan: &SerpentinePlan) -> Result<Study, InputError> {
     let followers = |v: &Variant| plan.followers.contains(&(number(v, CONNECTORS) as usize - 1));
     let study = Study::of_file(SWEEP, SCENARIO)?.keep_numbers(WIDTH, &plan.widths_m);
     Ok(study.keep(followers).sized(plan.seeds, Some(plan.corridor_cycles)))
 }
 
 impl Corridor {
-    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
-        let what = (plan.workers, "swarm in the corridor");
-        let results = study(plan)?.run_by(what, progress, |scenario, _, cell| {
+    pub(super) fn run(
+        plan: &SerpentinePlan,
+        progress: &mut Progress<'_>,
+    ) -> Result<Self, InputError> {
+        let what = "swarm in the corridor";
+        let results = study(plan)?.run_by(plan.workers, what, progress, |scenario, _, cell| {
             let mut run = chain_run(&scenario()?, 1)?;
             let mut in_band = 0_u64;
             finish(&mut *run, |run| in_band += u64::from(is_in_band(run)));
@@ -110,12 +113,12 @@ impl Corridor {
     }
 
     /// Returns the cells of a reading, the fewest followers first.
-    pub(super) fn of<'a>(&'a self, leaving: &'a str) -> impl Iterator<Item = &'a Cell> {
+    pub(super) fn of<'a>(&'a self, leaving: &'a str) -> impl Iterator<Item = &'a CaseResults> {
         self.cells.iter().filter(move |c| c.says("leaving", leaving))
     }
 
     /// Returns the cells of a reading with the fewest followers.
-    pub(super) fn of_few<'a>(&'a self, leaving: &'a str) -> impl Iterator<Item = &'a Cell> {
+    pub(super) fn of_few<'a>(&'a self, leaving: &'a str) -> impl Iterator<Item = &'a CaseResults> {
         let fewest = self.cells.iter().map(|c| c.count("followers")).min();
         self.of(leaving).filter(move |c| Some(c.count("followers")) == fewest)
     }

@@ -3,8 +3,8 @@
 //! wall, and discs that move as fast as it.
 
 use super::corridor::CLEARANCE;
-use super::{Plan, SPEED_M_S, draws};
-use crate::cells::{Cell, Columns, column, figure, series};
+use super::{SPEED_M_S, SerpentinePlan, draws};
+use crate::cells::{CaseResults, Columns, column, figure, series};
 use crate::study::{Progress, Study, number, setting};
 use serde::Serialize;
 use sidestep::experiment::sweep::{Setting, Variant, start};
@@ -27,8 +27,21 @@ const ENDS_M: [Point<2>; 2] = [[-8.5, -8.5], [8.5, 8.5]];
 const AIR_M: f64 = 1.5;
 
 /// Readings of "leaving a wall", and whether the leave rule is added.
-const READINGS: [(&str, bool); 5] =
-    [("latched", true), ("latched", false), ("range", true), ("range", false), ("level", false)];
+const READINGS: [Reading; 5] = [
+    Reading { leaving: "latched", leave_rule: true },
+    Reading { leaving: "latched", leave_rule: false },
+    Reading { leaving: "range", leave_rule: true },
+    Reading { leaving: "range", leave_rule: false },
+    Reading { leaving: "level", leave_rule: false },
+];
+
+/// A reading of the slides: when a wall counts as being left, and whether a free way to the target
+/// ends following a wall.
+#[derive(Clone, Copy)]
+struct Reading {
+    leaving: &'static str,
+    leave_rule: bool,
+}
 
 const COLUMNS: Columns = Columns {
     case: &[
@@ -48,18 +61,17 @@ const COLUMNS: Columns = Columns {
 };
 
 /// Returns the settings of a case: discs of 0.2 to 0.5 m, their speed divided by the robot's (0 if
-/// they stand), when a wall counts as being left, and whether a free way to the target ends
-/// following a wall.
-fn case(discs: usize, speed_ratio: f64, (leaving, leave_rule): (&str, bool)) -> Vec<Setting> {
+/// they stand), and a reading.
+fn case(discs: usize, speed_ratio: f64, reading: Reading) -> Vec<Setting> {
     vec![
         setting("discs", discs as i64),
         setting("speed_ratio", speed_ratio),
-        setting("leaving", leaving),
-        setting("leave_rule", leave_rule),
+        setting("leaving", reading.leaving),
+        setting("leave_rule", reading.leave_rule),
     ]
 }
 
-fn cases(plan: &Plan) -> Vec<Vec<Setting>> {
+fn cases(plan: &SerpentinePlan) -> Vec<Vec<Setting>> {
     let discs = || std::iter::once(0).chain(plan.discs.iter().copied());
     let standing = READINGS.into_iter().flat_map(|of| discs().map(move |n| case(n, 0.0, of)));
     let most = plan.discs.iter().max().copied().unwrap_or(0);
@@ -110,29 +122,36 @@ fn disc(draws: &mut Draws, speed_ratio: f64) -> Option<Value> {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Fields {
     /// Results by case.
-    pub(super) cells: Vec<Cell>,
+    pub(super) cells: Vec<CaseResults>,
 }
 
 impl Fields {
-    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
+    pub(super) fn run(
+        plan: &SerpentinePlan,
+        progress: &mut Progress<'_>,
+    ) -> Result<Self, InputError> {
         let study = Study::of_variants(SCENARIO, cases(plan))
             .sized(plan.field_seeds, Some(plan.field_cycles));
         let results =
-            study.run_with((plan.workers, "open field"), progress, settings, |source, cell| {
+            study.run_with(plan.workers, "open field", progress, settings, |source, cell| {
                 Ok(start(WORLDS, *cell, source, 1)?.run(&|| true).expect("nobody stops it"))
             })?;
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
     /// Returns cells with discs at rest, for a reading with or without the rule.
-    pub(super) fn at_rest(&self, leaving: &str, leave_rule: bool) -> impl Iterator<Item = &Cell> {
+    pub(super) fn at_rest(
+        &self,
+        leaving: &str,
+        leave_rule: bool,
+    ) -> impl Iterator<Item = &CaseResults> {
         let is_its =
-            move |c: &&Cell| c.says("leaving", leaving) && c.is("leave_rule") == leave_rule;
+            move |c: &&CaseResults| c.says("leaving", leaving) && c.is("leave_rule") == leave_rule;
         self.cells.iter().filter(|c| c.number("speed_ratio") == 0.0).filter(is_its)
     }
 
     /// Returns cells with discs that move.
-    pub(super) fn moving(&self) -> impl Iterator<Item = &Cell> {
+    pub(super) fn moving(&self) -> impl Iterator<Item = &CaseResults> {
         self.cells.iter().filter(|c| c.number("speed_ratio") > 0.0)
     }
 

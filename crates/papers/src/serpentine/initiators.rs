@@ -1,7 +1,7 @@
 //! Tests of which parts may start a motion, and which may object (slides R4, R5, R7, R8), and
 //! whether bends keep their limits (slide F1).
 
-use super::{Plan, draws};
+use super::{SerpentinePlan, draws};
 use crate::cells::{Share, table};
 use crate::study::{Progress, all_of, finish, known, setting, source};
 use serde::Serialize;
@@ -122,31 +122,40 @@ fn seen(seed: u64) -> Result<Seen, InputError> {
         for other in (0..CONNECTORS).filter(|&other| other != k) {
             let mut failing = free.clone();
             failing.set_failed(other, true);
-            let objected = objects(&mut failing, (k, to), (other, Reason::Failed), &mut seen)?;
+            let expected = Expected { by: other, reason: Reason::Failed };
+            let objected = objects(&mut failing, k, to, expected, &mut seen)?;
             seen.failed_objected.push(objected);
         }
         if k > 0 {
             let mut arm = free.clone();
             arm.set_mobility(0, Mobility::Fixed)?;
-            let objected = objects(&mut arm, (k, to), (0, Reason::Fixed), &mut seen)?;
+            let expected = Expected { by: 0, reason: Reason::Fixed };
+            let objected = objects(&mut arm, k, to, expected, &mut seen)?;
             seen.base_objected.push(objected);
         }
     }
     Ok(seen)
 }
 
-/// Returns whether a motion is vetoed by the expected connector, for the expected reason.
+/// The veto that is expected.
+struct Expected {
+    by: usize,
+    reason: Reason,
+}
+
+/// Returns whether the motion of connector `k` is vetoed by the expected connector, for the expected reason.
 fn objects(
     chain: &mut Chain<3>,
-    (k, to): (usize, Point<3>),
-    (by, reason): (usize, Reason),
+    k: usize,
+    to: Point<3>,
+    expected: Expected,
     seen: &mut Seen,
 ) -> Result<bool, InputError> {
     let before = chain.points().to_vec();
     let outcome = propagated(chain, k, to)?;
     let Some(veto) = outcome.veto() else { return Ok(false) };
     seen.kept.push(chain.points() == before);
-    Ok(veto.by == by && veto.reason == reason)
+    Ok(veto.by == expected.by && veto.reason == expected.reason)
 }
 
 /// Lets an operator lead a chain of which a connector fails; returns whether the veto names it.
@@ -197,7 +206,10 @@ fn bent<const D: usize>(limit_rad: f64, seed: u64) -> Result<Bent, InputError> {
 }
 
 impl Initiators {
-    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
+    pub(super) fn run(
+        plan: &SerpentinePlan,
+        progress: &mut Progress<'_>,
+    ) -> Result<Self, InputError> {
         let seeds: Vec<u64> = (1..=plan.seeds as u64).collect();
         let mut report = |share| progress("who begins, who objects", share);
         let all = all_of(&seeds, plan.workers, &mut report, |seed| seen(*seed))?;
@@ -210,7 +222,7 @@ impl Initiators {
                 true => bent::<3>(limit_rad, seed),
                 false => bent::<2>(limit_rad, seed),
             })?;
-            Ok(bend((limit_deg, in_space), &runs))
+            Ok(bend(limit_deg, in_space, &runs))
         });
         let bends: Vec<Bend> = bends.collect::<Result<_, InputError>>()?;
         Ok(Self {
@@ -263,7 +275,7 @@ impl Initiators {
     }
 }
 
-fn bend((limit_deg, in_space): (f64, bool), runs: &[Bent]) -> Bend {
+fn bend(limit_deg: f64, in_space: bool, runs: &[Bent]) -> Bend {
     Bend {
         limit_deg,
         in_space,

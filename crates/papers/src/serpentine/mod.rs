@@ -28,6 +28,7 @@ mod scaling;
 mod scenes;
 mod snake;
 
+use crate::claims::Parts;
 use crate::study::{Progress, stage};
 use serde::Serialize;
 use sidestep::kernel::stream::{Draws, Purpose, Streams};
@@ -48,7 +49,7 @@ fn draws(seed: u64) -> Draws {
 
 /// The amount of work to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Plan {
+pub struct SerpentinePlan {
     /// Seeds of every case that is random,
     pub seeds: usize,
     /// of cases of the open field,
@@ -97,7 +98,7 @@ pub struct Plan {
     pub quick: bool,
 }
 
-impl Default for Plan {
+impl Default for SerpentinePlan {
     /// The full plan: ten minutes on two processors, most of it for discs that move.
     fn default() -> Self {
         Self {
@@ -128,7 +129,7 @@ impl Default for Plan {
     }
 }
 
-impl Plan {
+impl SerpentinePlan {
     /// Returns a rehearsal of seconds: everything is run, and nothing is measured well.
     pub fn quick() -> Self {
         Self {
@@ -168,7 +169,7 @@ impl Plan {
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
     /// The plan that was run.
-    pub plan: Plan,
+    pub plan: SerpentinePlan,
     /// Version of the program.
     pub program_version: String,
     corridor: corridor::Corridor,
@@ -195,7 +196,7 @@ pub struct Report {
 ///
 /// # Errors
 /// When the plan asks for an impossible scenario.
-pub fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Report, InputError> {
+pub fn run(plan: &SerpentinePlan, progress: &mut Progress<'_>) -> Result<Report, InputError> {
     plan.check()?;
     // Shares of the whole by the time they take on two processors. Timings come first, when the
     // machine is quiet.
@@ -269,7 +270,8 @@ impl Report {
         let quick = if plan.quick { " --quick" } else { "" };
         let seeds = plan.seeds;
         let command = format!("sidestep reproduce serpentine{quick} --seeds {seeds} --out DIR");
-        let parts = (&self.claims[..], pictures, self.experiments());
+        let experiments = self.experiments();
+        let parts = Parts { claims: &self.claims, pictures, experiments };
         claims::WORDS.document(lead, plan.quick, parts, command)
     }
 }

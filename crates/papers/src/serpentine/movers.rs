@@ -2,8 +2,8 @@
 //! reaction, with one when touched, and with one before.
 
 use super::corridor::{FASTEST, OWN_PARTS, ROD_VIOLATION};
-use super::{Plan, SPEED_M_S};
-use crate::cells::{Cell, Columns, Value, column, figure, series};
+use super::{SPEED_M_S, SerpentinePlan};
+use crate::cells::{CaseResults, Columns, Value, column, figure, series};
 use crate::study::{Progress, Study, number};
 use serde::Serialize;
 use sidestep::experiment::sweep::Variant;
@@ -58,11 +58,11 @@ fn ratio(case: &Variant) -> f64 {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Movers {
     /// Results by case.
-    pub(super) cells: Vec<Cell>,
+    pub(super) cells: Vec<CaseResults>,
 }
 
 /// Returns the sweep of a plan.
-pub(super) fn study(plan: &Plan) -> Result<Study, InputError> {
+pub(super) fn study(plan: &SerpentinePlan) -> Result<Study, InputError> {
     let study = Study::of_file(SWEEP, SCENARIO)?;
     let study = study.keep(|v| plan.mover_discs.contains(&(number(v, DISCS) as usize)));
     let study = study.keep(|v| plan.speed_ratios.contains(&ratio(v)));
@@ -70,13 +70,16 @@ pub(super) fn study(plan: &Plan) -> Result<Study, InputError> {
 }
 
 impl Movers {
-    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
-        let results = study(plan)?.run((plan.workers, "discs that move"), progress)?;
+    pub(super) fn run(
+        plan: &SerpentinePlan,
+        progress: &mut Progress<'_>,
+    ) -> Result<Self, InputError> {
+        let results = study(plan)?.run(plan.workers, "discs that move", progress)?;
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
     /// Returns the cells of a way to react.
-    pub(super) fn of<'a>(&'a self, escape: &'a str) -> impl Iterator<Item = &'a Cell> {
+    pub(super) fn of<'a>(&'a self, escape: &'a str) -> impl Iterator<Item = &'a CaseResults> {
         self.cells.iter().filter(move |c| c.says("escape", escape))
     }
 

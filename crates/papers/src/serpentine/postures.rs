@@ -1,8 +1,8 @@
 //! Inverse kinematics by the chain's own rules (slides F2, E3): a tip is pulled to a target while
 //! the base objects, while it is free, and there and back; and damped least squares beside it.
 
-use super::{Plan, draws};
-use crate::cells::{Cell, Columns, Value, bars, column, figure};
+use super::{SerpentinePlan, draws};
+use crate::cells::{CaseResults, Columns, Value, bars, column, figure};
 use crate::study::{Progress, Study, number, outcome, setting};
 use cpu_time::ThreadTime;
 use serde::Serialize;
@@ -104,7 +104,7 @@ impl Case {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Postures {
     /// Results by case.
-    pub(super) cells: Vec<Cell>,
+    pub(super) cells: Vec<CaseResults>,
 }
 
 fn direction(draws: &mut Draws) -> Point<3> {
@@ -166,7 +166,10 @@ fn pulled(chain: &mut Chain<3>, tip: usize, target: Point<3>) -> Result<Json, In
 }
 
 impl Postures {
-    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
+    pub(super) fn run(
+        plan: &SerpentinePlan,
+        progress: &mut Progress<'_>,
+    ) -> Result<Self, InputError> {
         let mut cases = Vec::new();
         for &links in &plan.ik_links {
             for slack in [0.0, 0.1] {
@@ -174,15 +177,15 @@ impl Postures {
             }
         }
         let study = Study::of_variants("", cases).sized(plan.ik_targets, None);
-        let what = (plan.workers, "targets of tips");
-        let results = study.run_by(what, progress, |_, case, cell| {
+        let what = "targets of tips";
+        let results = study.run_by(plan.workers, what, progress, |_, case, cell| {
             Ok(outcome(cell, solved(&Case::of(case), cell.seed)?))
         })?;
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
     /// Returns the cells of a way.
-    pub(super) fn of(&self, way: Way) -> impl Iterator<Item = &Cell> {
+    pub(super) fn of(&self, way: Way) -> impl Iterator<Item = &CaseResults> {
         self.cells.iter().filter(move |c| c.says("way", way.key()))
     }
 

@@ -1,8 +1,8 @@
 //! A chain in a straight corridor is pushed back by its head until some part objects, and pulled
 //! back by its tail (slides A3, A4, R4).
 
-use super::{Plan, draws};
-use crate::cells::{Cell, Columns, Value, bars, column, figure};
+use super::{SerpentinePlan, draws};
+use crate::cells::{CaseResults, Columns, Value, bars, column, figure};
 use crate::study::{Progress, Study, number, outcome, setting};
 use serde::Serialize;
 use serde_json::{Value as Json, json};
@@ -67,7 +67,7 @@ fn cases() -> Vec<Vec<Setting>> {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Pushing {
     /// Results by case.
-    pub(super) cells: Vec<Cell>,
+    pub(super) cells: Vec<CaseResults>,
 }
 
 fn chain(max_bend_deg: f64) -> Result<Chain<2>, InputError> {
@@ -111,17 +111,20 @@ fn pushed(case: &Variant, seed: u64) -> Result<Json, InputError> {
 }
 
 impl Pushing {
-    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
+    pub(super) fn run(
+        plan: &SerpentinePlan,
+        progress: &mut Progress<'_>,
+    ) -> Result<Self, InputError> {
         let study = Study::of_variants("", cases()).sized(plan.seeds, None);
         let results =
-            study.run_by((plan.workers, "pushed and pulled"), progress, |_, case, cell| {
+            study.run_by(plan.workers, "pushed and pulled", progress, |_, case, cell| {
                 Ok(outcome(cell, pushed(case, cell.seed)?))
             })?;
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
     /// Returns cells of pushing, or of pulling.
-    pub(super) fn of(&self, by_head: bool) -> impl Iterator<Item = &Cell> {
+    pub(super) fn of(&self, by_head: bool) -> impl Iterator<Item = &CaseResults> {
         self.cells.iter().filter(move |c| c.is("by_head") == by_head)
     }
 
@@ -133,7 +136,7 @@ impl Pushing {
     }
 
     pub(super) fn figure(&self) -> Figure {
-        let category = |c: &Cell| match c.number("max_bend_deg") {
+        let category = |c: &CaseResults| match c.number("max_bend_deg") {
             _ if !c.is("self_collision") => "no self-collision".to_string(),
             180.0 => "self-collision".to_string(),
             deg => format!("bends up to {deg}\u{b0}"),

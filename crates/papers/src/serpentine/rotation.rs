@@ -1,9 +1,9 @@
 //! Reactions of a rod that hits an obstacle (slide A7): turn to the nearest direction that is free
 //! of everything, turn once as the slides say, or do not turn.
 
-use super::Plan;
+use super::SerpentinePlan;
 use super::corridor::{CLEARANCE, ROD_VIOLATION, WIDTH};
-use crate::cells::{Cell, Columns, Value, column, figure, least};
+use crate::cells::{CaseResults, Columns, Value, column, figure, least};
 use crate::study::{Progress, Study, finish, known};
 use serde::Serialize;
 use sidestep::experiment::sweep::Outcome;
@@ -46,19 +46,22 @@ const COLUMNS: Columns = Columns {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Rotations {
     /// Results by case.
-    pub(super) cells: Vec<Cell>,
+    pub(super) cells: Vec<CaseResults>,
 }
 
 /// Returns the sweep of a plan: corridors of medium width.
-pub(super) fn study(plan: &Plan) -> Result<Study, InputError> {
+pub(super) fn study(plan: &SerpentinePlan) -> Result<Study, InputError> {
     let study = Study::of_file(SWEEP, SCENARIO)?.keep_numbers(WIDTH, &plan.widths_m);
     Ok(study.keep_numbers(STEP, &plan.steps_m).sized(plan.seeds, None))
 }
 
 impl Rotations {
-    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
-        let what = (plan.workers, "rules of rotation");
-        let results = study(plan)?.run_by(what, progress, |scenario, _, cell| {
+    pub(super) fn run(
+        plan: &SerpentinePlan,
+        progress: &mut Progress<'_>,
+    ) -> Result<Self, InputError> {
+        let what = "rules of rotation";
+        let results = study(plan)?.run_by(plan.workers, what, progress, |scenario, _, cell| {
             let mut run = chain_run(&scenario()?, 1)?;
             let mut furthest = 0.0_f64;
             finish(&mut *run, |run| {
@@ -78,7 +81,7 @@ impl Rotations {
     }
 
     /// Returns the cells of a rule.
-    pub(super) fn of<'a>(&'a self, rotation: &'a str) -> impl Iterator<Item = &'a Cell> {
+    pub(super) fn of<'a>(&'a self, rotation: &'a str) -> impl Iterator<Item = &'a CaseResults> {
         self.cells.iter().filter(move |c| c.says("rotation", rotation))
     }
 

@@ -1,7 +1,7 @@
 //! The cost of a motion (slides P5, P6, E4): by the number of connectors, by how many of them it
 //! reaches, and by the number of obstacles that are far away.
 
-use super::{Plan, draws};
+use super::{SerpentinePlan, draws};
 use crate::cells::{figure, median, table};
 use crate::study::Progress;
 use cpu_time::ThreadTime;
@@ -131,7 +131,10 @@ fn bits(chain: &Chain<3>) -> Digest {
 
 impl Scaling {
     /// Runs the experiment; timings run alone, on one worker.
-    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
+    pub(super) fn run(
+        plan: &SerpentinePlan,
+        progress: &mut Progress<'_>,
+    ) -> Result<Self, InputError> {
         let mut sizes = Vec::new();
         for (k, &connectors) in plan.sizes.iter().enumerate() {
             progress("cost of a motion", k as f64 / plan.sizes.len() as f64);

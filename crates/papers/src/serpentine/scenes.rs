@@ -1,11 +1,11 @@
 //! The pictures: the swarm in its corridor, the snake in space, the broken chain before and after.
 
-use super::Plan;
+use super::SerpentinePlan;
 use super::{broken, corridor, snake};
 use crate::Scene;
 use crate::study::{known, setting, source};
 use sidestep::experiment::sweep::Setting;
-use sidestep::kernel::view::{Body, Frame, Kind, Look, Place, Pose, Scenery, Shape, Trail};
+use sidestep::kernel::view::{Body, Frame, Kind, Look, Place, Pose, Scenery, Shape, Trail, Who};
 use sidestep::kernel::{InputError, Simulation};
 use sidestep::worlds::chain::geometry::Point;
 use sidestep::worlds::chain::{ChainRun, chain_run};
@@ -16,7 +16,7 @@ const EVERY: u64 = 10;
 const NEAR_M: f64 = 0.7;
 
 /// Returns all pictures.
-pub(super) fn all(plan: &Plan) -> Result<Vec<Scene>, InputError> {
+pub(super) fn all(plan: &SerpentinePlan) -> Result<Vec<Scene>, InputError> {
     let mut scenes = vec![swarm(plan)?, creeping(plan)?];
     scenes.extend(broken_chain()?);
     Ok(scenes)
@@ -33,7 +33,7 @@ fn traced<const D: usize>(
 ) -> Result<Traced, InputError> {
     let mut run = chain_run(&source(text, settings)?, 1)?;
     let last = run.agents() as u32 - 1;
-    let trail = |part| Trail { of: (Kind::Connector, 0, Some(part)), way: Vec::new() };
+    let trail = |part| Trail { of: Who::new(Kind::Connector, 0, Some(part)), way: Vec::new() };
     let mut trails: Vec<Trail> = [0, last].map(trail).to_vec();
     while run.cycle() < cycles && !run.is_over() {
         if run.cycle().is_multiple_of(EVERY) {
@@ -48,7 +48,7 @@ fn traced<const D: usize>(
     Ok((run, trails))
 }
 
-fn swarm(plan: &Plan) -> Result<Scene, InputError> {
+fn swarm(plan: &SerpentinePlan) -> Result<Scene, InputError> {
     let cycles = plan.corridor_cycles.min(plan.pictured_cycles);
     let (mut run, trails) =
         traced::<2>(corridor::SCENARIO, &[setting("cycles", cycles as i64)], cycles)?;
@@ -61,7 +61,7 @@ fn swarm(plan: &Plan) -> Result<Scene, InputError> {
     })
 }
 
-fn creeping(plan: &Plan) -> Result<Scene, InputError> {
+fn creeping(plan: &SerpentinePlan) -> Result<Scene, InputError> {
     let cycles = setting("cycles", plan.snake_cycles as i64);
     let (mut run, trails) = traced::<3>(snake::SCENARIO, &[cycles], plan.snake_cycles)?;
     let (mut scenery, frame) = (run.scenery(), run.frame(Look::BODIES));

@@ -2,8 +2,8 @@
 //! balls that stand, and balls that fly.
 
 use super::corridor::{CLEARANCE, FASTEST, OWN_PARTS, ROD_VIOLATION};
-use super::{DT_S, Plan};
-use crate::cells::{Cell, Columns, Value, column};
+use super::{DT_S, SerpentinePlan};
+use crate::cells::{CaseResults, Columns, Value, column};
 use crate::study::{Progress, Study, number};
 use serde::Serialize;
 use sidestep::experiment::sweep::Variant;
@@ -50,24 +50,27 @@ fn of_fields(case: &Variant, key: &str) -> f64 {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Snakes {
     /// Results by case.
-    pub(super) cells: Vec<Cell>,
+    pub(super) cells: Vec<CaseResults>,
 }
 
 /// Returns the sweep of a plan.
-pub(super) fn study(plan: &Plan) -> Result<Study, InputError> {
+pub(super) fn study(plan: &SerpentinePlan) -> Result<Study, InputError> {
     let study = Study::of_file(SWEEP, SCENARIO)?;
     let study = study.keep(|v| plan.snake_connectors.contains(&(number(v, CONNECTORS) as usize)));
     Ok(study.sized(plan.snake_seeds, Some(plan.snake_cycles)))
 }
 
 impl Snakes {
-    pub(super) fn run(plan: &Plan, progress: &mut Progress<'_>) -> Result<Self, InputError> {
-        let results = study(plan)?.run((plan.workers, "snake in space"), progress)?;
+    pub(super) fn run(
+        plan: &SerpentinePlan,
+        progress: &mut Progress<'_>,
+    ) -> Result<Self, InputError> {
+        let results = study(plan)?.run(plan.workers, "snake in space", progress)?;
         Ok(Self { cells: COLUMNS.cells(&results) })
     }
 
     /// Returns cells among balls that all stand.
-    pub(super) fn at_rest(&self) -> impl Iterator<Item = &Cell> {
+    pub(super) fn at_rest(&self) -> impl Iterator<Item = &CaseResults> {
         self.cells.iter().filter(|c| c.count("movers") == 0 && c.number("filled") > 0.0)
     }
 

@@ -84,7 +84,8 @@ pub fn live(
     host: &str,
     port: u16,
     scenery: &Scenery,
-    (first, end_s): (&Frame, f64),
+    first: &Frame,
+    end_s: f64,
     steer: impl Fn(Steering) -> Playback + Send + Sync + 'static,
 ) -> io::Result<(LiveServer, LiveFrames)> {
     let context = Context::new();

@@ -115,7 +115,7 @@ impl McapScenes {
 
 /// Returns the bodies that an entity shows; those of a chain are its connectors, in their order.
 fn bodies(entity: &SceneEntity) -> Vec<Body> {
-    let Some((kind, number, _)) = who(&entity.id) else { return Vec::new() };
+    let Some(Who { kind, number, .. }) = who(&entity.id) else { return Vec::new() };
     let shapes = shapes(entity).into_iter().enumerate();
     let part = |k: usize| (kind == Kind::Connector).then_some(k as u32);
     shapes
@@ -164,7 +164,7 @@ fn who(name: &str) -> Option<Who> {
     let kind = Kind::from_name(parts.next()?)?;
     let number = parts.next()?.parse().ok()?;
     let part = parts.next().map(str::parse).transpose().ok()?;
-    parts.next().is_none().then_some((kind, number, part))
+    parts.next().is_none().then_some(Who { kind, number, part })
 }
 
 /// Returns the event of a body that a message reports. Its words are all that is known of it.
@@ -232,8 +232,8 @@ mod tests {
 
     #[test]
     fn names_that_are_no_bodies_are_left_out() {
-        assert_eq!(who("connector/0/7"), Some((Kind::Connector, 0, Some(7))));
-        assert_eq!(who("robot/3"), Some((Kind::Robot, 3, None)));
+        assert_eq!(who("connector/0/7"), Some(Who::new(Kind::Connector, 0, Some(7))));
+        assert_eq!(who("robot/3"), Some(Who::new(Kind::Robot, 3, None)));
         for name in ["scenery", "robot", "robot/x", "robot/1/2/3", "cow/1"] {
             assert_eq!(who(name), None, "{name}");
         }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use sidestep_kernel::view::{
     Body, Condition, Entry, Floor, Frame, Happening, Kind, Level, Occupancy, Plane, Pose, Scan,
-    Scenery, Shape,
+    Scenery, Shape, Who,
 };
 use sidestep_record::{Existing, McapEnd, McapOrigin, McapRecorder, McapRun, Status, is_mcap};
 
@@ -56,7 +56,7 @@ fn frame(cycle: u64) -> Frame {
         bodies.push(body(Kind::Airplane, 0, Shape::Dart { length_m: 2.0, width_m: 1.0 }));
     }
     let scan = Scan {
-        of: (Kind::Robot, 0, None),
+        of: Who::new(Kind::Robot, 0, None),
         sensor: "sonar".into(),
         pose: Pose::at(at_m),
         bearings_rad: vec![-0.5, 0.0, 0.5],
@@ -68,7 +68,7 @@ fn frame(cycle: u64) -> Frame {
         cycle,
         level: Level::Warning,
         kind: Happening::Contact,
-        who: (Kind::Robot, 0, None),
+        who: Who::new(Kind::Robot, 0, None),
         with: None,
         at_m: None,
         value: None,

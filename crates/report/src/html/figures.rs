@@ -6,13 +6,13 @@ use maud::{Markup, PreEscaped, html};
 use serde_json::json;
 use sidestep_document::document::Picture;
 use sidestep_document::{Figure, FigureKind, Table};
-use sidestep_draw::SERIES_COLORS;
+use sidestep_draw::series_colors;
 
 /// Largest number of points of a figure that has a table of its numbers.
 const MOST_ROWS: usize = 200;
 
 pub(super) fn figure(figure: &Figure, id: &str, still: Option<&SvgFile>) -> Markup {
-    let data = json!({ "figure": figure, "colors": SERIES_COLORS });
+    let data = json!({ "figure": figure, "colors": series_colors() });
     html! {
         figure .plot id=(id) {
             figcaption { (figure.title) }

@@ -5,7 +5,7 @@ use sidestep::kernel::InputError;
 use sidestep::kernel::view::{self, Body, Entry, Level, Occupancy, Scenery};
 
 /// Returns the scene of a world, which stays the same, by the world's name and its noun for an agent.
-pub(crate) fn scene((world, agent): (&str, &str), scenery: &Scenery, is_recording: bool) -> Scene {
+pub(crate) fn scene(world: &str, agent: &str, scenery: &Scenery, is_recording: bool) -> Scene {
     let still = |body: &Body| still_body(body, scenery);
     Scene {
         name: scenery.name.clone(),
@@ -68,8 +68,8 @@ pub(super) fn look(body: &Body, dimensions: u8) -> Look {
 }
 
 /// Returns the name of a body.
-pub(crate) fn who(&(kind, number, part): &view::Who) -> Who {
-    Who { kind: kind.name().into(), number, part }
+pub(crate) fn who(who: &view::Who) -> Who {
+    Who { kind: who.kind.name().into(), number: who.number, part: who.part }
 }
 
 /// Returns a scan.
@@ -109,7 +109,7 @@ pub(crate) fn event(entry: &Entry) -> Event {
 
 /// Returns the body that a page names; `None` where there is no such kind.
 pub(crate) fn body(who: &Who) -> Option<view::Who> {
-    Some((view::Kind::from_name(&who.kind)?, who.number, who.part))
+    Some(view::Who::new(view::Kind::from_name(&who.kind)?, who.number, who.part))
 }
 
 /// Returns an error of the program's own.

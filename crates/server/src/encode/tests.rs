@@ -142,7 +142,7 @@ fn a_height_begins_a_cast_in_space_and_none_in_a_plane() {
 #[test]
 fn scans_and_events_are_the_text_of_a_frame_and_nothing_in_range_is_null() {
     let seen = sidestep::kernel::view::Scan {
-        of: (Kind::Robot, 1, None),
+        of: sidestep::kernel::view::Who::new(Kind::Robot, 1, None),
         sensor: "eye".into(),
         pose: Pose::at([0.0; 3]),
         bearings_rad: vec![0.0, 1.0],

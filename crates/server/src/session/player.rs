@@ -116,7 +116,7 @@ impl Player {
     /// Returns the answer to the page that has opened the session.
     pub(super) fn opened(&mut self) -> Answer {
         let (run, is_recording) = (&self.stage.run, self.stage.recorded.is_some());
-        let scene = scene((run.world(), run.agent()), &self.scenery, is_recording);
+        let scene = scene(run.world(), run.agent(), &self.scenery, is_recording);
         Answer::Opened { session: self.session, scene, status: self.status(Instant::now()) }
     }
 

@@ -71,7 +71,7 @@ impl Showing {
         *shown = None;
         let (playing, time_s) = (Playing::Paused, run.cycle() as f64 * scenery.cycle_s);
         let now = Playback { playing, time_s, speed: 1.0, did_seek: false };
-        let viewers = Viewers::start(&showcase.at, run, scenery, (end_s, true), now)?;
+        let viewers = Viewers::start(&showcase.at, run, scenery, end_s, true, now)?;
         *shown = Some((self.session, viewers));
         Ok(())
     }

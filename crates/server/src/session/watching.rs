@@ -111,7 +111,7 @@ impl Watching {
 
     fn opened(&self) -> Answer {
         let staged = &self.staged;
-        let mut scene = scene((&staged.world, &staged.agent), &staged.scenery, false);
+        let mut scene = scene(&staged.world, &staged.agent, &staged.scenery, false);
         // Tabs are distinguished by names, which scenarios need not have.
         if scene.name.is_empty() {
             scene.name.clone_from(&self.screen.endpoint);

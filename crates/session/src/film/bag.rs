@@ -101,7 +101,7 @@ impl BagFilm {
 
     fn write_truth(&mut self, frame: &Frame) -> Result<(), Error> {
         for (who, _) in &frame.odometry {
-            let body = frame.bodies.iter().find(|body| (body.kind, body.number, body.part) == *who);
+            let body = frame.bodies.iter().find(|body| body.who() == *who);
             let Some(body) = body else { continue };
             // A floor has no height, even if pictures show one.
             let [x_m, y_m, _] = body.pose.at_m;
@@ -184,8 +184,8 @@ fn header(time_s: f64, frame_id: String) -> Header {
 }
 
 /// Returns the name of a body in topics and frames.
-fn namespace((kind, number, _): Who) -> String {
-    format!("{kind}_{number}")
+fn namespace(who: Who) -> String {
+    format!("{}_{}", who.kind, who.number)
 }
 
 fn odometry_frame(who: Who) -> String {

@@ -52,7 +52,7 @@ impl Pictures {
                 continue;
             }
             let from = way.places.last().map(|(_, at)| (*at, way.heading));
-            let between = from.and_then(|from| slipped(&self.scenery, body, from));
+            let between = from.and_then(|(at, heading)| slipped(&self.scenery, body, at, heading));
             way.places.extend(between.map(|at| (frame.cycle, at)));
             way.places.push((frame.cycle, body.pose.at_m));
             way.heading = quarters(&self.scenery, body);
@@ -135,17 +135,17 @@ impl Film for Pictures {
     }
 }
 
-/// Returns the place where a body was if it went ahead before it slipped to a side; `None` for a straight
-/// move, and for bodies that do not stand on boxes.
-fn slipped(scenery: &Scenery, body: &Body, from: (Place, u32)) -> Option<Place> {
+/// Returns the place where a body was if it went ahead before it slipped to a side: it left `from` with a heading
+/// of so many quarter turns. `None` for a straight way, and for bodies that do not stand on boxes.
+fn slipped(scenery: &Scenery, body: &Body, from: Place, quarters: u32) -> Option<Place> {
     let plane = &scenery.floor.as_ref()?.plane;
     let flat = |[x, y, z]: Place| {
         let [x, y] = plane.point([x, y]);
         [x, y, z]
     };
-    let (was, is) = (flat(from.0), flat(body.pose.at_m));
+    let (was, is) = (flat(from), flat(body.pose.at_m));
     let moved = |k: usize| (was[k] - is[k]).abs() > 1e-9;
-    let [x, y, z] = corner(was, from.1, is);
+    let [x, y, z] = corner(was, quarters, is);
     let [x, y] = plane.place([x, y]);
     (moved(0) && moved(1)).then_some([x, y, z])
 }
@@ -196,7 +196,10 @@ mod tests {
             }
         }
         assert!(
-            pictures.trail((sidestep::kernel::view::Kind::Robot, 9, None), last).way.is_empty()
+            pictures
+                .trail(Who::new(sidestep::kernel::view::Kind::Robot, 9, None), last)
+                .way
+                .is_empty()
         );
     }
 }

@@ -63,7 +63,8 @@ impl Viewers {
         at: &ViewersAt,
         run: &mut dyn Simulation,
         scenery: &Scenery,
-        (end_s, can_seek): (f64, bool),
+        end_s: f64,
+        can_seek: bool,
         now: Playback,
     ) -> Result<Self, Error> {
         let told = Mutex::new(now);
@@ -72,7 +73,7 @@ impl Viewers {
         let first = run.frame(LOOK);
         let (host, port) = (at.host(), at.port());
         let steer = move |wish| heard.take(wish);
-        let served = retried(|| live(&host, port, scenery, (&first, end_s), steer.clone()));
+        let served = retried(|| live(&host, port, scenery, &first, end_s, steer.clone()));
         let (server, encoder) = served.map_err(|e| at.unusable(&e))?;
         let (frames, taken) = sync_channel(1);
         let is_encoding = Arc::new(AtomicBool::new(false));

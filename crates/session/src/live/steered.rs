@@ -31,7 +31,7 @@ impl Steered {
         let now = Playback { playing, time_s: time_s(run, cycle_s), speed, did_seek: false };
         let end_s = run.plan().cycles as f64 * cycle_s;
         run.watch();
-        let viewers = Viewers::start(at, run, &scenery, (end_s, false), now)?;
+        let viewers = Viewers::start(at, run, &scenery, end_s, false, now)?;
         Ok(Self { viewers, cycle_s, playing, speed, beat: None })
     }
 

@@ -4,7 +4,7 @@ use crate::recorded::has_rows;
 use sidestep::kernel::InputError;
 use sidestep::kernel::ports::Values;
 use sidestep::kernel::ports::table::split_unit;
-use sidestep::kernel::view::{Amount, Body, Entry, Happening, Kind, Level, PlaceRows};
+use sidestep::kernel::view::{Amount, Body, Entry, Happening, Kind, Level, PlaceRows, Who};
 use sidestep_record::{Table, read_table};
 use std::ops::Range;
 
@@ -59,8 +59,8 @@ impl Rows<'_> {
             level: if known == Some(&Happening::Contact) { Level::Warning } else { Level::Info },
             // An event without a name here is shown with its own words.
             kind: known.copied().unwrap_or(Happening::Changed),
-            who: (kind, number, part),
-            with: self.number("other", row).map(|other| (self.place.kind, other, None)),
+            who: Who { kind, number, part },
+            with: self.number("other", row).map(|other| Who::new(self.place.kind, other, None)),
             at_m: None,
             value,
             words,

@@ -121,7 +121,7 @@ impl Places {
             let followed = match body.kind {
                 Kind::Rods => line(body, poses, joints.entry(body.number).or_default()),
                 Kind::Zone => poses
-                    .get(&(Kind::Airplane, body.number, None))
+                    .get(&Who::new(Kind::Airplane, body.number, None))
                     .map(|pose| Body { pose: Pose::at(pose.at_m), ..body.clone() }),
                 _ => who.and_then(|who| poses.get(&who)).map(|pose| {
                     used.extend(who);
@@ -140,11 +140,12 @@ impl Places {
     /// Returns the name of a body in the tables, if it has rows there.
     fn row_of(&self, body: &Body) -> Option<Who> {
         let rows = self.rows.iter().find(|rows| is_of(rows, body))?;
-        Some((rows.kind, body.number, body.part))
+        Some(Who::new(rows.kind, body.number, body.part))
     }
 
     /// Returns a body that was not there at the start; it looks like the others of its kind.
-    fn latecomer(&self, (kind, number, part): Who, pose: Pose) -> Body {
+    fn latecomer(&self, who: Who, pose: Pose) -> Body {
+        let Who { kind, number, part } = who;
         let like = self.first.iter().find(|body| body.kind == kind);
         let shape = like.map_or(Shape::Sphere { radius_m: 1.0 }, |body| body.shape.clone());
         Body { part, ..Body::new(kind, number, pose, shape) }
@@ -162,7 +163,7 @@ fn line(body: &Body, poses: &BTreeMap<Who, Pose>, joint: &mut u32) -> Option<Bod
     let Shape::Line { points_m, thickness_m } = &body.shape else { return None };
     let from = *joint;
     *joint += points_m.len() as u32;
-    let place = |part| Some(poses.get(&(Kind::Connector, body.number, Some(part)))?.at_m);
+    let place = |part| Some(poses.get(&Who::new(Kind::Connector, body.number, Some(part)))?.at_m);
     let points_m = (from..*joint).map(place).collect::<Option<Vec<_>>>()?;
     let shape = Shape::Line { points_m, thickness_m: *thickness_m };
     Some(Body { shape, ..body.clone() })
@@ -179,7 +180,7 @@ fn last_headings(
     let mut found: BTreeMap<Who, (Cycle, Option<u32>)> = BTreeMap::new();
     for (row, &at) in cycles.iter().enumerate().filter(|(_, at)| **at <= cycle) {
         let part = rows.part.and_then(|part| whole(part, row));
-        let who = (rows.kind, whole(rows.number, row)?, part);
+        let who = Who::new(rows.kind, whole(rows.number, row)?, part);
         let last = found.entry(who).or_default();
         if at >= last.0 {
             *last = (at, rows.ahead.and_then(|ahead| whole(ahead, row)));

@@ -424,7 +424,7 @@ impl<'a> Log<'a> {
             Ok(())
         };
         let take: &mut Take<'_> = &mut take;
-        let ran = work.run(&open, (before, before + open.len() as u64), take);
+        let ran = work.run(&open, before, before + open.len() as u64, take);
         effort.end(work.at_once(open.len()));
         ran.map(|()| effort)
     }

@@ -48,8 +48,7 @@ impl Task {
         let engine = Engine::Workers(1);
         let work = Work { worlds, agents: 0, source: &source, record: None, engine, watcher };
         let mut outcomes = Vec::with_capacity(self.cells.len());
-        let span = (0, self.cells.len() as u64);
-        work.run(&self.cells, span, &mut |outcome| {
+        work.run(&self.cells, 0, self.cells.len() as u64, &mut |outcome| {
             outcomes.push(outcome);
             Ok(())
         })?;

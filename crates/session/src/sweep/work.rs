@@ -46,7 +46,8 @@ impl Work<'_> {
     pub(super) fn run(
         &self,
         cells: &[Cell],
-        (before, total): (u64, u64),
+        before: u64,
+        total: u64,
         take: &mut Take<'_>,
     ) -> Result<(), Error> {
         let watched = Watched(self.watcher);

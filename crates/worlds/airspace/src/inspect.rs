@@ -25,7 +25,7 @@ impl AirspaceWorld {
         now: Cycle,
         who: Who,
     ) -> Option<Inspection> {
-        let (kind, id, part) = who;
+        let Who { kind, number: id, part } = who;
         let is_airplane = kind == Kind::Airplane && part.is_none();
         if !is_airplane || id as usize >= self.airplanes.len() || !state.is_there(self, id, now) {
             return None;
@@ -172,5 +172,5 @@ impl Looking<'_> {
 
 /// Returns the body that stands for an airplane.
 fn airplane(id: EntityId) -> Who {
-    (Kind::Airplane, id, None)
+    Who::new(Kind::Airplane, id, None)
 }

@@ -38,7 +38,7 @@ impl Compiled {
         self.too_close.iter().for_each(|&pair| ledger.add_too_close(0, pair));
         let books = Books { ledger, rows: Rows::new(self.record), ..Books::default() };
         let plan = self.plan();
-        Run::new(self.world, plan, (state, books), &source.text, workers)
+        Run::new(self.world, plan, state, books, &source.text, workers)
     }
 
     /// Returns the plan that the scenario asks for.

@@ -5,7 +5,7 @@ use super::flight::{Airplane, Point, distance_m};
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use sidestep_kernel::view::{
-    Amount, Axis, Body, Condition, Entry, Kind, Level, PlaceRows, Pose, Scenery, Shape,
+    Amount, Axis, Body, Condition, Entry, Kind, Level, PlaceRows, Pose, Scenery, Shape, Who,
 };
 use sidestep_kernel::{Cycle, Slot};
 
@@ -163,7 +163,7 @@ pub(super) fn entry(event: &Event) -> Entry {
             (Level::Warning, "stays on its orbit: no control of it came in time".into())
         }
     };
-    let airplane = |id| (Kind::Airplane, id, None);
+    let airplane = |id| Who::new(Kind::Airplane, id, None);
     Entry {
         cycle: event.cycle,
         level,

@@ -29,7 +29,7 @@ impl<const D: usize> ChainWorld<D> {
         now: Cycle,
         who: Who,
     ) -> Option<Inspection> {
-        let (kind, slot, Some(part)) = who else { return None };
+        let Who { kind, number: slot, part: Some(part) } = who else { return None };
         if slot as usize >= state.len() {
             return None;
         }
@@ -54,7 +54,8 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// Returns the name of a connector, or of its robot, for people.
-    fn title(&self, (kind, slot, part): Who) -> String {
+    fn title(&self, who: Who) -> String {
+        let Who { kind, number: slot, part } = who;
         let name = &self.chains[slot as usize].name;
         let chain = if name.is_empty() { format!("chain {slot}") } else { name.clone() };
         format!("{kind} {} of {chain}", part.unwrap_or_default())
@@ -150,7 +151,7 @@ impl<const D: usize> Asked<'_, D> {
     }
 
     fn connector(&self, k: usize) -> Who {
-        (Kind::Connector, self.slot, Some(k as u32))
+        Who::new(Kind::Connector, self.slot, Some(k as u32))
     }
 
     /// Returns the place of the connector or robot in a state of the chain.
@@ -184,7 +185,7 @@ impl<const D: usize> Asked<'_, D> {
     fn is_in_group(&self, told: &mut Inspection, group: &[Slot]) {
         let mut table = Table::new(["turn", "chain"]);
         for (turn, &slot) in group.iter().enumerate().filter(|_| group.len() > 1) {
-            table.row([Value::count(turn + 1), Value::Who((Kind::Rods, slot, None))]);
+            table.row([Value::count(turn + 1), Value::Who(Who::new(Kind::Rods, slot, None))]);
         }
         let turn = group.iter().position(|&slot| slot == self.slot).map_or(0, |turn| turn + 1);
         told.tell(

@@ -45,7 +45,7 @@ impl<const D: usize> Compiled<D> {
         let state = ChainState::new(&self.world).expect("scripts are tried when they are compiled");
         let books = Books { rows: Rows::new(self.record), ..Books::default() };
         let plan = self.plan();
-        Run::new(self.world, plan, (state, books), &source.text, workers)
+        Run::new(self.world, plan, state, books, &source.text, workers)
     }
 
     /// Returns the plan that the scenario asks for.

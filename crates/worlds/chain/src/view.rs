@@ -82,9 +82,9 @@ impl<const D: usize> ChainWorld<D> {
         match of {
             Scans::First(leaders) => slots.filter_map(scan).take(*leaders).collect(),
             Scans::Of(bodies) => {
-                let asked = |&(_, slot, part): &Who| {
-                    let scan = slots.contains(&slot).then(|| scan(slot))??;
-                    (scan.of.2 == part).then_some(scan)
+                let asked = |of: &Who| {
+                    let scan = slots.contains(&of.number).then(|| scan(of.number))??;
+                    (scan.of.part == of.part).then_some(scan)
                 };
                 bodies.iter().filter_map(asked).collect()
             }
@@ -101,7 +101,7 @@ fn scan_of<const D: usize>(looking: &mut Looking<'_, D>, slot: Slot) -> Option<S
     let (bearings_rad, ranges_m) = beams.map(|(b, range_m)| (b, beyond(range_m))).unzip();
     let true_m = laser.truths(&looking.scratch.scan).map(beyond).collect();
     Some(Scan {
-        of: (Kind::Connector, slot, Some(sight.agent as u32)),
+        of: Who::new(Kind::Connector, slot, Some(sight.agent as u32)),
         sensor: LASER.into(),
         pose: Pose::heading([x_m, y_m, 0.0], sight.leader.pose.heading_rad),
         bearings_rad,
@@ -233,7 +233,7 @@ pub(crate) fn entry(event: &Event) -> Entry {
         cycle: event.cycle,
         level,
         kind: event.kind.happening(),
-        who: (Kind::Connector, event.chain, Some(event.connector)),
+        who: Who::new(Kind::Connector, event.chain, Some(event.connector)),
         with: event.obstacle.map(who_of_obstacle),
         at_m: Some(event.at_m),
         value: (unit != NO_VALUE).then(|| Amount::new(event.value, unit)),
@@ -284,8 +284,8 @@ fn told(event: &Event) -> (Level, &'static str, String) {
 /// Returns the body of an obstacle: another chain stands for all of its parts.
 pub(crate) fn who_of_obstacle(id: u32) -> Who {
     match id.checked_sub(OTHER_CHAIN) {
-        Some(chain) => (Kind::Rods, chain, None),
-        None => (Kind::Obstacle, id, None),
+        Some(chain) => Who::new(Kind::Rods, chain, None),
+        None => Who::new(Kind::Obstacle, id, None),
     }
 }
 

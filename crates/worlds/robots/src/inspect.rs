@@ -24,7 +24,7 @@ const MOST_MEMBERS: usize = 64;
 impl RobotsWorld {
     /// Returns the inspection of a body in cycle `now`; `None` for one that is not there.
     pub(super) fn inspect(&self, state: &RobotsState, now: Cycle, who: Who) -> Option<Inspection> {
-        let (_, id, _) = who;
+        let id = who.number;
         if id as usize >= self.bodies.len() || self.who(id) != who {
             return None;
         }
@@ -171,7 +171,7 @@ impl<'a, T: BoxWord> Looking<'a, T> {
             table.row([Value::count(k + 1), who.into(), draw]);
             let corners_m =
                 world.corners_m(world.map_position(cell.at()), world.type_of(cell.id).size);
-            let label = format!("{}. {}", k + 1, view::name_of(who));
+            let label = format!("{}. {who}", k + 1);
             self.told.mark(view::Role::Group, label, MarkShape::Area { corners_m });
         }
         self.told.tell(

@@ -35,7 +35,7 @@ impl Compiled {
     pub fn start(self, source: &Source, workers: usize) -> RobotsRun {
         let state = RobotsState::restore(&self.world, &self.start_snapshot());
         let (plan, books) = (self.plan(), Books::new(self.record));
-        Run::new(self.world, plan, (state, books), &source.text, workers)
+        Run::new(self.world, plan, state, books, &source.text, workers)
     }
 
     /// Returns the plan that the scenario asks for.

@@ -97,8 +97,8 @@ impl RobotsWorld {
             Scans::First(robots) => self.robots.iter().take(*robots).flat_map(scans).collect(),
             Scans::Of(bodies) => {
                 let is_there = |id: &EntityId| (*id as usize) < self.bodies.len();
-                let asked = bodies.iter().filter(|(kind, ..)| *kind == Kind::Robot);
-                asked.map(|(_, id, _)| *id).filter(is_there).flat_map(|id| scans(&id)).collect()
+                let asked = bodies.iter().filter(|of| of.kind == Kind::Robot);
+                asked.map(|of| of.number).filter(is_there).flat_map(|id| scans(&id)).collect()
             }
         }
     }
@@ -147,14 +147,14 @@ impl RobotsWorld {
     pub(super) fn claimed_poses(&self, claimed: &[Claimed]) -> Vec<(Who, Pose)> {
         let turns = Claimed::turns();
         let of = |(id, claimed): (EntityId, &Claimed)| {
-            ((Kind::Robot, id, None), claimed.pose(self.map.box_size_m, &turns))
+            (Who::new(Kind::Robot, id, None), claimed.pose(self.map.box_size_m, &turns))
         };
         (0..).zip(claimed).map(of).collect()
     }
 
     /// Returns which body one is.
     pub(super) fn who(&self, id: EntityId) -> Who {
-        (self.visible_kind(id), id, None)
+        Who::new(self.visible_kind(id), id, None)
     }
 
     /// Returns an event in words.
@@ -254,7 +254,7 @@ fn scan(
     let true_m = true_m.iter().zip(&bearings_rad);
     let true_m = true_m.map(|(far_m, bearing_rad)| to_boundary_m(side_m, *bearing_rad) + far_m);
     Scan {
-        of: (Kind::Robot, robot, None),
+        of: Who::new(Kind::Robot, robot, None),
         sensor: sensor.name.clone(),
         pose,
         ranges_m: readings.iter().zip(&bearings_rad).map(range_m).collect(),

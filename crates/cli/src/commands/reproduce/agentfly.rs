@@ -6,7 +6,7 @@ use crate::exit::{ExitCode, Failure};
 use crate::link;
 use crate::progress::Stages;
 use clap::Args;
-use sidestep_papers::agentfly::{self, Measured, Plan, Sockets};
+use sidestep_papers::agentfly::{self, AgentflyPlan, Measured, Sockets};
 use sidestep_session::fleet::{Clock, Common, FleetJob, Flown, Job, NodeNow, Told, Topology};
 use std::path::{Path, PathBuf};
 
@@ -31,7 +31,7 @@ pub(super) struct AgentflyArgs {
 }
 
 /// Measures over real sockets, if the program is there that carries them.
-fn sockets(plan: &Plan, console: Console) -> Result<Sockets, Failure> {
+fn sockets(plan: &AgentflyPlan, console: Console) -> Result<Sockets, Failure> {
     if let Err(missing) = link::find() {
         let reason = missing.to_string();
         console.note(format!("The part over real sockets is left out: {reason}"));
@@ -85,9 +85,8 @@ fn job(file: &Path) -> FleetJob {
 }
 
 pub(super) fn reproduce(args: &AgentflyArgs, console: Console) -> Result<ExitCode, Failure> {
-    let default = if args.quick { agentfly::Plan::quick() } else { agentfly::Plan::default() };
-    let plan =
-        agentfly::Plan { seeds: args.seeds.map_or(default.seeds, |n| n as usize), ..default };
+    let default = if args.quick { AgentflyPlan::quick() } else { AgentflyPlan::default() };
+    let plan = AgentflyPlan { seeds: args.seeds.map_or(default.seeds, |n| n as usize), ..default };
     if let Some(folder) = &args.out {
         check_vacant(folder)?;
     }

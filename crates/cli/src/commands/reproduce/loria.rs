@@ -11,7 +11,7 @@ use sidestep_document::document::Picture;
 use sidestep_draw::{DrawError, describe};
 use sidestep_papers::Scene;
 use sidestep_papers::loria::scenes;
-use sidestep_papers::loria::{LoriaError, NewRecorder, Plan, Report, in_memory, run_recorded};
+use sidestep_papers::loria::{LoriaError, LoriaPlan, NewRecorder, Report, in_memory, run_recorded};
 use sidestep_record::{Origin, ParquetRecorder};
 use std::path::{Path, PathBuf};
 
@@ -41,9 +41,9 @@ pub(super) struct LoriaArgs {
 }
 
 impl LoriaArgs {
-    fn plan(&self) -> Plan {
-        let default = if self.quick { Plan::quick() } else { Plan::default() };
-        Plan {
+    fn plan(&self) -> LoriaPlan {
+        let default = if self.quick { LoriaPlan::quick() } else { LoriaPlan::default() };
+        LoriaPlan {
             seeds: self.seeds.unwrap_or(default.seeds),
             cycles: self.cycles.unwrap_or(default.cycles),
             workers: self.workers.unwrap_or(default.workers),
@@ -75,7 +75,11 @@ fn described(scene: &Scene) -> Result<Picture, DrawError> {
     Ok(Picture { caption: format!("{what} {}", picture.caption), ..picture })
 }
 
-fn run(plan: &Plan, recorders: &mut NewRecorder<'_>, console: Console) -> Result<Report, Failure> {
+fn run(
+    plan: &LoriaPlan,
+    recorders: &mut NewRecorder<'_>,
+    console: Console,
+) -> Result<Report, Failure> {
     let stages = Stages::new(console);
     let report = run_recorded(plan, recorders, &mut |what, share| stages.at(what, share));
     stages.clear();
@@ -87,7 +91,7 @@ fn run(plan: &Plan, recorders: &mut NewRecorder<'_>, console: Console) -> Result
 
 /// Runs the experiments with recordings on disk, as the paper did, and deletes these at the end;
 /// after a failure also the folder, if it was made for them.
-fn recorded(plan: &Plan, folder: &Path, console: Console) -> Result<Report, Failure> {
+fn recorded(plan: &LoriaPlan, folder: &Path, console: Console) -> Result<Report, Failure> {
     let timed = folder.join("timed-runs");
     let found = folder.exists();
     std::fs::create_dir_all(&timed).map_err(|e| Failure::write(&timed, &e))?;

@@ -6,7 +6,7 @@ use crate::exit::{ExitCode, Failure};
 use crate::progress::Stages;
 use clap::Args;
 use sidestep_document::document::Picture;
-use sidestep_papers::serpentine::{self, Plan};
+use sidestep_papers::serpentine::{self, SerpentinePlan};
 use std::path::PathBuf;
 
 /// The extent of the experiments.
@@ -27,11 +27,13 @@ pub(super) struct SerpentineArgs {
 }
 
 impl SerpentineArgs {
-    fn plan(&self) -> Plan {
-        let default = if self.quick { Plan::quick() } else { Plan::default() };
+    fn plan(&self) -> SerpentinePlan {
+        let default = if self.quick { SerpentinePlan::quick() } else { SerpentinePlan::default() };
         match self.seeds.map(|n| n as usize) {
             None => default,
-            Some(seeds) => Plan { seeds, field_seeds: 3 * seeds, snake_seeds: seeds, ..default },
+            Some(seeds) => {
+                SerpentinePlan { seeds, field_seeds: 3 * seeds, snake_seeds: seeds, ..default }
+            }
         }
     }
 }

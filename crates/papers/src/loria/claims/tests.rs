@@ -7,7 +7,7 @@ use super::super::measure::{Outcome, Variant};
 use super::super::performance::{Initialization, Performance, Timing, loads};
 use super::super::reliability::Reliability;
 use super::super::strategies::{Strategies, Trial};
-use super::super::{Plan, Report};
+use super::super::{LoriaPlan, Report};
 use super::*;
 use sidestep::statistics::Interval;
 use sidestep::worlds::robots::baseline::Strategy;
@@ -38,18 +38,18 @@ fn outcome(variant: &Variant, seed: usize, is_right: bool) -> Outcome {
 }
 
 /// Factors near one value, by repeat.
-fn near(value: f64, plan: &Plan) -> Vec<Option<f64>> {
+fn near(value: f64, plan: &LoriaPlan) -> Vec<Option<f64>> {
     (0..plan.repeats).map(|k| Some(value * (1.0 + 0.001 * k as f64))).collect()
 }
 
-fn genericity(plan: &Plan) -> Genericity {
+fn genericity(plan: &LoriaPlan) -> Genericity {
     let lawful = Outcome { lawful: true, ..Outcome::default() };
     let build = |camera| Build { size: 2, camera, outcomes: vec![lawful.clone(); plan.seeds] };
     Genericity { builds: [false, true].map(build).into(), cycles: plan.cycles }
 }
 
 /// Timings on a quiet machine of two processors.
-fn performance(plan: &Plan) -> Performance {
+fn performance(plan: &LoriaPlan) -> Performance {
     let loads = loads(plan);
     let timing = |load: usize, workers: usize, recorded| {
         let dear = if loads[load].operations > 1000 { 0.1 } else { 0.0 };
@@ -79,7 +79,7 @@ fn performance(plan: &Plan) -> Performance {
     }
 }
 
-fn strategies(plan: &Plan) -> Strategies {
+fn strategies(plan: &LoriaPlan) -> Strategies {
     let loads = loads(plan);
     let trial = |load: usize, strategy: &str, value: f64| {
         let ratios = near(value, plan);
@@ -116,7 +116,7 @@ fn cost_model(low: f64) -> CostModel {
 
 /// A report of a full plan that satisfies the paper.
 fn ideal() -> Report {
-    let plan = Plan { most_workers: 2, ..Plan::default() };
+    let plan = LoriaPlan { most_workers: 2, ..LoriaPlan::default() };
     Report {
         program_version: "0".into(),
         reliability: Reliability::made_up(&plan, |variant, seed| outcome(variant, seed, true)),
@@ -146,7 +146,7 @@ fn ideal_numbers_hold_all_claims_that_are_judged_and_settings_are_not() {
     assert_eq!(ids(&report, Verdict::Setting), ["E-1", "E-2", "E-3", "E-7"]);
 }
 
-fn set(timings: &mut [Timing], plan: &Plan, value: f64) {
+fn set(timings: &mut [Timing], plan: &LoriaPlan, value: f64) {
     for timing in timings {
         timing.ratios = near(value, plan);
         timing.speed_up = Estimate::of_factors(timing.ratios.iter().copied());
@@ -199,7 +199,7 @@ fn a_busy_machine_refutes_nothing_about_time() {
 
 #[test]
 fn too_few_runs_decide_nothing_that_is_a_mean() {
-    let plan = Plan { most_workers: 2, ..Plan::quick() };
+    let plan = LoriaPlan { most_workers: 2, ..LoriaPlan::quick() };
     let report = Report {
         reliability: Reliability::made_up(&plan, |variant, seed| outcome(variant, seed, true)),
         performance: performance(&plan),

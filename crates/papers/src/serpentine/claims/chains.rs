@@ -10,7 +10,7 @@ use super::super::rotation::{RULES, Rotations};
 use super::super::scaling::Scaling;
 use super::super::snake::Snakes;
 use super::{Claim, Comparison, both, claim, every, every_trial, in_every_run, judged, listed};
-use crate::cells::{Cell, least, mm, most};
+use crate::cells::{CaseResults, least, mm, most};
 
 /// Tolerance of the rods' limits, meters.
 const ROD_TOLERANCE_M: f64 = 1e-9;
@@ -95,7 +95,7 @@ fn few_and_many(report: &Report) -> Claim {
 
 fn joints(arms: &Arms) -> Claim {
     let ours = listed(PLANNERS, |planner| {
-        let told = |c: &Cell| {
+        let told = |c: &CaseResults| {
             format!(
                 "{} pillars: {} runs reach all, fastest joint at {:.3} of its limit",
                 c.count("pillars"),
@@ -105,7 +105,7 @@ fn joints(arms: &Arms) -> Claim {
         };
         format!("planner {planner}: {}", listed(arms.with(planner), told))
     });
-    let is_kept = |c: &Cell| {
+    let is_kept = |c: &CaseResults| {
         let broken = ["outside", "too_fast", "penetrations"].map(|name| c.count(name));
         broken == [0; 3] && c.number("off_m") <= ROD_TOLERANCE_M
     };
@@ -141,7 +141,7 @@ fn creeps(snakes: &Snakes) -> Claim {
             c.count("steps")
         )
     });
-    let on_the_way = |c: &Cell| Comparison::above(c.estimate("way_percent"), 90.0);
+    let on_the_way = |c: &CaseResults| Comparison::above(c.estimate("way_percent"), 90.0);
     let verdict = both(&[
         judged(snakes.at_rest().map(on_the_way)),
         every(snakes.at_rest(), |c| c.count("penetrations") == 0),
@@ -253,7 +253,7 @@ fn rejoined_with_fewer(broken: &Broken) -> Claim {
             c.count("too_long")
         )
     });
-    let as_can = |c: &Cell| {
+    let as_can = |c: &CaseResults| {
         let whole = if c.is("may_come") { c.share("whole").n } else { c.share("can").hits };
         c.share("whole").hits == whole && c.in_all("ends_kept")
     };

@@ -5,7 +5,7 @@ use super::super::corridor::{Corridor, READINGS};
 use super::super::field::Fields;
 use super::super::snake::Snakes;
 use super::{Claim, Comparison, Verdict, claim, every, judged, listed};
-use crate::cells::{Cell, mm, most};
+use crate::cells::{CaseResults, mm, most};
 
 /// Number of followers in the slides' swarm.
 const FOLLOWERS: u64 = 15;
@@ -28,7 +28,7 @@ pub(super) fn claims(report: &Report) -> Vec<Claim> {
 }
 
 /// Returns cells of our reading with the fewest followers.
-fn plain(corridor: &Corridor) -> impl Iterator<Item = &Cell> {
+fn plain(corridor: &Corridor) -> impl Iterator<Item = &CaseResults> {
     corridor.of_few(READINGS[0])
 }
 
@@ -106,16 +106,16 @@ fn snake_in_real_time(snakes: &Snakes) -> Claim {
             c.estimate("real_time")
         )
     });
-    let faster = |c: &Cell| Comparison::above(c.estimate("real_time"), 1.0);
+    let faster = |c: &CaseResults| Comparison::above(c.estimate("real_time"), 1.0);
     claim("E1", judged(cells().map(faster)), ours)
 }
 
 fn swarm(corridor: &Corridor) -> Claim {
     let cells = || corridor.of(READINGS[0]).filter(|c| c.count("followers") >= FOLLOWERS);
-    let is_clean = |c: &Cell| {
+    let is_clean = |c: &CaseResults| {
         c.in_all("arrived") && c.count("bumper_events") == 0 && c.count("penetrations") == 0
     };
-    let sum = |count: fn(&Cell) -> u64| cells().map(count).sum::<u64>();
+    let sum = |count: fn(&CaseResults) -> u64| cells().map(count).sum::<u64>();
     let ours = format!(
         "{} of {} runs arrive; {} bumper events, {} of {} steps inside, gap {} mm, lag up to {:.3} m",
         sum(|c| c.share("arrived").hits),

@@ -3,7 +3,7 @@
 use super::super::*;
 use super::*;
 use crate::cells::Value::{Count, Maybe, Number, Word, Yes};
-use crate::cells::{Cell, Share, Value};
+use crate::cells::{CaseResults, Share, Value};
 use sidestep_document::Estimate;
 
 fn yes(n: usize) -> Value {
@@ -62,9 +62,9 @@ fn clean() -> Vec<(&'static str, Value)> {
 fn ideal() -> Report {
     let ride = |leaving| {
         let case = [("width_m", Number(2.0)), ("followers", Count(15)), ("leaving", word(leaving))];
-        Cell::new(case, clean())
+        CaseResults::new(case, clean())
     };
-    let turned = |rotation| Cell::new([("rotation", word(rotation))], clean());
+    let turned = |rotation| CaseResults::new([("rotation", word(rotation))], clean());
     let crossed = |leaving, leave_rule, speed_ratio| {
         let case = [
             ("discs", Count(10)),
@@ -72,13 +72,14 @@ fn ideal() -> Report {
             ("leaving", word(leaving)),
             ("leave_rule", Yes(leave_rule)),
         ];
-        Cell::new(case, clean())
+        CaseResults::new(case, clean())
     };
-    let reached = |planner| Cell::new([("pillars", Count(3)), ("planner", word(planner))], clean());
-    let met = |escape| Cell::new([("escape", word(escape))], clean());
+    let reached =
+        |planner| CaseResults::new([("pillars", Count(3)), ("planner", word(planner))], clean());
+    let met = |escape| CaseResults::new([("escape", word(escape))], clean());
     let solved = |way: postures::Way| {
         let case = [("way", word(way.key())), ("links", Count(7)), ("slack", Number(0.1))];
-        Cell::new(case, clean())
+        CaseResults::new(case, clean())
     };
     let joined = |gone| {
         let case = [
@@ -87,7 +88,7 @@ fn ideal() -> Report {
             ("gone", Count(gone)),
             ("may_come", Yes(false)),
         ];
-        Cell::new(case, clean())
+        CaseResults::new(case, clean())
     };
     let size = |connectors| scaling::Size {
         connectors,
@@ -98,7 +99,7 @@ fn ideal() -> Report {
         slack_moved: 1.0,
     };
     let case = [("filled", Number(0.1)), ("movers", Count(0)), ("connectors", Count(450))];
-    let snake = Cell::new(case, clean());
+    let snake = CaseResults::new(case, clean());
     let all = Share::of([true; 30]);
     let bend = initiators::Bend {
         limit_deg: 60.0,
@@ -110,7 +111,7 @@ fn ideal() -> Report {
     };
     use postures::Way::{FreeBase, LeastSquares, ThereAndBack, Veto};
     Report {
-        plan: Plan::quick(),
+        plan: SerpentinePlan::quick(),
         program_version: "0".into(),
         corridor: corridor::Corridor { cells: vec![ride("latched"), ride("level")] },
         rotations: rotation::Rotations { cells: vec![turned("union"), turned("literal")] },
@@ -219,7 +220,7 @@ fn each_claim_has_a_number_that_refutes_it() {
 
 #[test]
 fn a_full_plan_has_runs_enough_to_decide() {
-    let plan = Plan::default();
+    let plan = SerpentinePlan::default();
     let least = [plan.seeds, plan.field_seeds, plan.snake_seeds, plan.breaks];
     assert!(least.into_iter().all(|n| n >= crate::claims::LEAST_RUNS), "{least:?}");
     assert_eq!(plan.ik_targets, TARGETS, "as many as 99 % takes");
@@ -236,10 +237,10 @@ fn discs_that_only_touching_chains_run_into_say_nothing_of_those_that_look_ahead
 
 #[test]
 fn a_full_plan_runs_all_variants_of_the_sweep_files() {
-    let plan = Plan::default();
+    let plan = SerpentinePlan::default();
     let studies = [corridor::study, rotation::study, movers::study, snake::study];
     let full = studies.map(|study| study(&plan).expect("right files").len());
     assert_eq!(full, [7 * 4, 9 * 3, 8 * 2 * 5, 2 * 4]);
-    let quick = studies.map(|study| study(&Plan::quick()).expect("right files").len());
+    let quick = studies.map(|study| study(&SerpentinePlan::quick()).expect("right files").len());
     assert_eq!(quick, [2 * 3, 3, 8 * 2, 4]);
 }

@@ -98,8 +98,9 @@ impl Compiled for CompiledPond {
     }
 
     fn start(&self, source: &Source, workers: usize) -> Box<dyn Simulation> {
-        let begin = (self.world.start(), Books::default());
-        let mut run = Run::new(self.world.clone(), self.plan.clone(), begin, &source.text, workers);
+        let (world, plan) = (self.world.clone(), self.plan.clone());
+        let (state, books) = (world.start(), Books::default());
+        let mut run = Run::new(world, plan, state, books, &source.text, workers);
         // A pond this small would be left to one worker.
         run.share_always();
         Box::new(run)

@@ -3,7 +3,7 @@
 use super::cell::Outcome;
 use super::plan::{Plan, Shard};
 use super::seeds::Trials;
-use super::shape::{CYCLES, FAILURE, Shape, each_field, type_of, widened, wider, words};
+use super::shape::{CYCLES, FAILURE, First, Shape, each_field, type_of, widened, wider, words};
 use super::table::{Role, RunColumn, RunTable};
 use super::variant::Variant;
 use serde_json::Value;
@@ -25,8 +25,7 @@ pub struct Rows {
 #[derive(Debug)]
 struct Growing {
     column: RunColumn,
-    /// See [`Shape`].
-    first: (u64, usize),
+    first: First,
 }
 
 impl Rows {
@@ -54,12 +53,13 @@ impl Rows {
         let k = *self.index.entry(key).or_insert_with(|| {
             let values = Values::empty(ColumnType::F64);
             let column = RunColumn { name: name.into(), role, values };
-            self.columns.push(Growing { column, first: (u64::MAX, usize::MAX) });
+            let first = First { cell: u64::MAX, place: usize::MAX };
+            self.columns.push(Growing { column, first });
             self.columns.len() - 1
         });
         let growing = &mut self.columns[k];
         let cell = if value.is_null() { u64::MAX } else { cell };
-        growing.first = growing.first.min((cell, place));
+        growing.first = growing.first.min(First { cell, place });
         growing.column.values.resize(row);
         add(&mut growing.column.values, value);
     }
@@ -86,7 +86,7 @@ impl Rows {
         for Growing { column, first } in &self.columns {
             let values = &column.values;
             let has_values = (0..values.len()).any(|row| !values.is_missing(row));
-            shape.see((column.role, &column.name), has_values.then(|| values.ty()), *first);
+            shape.see(column.role, &column.name, has_values.then(|| values.ty()), *first);
         }
         shape
     }

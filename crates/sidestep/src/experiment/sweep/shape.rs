@@ -23,9 +23,15 @@ pub struct Shape(BTreeMap<(Role, String), Seen>);
 struct Seen {
     /// Its type, once it has a value.
     ty: Option<ColumnType>,
-    /// The first cell in which it has a value, and its place there: the order of columns, whichever process ran
-    /// which cell. Columns without any value come last.
-    first: (u64, usize),
+    first: First,
+}
+
+/// The first cell in which a column has a value, and its place there: the order of columns, whoever ran what. Columns
+/// without any value come last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct First {
+    pub(super) cell: u64,
+    pub(super) place: usize,
 }
 
 impl Shape {
@@ -33,17 +39,12 @@ impl Shape {
     pub fn note(&mut self, outcome: &Outcome) {
         each_field(outcome, |role, name, value, place| {
             let cell = if value.is_null() { u64::MAX } else { outcome.cell };
-            self.see((role, name), type_of(value), (cell, place));
+            self.see(role, name, type_of(value), First { cell, place });
         });
     }
 
     /// Takes note of a column of which values were seen.
-    pub(super) fn see(
-        &mut self,
-        (role, name): (Role, &str),
-        ty: Option<ColumnType>,
-        first: (u64, usize),
-    ) {
+    pub(super) fn see(&mut self, role: Role, name: &str, ty: Option<ColumnType>, first: First) {
         let seen = self.0.entry((role, name.to_string())).or_insert(Seen { ty, first });
         *seen = Seen { ty: wider(seen.ty, ty), first: seen.first.min(first) };
     }

@@ -57,7 +57,7 @@ impl Summary {
         let reference = reference(&groups, options)?;
         let metric = |(k, c): (usize, &&RunColumn)| {
             let within = &mut |share| progress((k as f64 + share) / columns.len() as f64);
-            summed(&groups, c, (reference.as_ref(), &options.bootstrap), within)
+            summed(&groups, c, reference.as_ref(), &options.bootstrap, within)
         };
         let metrics: Vec<MetricSummary> = columns.iter().enumerate().map(metric).collect();
         let named = |c: &&RunColumn, f: Figure| (c.name.clone(), f);
@@ -244,7 +244,8 @@ fn explained(groups: &Groups<'_>, column: &RunColumn) -> Option<f64> {
 fn summed(
     groups: &Groups<'_>,
     column: &RunColumn,
-    (reference, bootstrap): (Option<&Reference>, &Bootstrap),
+    reference: Option<&Reference>,
+    bootstrap: &Bootstrap,
     progress: &mut dyn FnMut(f64),
 ) -> MetricSummary {
     let count = groups.variants.len();

@@ -280,8 +280,8 @@ mod tests {
         };
         let mut stations: Vec<Alone> = (0..group).map(station).collect();
         let talks = [(schedule.begins, 15.0)];
-        let faults = (network, purpose::of_network(streams));
-        let mut faulty = Carrier::in_memory(faults, None, &talks);
+        let draws = purpose::of_network(streams);
+        let mut faulty = Carrier::in_memory(network, draws, None, &talks);
         drive(&mut faulty, &mut stations, begins, |station| station.ended.is_some());
         stations.into_iter().map(|station| station.ended.expect("all end")).collect()
     }

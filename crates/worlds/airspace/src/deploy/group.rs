@@ -66,7 +66,7 @@ fn network<'a>(
     state: &'a AirspaceState,
     talks: &'a [(u64, f64)],
 ) -> Carrier<'a, MemoryTransport> {
-    Carrier::in_memory((world.network.as_ref(), world.draws()), Some(state), talks)
+    Carrier::in_memory(world.network.as_ref(), world.draws(), Some(state), talks)
 }
 
 impl Apart for AirspaceState {

@@ -1,7 +1,7 @@
 use crate::flight::distance_m;
 use crate::{AirspaceRun, airspace_run};
 use sidestep_kernel::Simulation;
-use sidestep_kernel::view::{Inspection, Kind, MarkShape, Role, Value};
+use sidestep_kernel::view::{Inspection, Kind, MarkShape, Role, Value, Who};
 use sidestep_scenario::Source;
 
 fn run(airspace: &str, seed: u32, n: u32) -> AirspaceRun {
@@ -13,7 +13,7 @@ fn run(airspace: &str, seed: u32, n: u32) -> AirspaceRun {
 }
 
 fn told(run: &AirspaceRun, id: u32) -> Inspection {
-    run.inspect((Kind::Airplane, id, None)).expect("it is in the air")
+    run.inspect(Who::new(Kind::Airplane, id, None)).expect("it is in the air")
 }
 
 /// Returns the probabilities of the actions; none of an airplane that is alone.
@@ -84,14 +84,14 @@ fn who_is_kept_from_its_wish_is_told_because_of_whom() {
     let mut kept = 0;
     while !run.is_over() && run.cycle() < 80 {
         for id in 0..6 {
-            let Some(told) = run.inspect((Kind::Airplane, id, None)) else { continue };
+            let Some(told) = run.inspect(Who::new(Kind::Airplane, id, None)) else { continue };
             assert_eq!(told.marks_of(Role::Orbit).count(), 1, "its stored orbit is drawn");
             if told.value("Shield", "lets it fly") == Some(&"what it wants".into()) {
                 assert_eq!(told.value("Shield", "because of"), Some(&Value::None));
                 continue;
             }
             kept += 1;
-            let Some(Value::Who((Kind::Airplane, other, None))) =
+            let Some(Value::Who(Who { kind: Kind::Airplane, number: other, part: None })) =
                 told.value("Shield", "because of")
             else {
                 panic!("nobody is the reason: {told:?}")

@@ -116,7 +116,8 @@ pub(super) fn run<const D: usize>(
     sights: Vec<Sight<D>>,
 ) -> Vec<Option<Control<D>>> {
     let (places, begins) = (Places(talk.first_id, &sights), [talk.begins]);
-    let carrier = Carrier::in_memory((talk.network, draws(talk.streams)), Some(&places), &begins);
+    let draws = draws(talk.streams);
+    let carrier = Carrier::in_memory(talk.network, draws, Some(&places), &begins);
     let longest = talk.network.map_or(1, longest_ticks);
     let mut air = Air { talk, carrier, longest, busy_until: vec![0; agents.len()] };
     let mut tick = talk.begins.0;

@@ -6,7 +6,7 @@ use crate::rods::geometry::{Point, distance, in_dimensions, sub};
 use crate::rods::veto::Moved;
 use crate::view::who_of_obstacle;
 use sidestep_kernel::geometry::angle_rad;
-use sidestep_kernel::view::{Amount, Inspection, Kind, Role, Section, Table, Value};
+use sidestep_kernel::view::{Amount, Inspection, Kind, Role, Section, Table, Value, Who};
 use std::borrow::Cow;
 
 /// Connectors that are told, at most.
@@ -43,9 +43,9 @@ impl<const D: usize> Asked<'_, D> {
 
     fn said(&self, section: Section, moved: &Moved<D>) -> Section {
         let cut = moved.cut_short.map(|veto| {
-            let because = veto.obstacle.map_or(String::new(), |id| {
-                format!(", because of {}", sidestep_kernel::view::name_of(who_of_obstacle(id)))
-            });
+            let because = veto
+                .obstacle
+                .map_or(String::new(), |id| format!(", because of {}", who_of_obstacle(id)));
             format!("by connector {}: {}{because}", veto.by, veto.reason)
         });
         let touched = match moved.touched.is_empty() {
@@ -93,7 +93,12 @@ impl<const D: usize> Asked<'_, D> {
             let then = Value::meters(behind_m(&self.after, k));
             let (now, touches) =
                 (Value::meters(behind_m(&self.before, k)), self.after.robots[k].is_bumped);
-            table.row([(Kind::Robot, self.slot, Some(k as u32)).into(), now, then, touches.into()]);
+            table.row([
+                Who::new(Kind::Robot, self.slot, Some(k as u32)).into(),
+                now,
+                then,
+                touches.into(),
+            ]);
         }
         let latest_m = all.map(|k| behind_m(&self.before, k)).fold(0.0, f64::max);
         told.tell(

@@ -3,7 +3,7 @@ use crate::rods::geometry::norm;
 use crate::scenario::AnyCompiled;
 use sidestep_kernel::control::{Bounds, CellsMut, OrderBook, Orders, Team};
 use sidestep_kernel::ports::{MemoryRecorder, Recorder};
-use sidestep_kernel::view::{Kind, Value};
+use sidestep_kernel::view::{Kind, Value, Who};
 use sidestep_kernel::{Cycle, Simulation};
 use sidestep_scenario::Source;
 use std::collections::BTreeMap;
@@ -329,9 +329,9 @@ fn who_looks_at_a_connector_sees_the_order_that_is_ahead() {
     order(&mut run, "to_m", 0, &[-1.5, -0.4]);
     order(&mut run, "connector", 0, &[5.0]);
     let digest = run.digest();
-    let told = run.inspect((Kind::Connector, 0, Some(5))).expect("it is there");
+    let told = run.inspect(Who::new(Kind::Connector, 0, Some(5))).expect("it is there");
     assert_eq!(told.value("Wish", "what"), Some(&"go, as ordered".into()));
-    assert_eq!(told.value("Wish", "of"), Some(&Value::Who((Kind::Connector, 0, Some(5)))));
+    assert_eq!(told.value("Wish", "of"), Some(&Value::Who(Who::new(Kind::Connector, 0, Some(5)))));
     assert_eq!(told.value("Ladder", "rung"), Some(&"as wanted".into()));
     assert_eq!(run.digest(), digest);
 }

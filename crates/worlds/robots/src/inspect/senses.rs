@@ -8,7 +8,7 @@ use crate::view::{beyond_boundary_m, to_boundary_m};
 use crate::world::{MountedSensor, RobotModel, Role};
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::space::BoxWord;
-use sidestep_kernel::view::{self, Kind, MarkShape, Section, Table, Value};
+use sidestep_kernel::view::{self, Kind, MarkShape, Section, Table, Value, Who};
 
 /// One beam.
 struct Beam<'a, T> {
@@ -123,7 +123,7 @@ impl<T: BoxWord> Looking<'_, T> {
     fn hears(&mut self, scratch: &Scratch) {
         let mut table = Table::new(["sender", "word"]);
         for heard in &scratch.heard {
-            let sender = (Kind::Robot, heard.sender, None);
+            let sender = Who::new(Kind::Robot, heard.sender, None);
             table.row([sender.into(), format!("{:#018x}", heard.word).into()]);
         }
         if self.scene.world.radio.is_some() {

@@ -18,7 +18,7 @@ fn head_on() -> RobotsRun {
 }
 
 fn robot(id: u32) -> Who {
-    (Kind::Robot, id, None)
+    Who::new(Kind::Robot, id, None)
 }
 
 fn told(run: &RobotsRun, id: u32) -> Inspection {
@@ -61,7 +61,11 @@ fn a_robot_that_is_cut_is_told_by_whom_and_what_it_saw_and_claimed() {
 #[test]
 fn nobody_is_told_of_who_is_not_there() {
     let run = head_on();
-    for who in [(Kind::Robot, 2, None), (Kind::Person, 0, None), (Kind::Robot, 0, Some(0))] {
+    for who in [
+        Who::new(Kind::Robot, 2, None),
+        Who::new(Kind::Person, 0, None),
+        Who::new(Kind::Robot, 0, Some(0)),
+    ] {
         assert_eq!(run.inspect(who), None, "{who:?}");
     }
 }

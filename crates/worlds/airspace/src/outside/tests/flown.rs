@@ -7,7 +7,7 @@ use crate::outside::percept::MOST_NEIGHBORS;
 use crate::wish::Wish;
 use sidestep_kernel::control::{OrderBook, Orders};
 use sidestep_kernel::math::{cos, sin};
-use sidestep_kernel::view::Kind;
+use sidestep_kernel::view::{Kind, Who};
 use sidestep_kernel::{EntityId, Simulation};
 
 /// One airplane far from its way-point, without the shield.
@@ -212,10 +212,10 @@ fn what_cannot_be_obeyed_is_refused_and_nothing_of_it_noted() {
 fn who_asks_what_was_ordered_does_not_use_it_up() {
     let mut run = lone("");
     run.order(&Orders { order: Wish::TURN_RATE, agents: &[0], values: &[0.02] }).expect("right");
-    let told = run.inspect((Kind::Airplane, 0, None)).expect("it is in the air");
+    let told = run.inspect(Who::new(Kind::Airplane, 0, None)).expect("it is in the air");
     assert_eq!(told.value("Decides", "action"), Some(&"the turn that was ordered".into()));
     run.advance(1);
     assert!((heading_rad(&run, 0) - 0.1).abs() < 1e-12, "{}", heading_rad(&run, 0));
-    let told = run.inspect((Kind::Airplane, 0, None)).expect("it is in the air");
+    let told = run.inspect(Who::new(Kind::Airplane, 0, None)).expect("it is in the air");
     assert_eq!(told.value("Decides", "action"), Some(&"to the way-point".into()));
 }

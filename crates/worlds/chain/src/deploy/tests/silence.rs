@@ -31,7 +31,7 @@ fn led(network: &str, rod: &str) -> Box<dyn Simulation> {
 
 /// Kinds of events since the last look, with their connectors.
 fn told(run: &mut dyn Simulation) -> Vec<(Happening, Option<u32>)> {
-    run.frame(Look::first(0)).log.iter().map(|entry| (entry.kind, entry.who.2)).collect()
+    run.frame(Look::first(0)).log.iter().map(|entry| (entry.kind, entry.who.part)).collect()
 }
 
 #[test]
