@@ -36,8 +36,8 @@ impl RobotsWorld {
     }
 
     /// Returns a body's heading in words.
-    fn heading(facing: u8) -> &'static str {
-        HEADING_NAMES[usize::from(facing % 4)]
+    fn heading(heading: u8) -> &'static str {
+        HEADING_NAMES[usize::from(heading % 4)]
     }
 }
 
@@ -99,14 +99,13 @@ impl<'a, T: BoxWord> Looking<'a, T> {
     fn facing(&self) -> Value {
         let cell = self.scene.cell(self.slot);
         match &self.scene.type_of(cell).role {
-            Role::Door(_) => (if cell.facing.get() == 1 { "open" } else { "closed" }).into(),
-            _ => RobotsWorld::heading(cell.facing.get()).into(),
+            Role::Door(_) => (if cell.facing.get().is_open() { "open" } else { "closed" }).into(),
+            _ => RobotsWorld::heading(cell.facing.get().heading()).into(),
         }
     }
 
     fn last_contact(&self) -> Value {
-        let word = self.scene.cell(self.slot).contact.get();
-        let contact = super::perceive::contact_of_word(word);
+        let contact = self.scene.cell(self.slot).contact.get().get();
         let kinds = &self.scene.world.kinds;
         let words = |c: super::decide::Contact| {
             format!("{} at its {}", kinds[usize::from(c.kind)], c.side.name())

@@ -4,7 +4,7 @@ use super::effector::Side;
 use super::odometry::Claimed;
 use super::scene::{Scene, with_scene};
 use super::sensor::{NOTHING, Reading, SensorModel};
-use super::state::{BodyCell, RobotsState};
+use super::state::{BodyCell, LastContact, RobotsState};
 use super::world::{BodyType, MountedSensor, Role};
 use super::{Event, EventKind, RobotsWorld, Scratch};
 use sidestep_kernel::math::{cos, sin};
@@ -85,8 +85,8 @@ impl RobotsWorld {
     }
 
     /// Returns the direction in the world of a heading, which is along the axes of the map.
-    pub(super) fn heading_rad(&self, facing: u8) -> f64 {
-        self.map.plane.yaw_rad + f64::from(facing) * FRAC_PI_2
+    pub(super) fn heading_rad(&self, heading: u8) -> f64 {
+        self.map.plane.yaw_rad + f64::from(heading) * FRAC_PI_2
     }
 
     /// Returns the readings that some robots are about to perceive.
@@ -186,14 +186,14 @@ struct Eye<'a> {
 
 impl<'a> Eye<'a> {
     fn new(world: &'a RobotsWorld) -> Self {
-        let turn = |facing| Pose::heading([0.0; 3], world.heading_rad(facing)).turn;
+        let turn = |heading| Pose::heading([0.0; 3], world.heading_rad(heading)).turn;
         Self { world, plane: world.map.plane.turned(), turns: [0, 1, 2, 3].map(turn) }
     }
 
     fn body(&self, id: EntityId, cell: &BodyCell) -> Body {
         let (ty, box_m) = (self.world.type_of(id), self.world.map.box_size_m);
         let kind = ty.visible_kind();
-        let is_open = kind == Kind::Door && cell.facing.get() == 1;
+        let is_open = kind == Kind::Door && cell.facing.get().is_open();
         // Heights are made up, because the model is a plane.
         let (width, height) = ty.size;
         let side_m = f64::from(width.min(height)) * box_m;
@@ -204,17 +204,17 @@ impl<'a> Eye<'a> {
         };
         let size_m = [f64::from(width) * box_m, f64::from(height) * box_m, height_m];
         Body::new(kind, id, self.pose(ty, cell, 0.5 * height_m), Shape::Cuboid { size_m })
-            .when(cell.contact.get() != 0, Condition::Touching)
+            .when(cell.contact.get() != LastContact::NONE, Condition::Touching)
             .when(is_open, Condition::Open)
     }
 
     fn pose(&self, ty: &BodyType, cell: &BodyCell, z_m: f64) -> Pose {
         let [x_m, y_m] = self.middle_m(ty.size, self.world.map_position(cell.at()));
-        let facing = match ty.role {
+        let heading = match ty.role {
             Role::Door(_) => 0,
-            _ => cell.facing.get(),
+            _ => cell.facing.get().heading(),
         };
-        Pose { at_m: [x_m, y_m, z_m], turn: self.turns[usize::from(facing % 4)] }
+        Pose { at_m: [x_m, y_m, z_m], turn: self.turns[usize::from(heading % 4)] }
     }
 
     fn middle_m(&self, (width, height): (u32, u32), (col, row): (u32, u32)) -> [f64; 2] {
