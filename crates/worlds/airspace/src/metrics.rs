@@ -347,6 +347,7 @@ pub fn everybody_has_arrived(state: &AirspaceState) -> bool {
 #[cfg(test)]
 mod tests {
     use crate::airspace_run;
+    use crate::state::End;
     use sidestep_kernel::Simulation;
     use sidestep_scenario::Source;
 
@@ -363,7 +364,7 @@ mod tests {
         run.advance(30);
         let world = run.world();
         assert_eq!(world.alone_s[0], f64::INFINITY);
-        run.state().airplanes[0].arrived.set(20);
+        run.state().airplanes[0].set_end(End::Arrived(20));
         let first = super::airplane_metrics(world, run.state(), 0);
         assert_eq!((first.flown_s, first.delay_s(), first.delay_percent), (Some(20.0), None, None));
         let metrics = run.metrics();

@@ -7,6 +7,7 @@
 
 use crate::flight::{Point, Pose, distance_m};
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::column::Coded;
 use sidestep_kernel::math;
 
 /// Length in seconds below which an interval is no longer halved: undecided counts as too near.
@@ -36,6 +37,20 @@ impl Side {
             Self::Left => 1.0,
             Self::Right => -1.0,
         }
+    }
+}
+
+impl Coded for Side {
+    type Code = u8;
+
+    #[inline(always)]
+    fn code(self) -> u8 {
+        self as u8
+    }
+
+    #[inline(always)]
+    fn of_code(code: u8) -> Self {
+        Self::BOTH[usize::from(code & 1)]
     }
 }
 
