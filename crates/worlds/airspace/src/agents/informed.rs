@@ -165,7 +165,7 @@ impl Agent {
             for j in i + 1..all.len() {
                 // An exact player needs only the pairs that it is part of.
                 if !self.is_exact() || i == self.own.me || j == self.own.me {
-                    couple(&mut game, objective, (i, all[i]), (j, all[j]));
+                    couple(&mut game, objective, [i, j], [all[i], all[j]]);
                 }
             }
         }

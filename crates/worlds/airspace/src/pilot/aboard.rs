@@ -332,7 +332,7 @@ impl Pilot {
             Topic::Shield => {
                 let allowed = allowed(world, sight, considered);
                 let ways: Vec<_> = allowed.iter().map(|&k| considered.ways[k].clone()).collect();
-                let party = proposes(world, (sight, unheard), contacts, &ways, radio);
+                let party = proposes(world, sight, unheard, contacts, &ways, radio);
                 Stage::Shielding(Talk::new(frame, party), allowed)
             }
             Topic::Group => Stage::Grouping(Talk::new(frame, looks(world, sight, contacts, radio))),
@@ -341,7 +341,7 @@ impl Pilot {
                 Stage::Deciding(Talk::new(frame, party))
             }
             Topic::Decision => {
-                let party = optimizes(world, (sight, unheard), contacts, radio);
+                let party = optimizes(world, sight, unheard, contacts, radio);
                 Stage::Deciding(Talk::new(frame, party))
             }
         };

@@ -141,11 +141,12 @@ fn expected(sight: &Sight, contacts: &Contacts) -> Vec<bool> {
 /// Returns the party of the deployment to an optimization, beside those near who are not heard.
 pub(super) fn optimizes(
     world: &AirspaceWorld,
-    (sight, unheard): (&Sight, &[Sighted]),
+    sight: &Sight,
+    unheard: &[Sighted],
     contacts: &Contacts,
     radio: Radio,
 ) -> Box<Speaker> {
-    let own = own_ship(world, (sight, unheard), contacts);
+    let own = own_ship(world, sight, unheard, contacts);
     match (world.deployment, world.settings.estimator) {
         (Deployment::Pim | Deployment::HierarchicalPim, _) => {
             let is_hierarchy = world.deployment == Deployment::HierarchicalPim;
@@ -188,7 +189,8 @@ pub(super) fn tells(
 /// Returns the party to the shield's exchange of an airplane that may fly some ways.
 pub(super) fn proposes(
     world: &AirspaceWorld,
-    (sight, unheard): (&Sight, &[Sighted]),
+    sight: &Sight,
+    unheard: &[Sighted],
     contacts: &Contacts,
     ways: &[Way],
     radio: Radio,
