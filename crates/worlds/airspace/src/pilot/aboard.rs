@@ -305,10 +305,7 @@ impl Pilot {
     fn talk(&mut self, topic: Topic, tick: u64) {
         let Some(turn) = &mut self.turn else { return };
         let world = &*self.world;
-        let known: Arc<[EntityId]> = match topic {
-            Topic::Shield => turn.in_scene().into(),
-            Topic::Group | Topic::Decision => turn.members.clone(),
-        };
+        let known = turn.known_in(topic);
         let Turn { sight, schedule, members, unheard, considered, .. } = turn;
         let (begins, ends) = schedule.of(topic, tick);
         let id = match topic {
