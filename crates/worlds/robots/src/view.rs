@@ -14,6 +14,7 @@ use sidestep_kernel::view::{
     Who,
 };
 use sidestep_kernel::{Cycle, EntityId, Phases};
+use sidestep_map::Rect;
 use std::f64::consts::FRAC_PI_2;
 
 /// Length of a cycle in seconds for pictures; the model itself has no time but cycles.
@@ -81,7 +82,7 @@ impl RobotsWorld {
 
     /// Returns the middle in the world of a body whose lower-left box is `at`.
     pub(super) fn middle_m(&self, id: EntityId, at: (u32, u32)) -> [f64; 2] {
-        Eye::new(self).middle_m(self.type_of(id).size, at)
+        Eye::new(self).middle_m(self.type_of(id).boxes(at))
     }
 
     /// Returns the direction in the world of a heading, which is along the axes of the map.
@@ -122,7 +123,7 @@ impl RobotsWorld {
         let scan = |(sensor, true_m): (&MountedSensor, Vec<f64>)| {
             let (own, others) = readings.split_at(sensor.model.bearings_deg.len());
             readings = others;
-            scan(&sensor.model, (own, &true_m), self.side_m(id), id, pose)
+            scan(&sensor.model, own, &true_m, self.side_m(id), id, pose)
         };
         model.body.sensors.iter().zip(truths).map(scan).collect()
     }
@@ -209,7 +210,7 @@ impl<'a> Eye<'a> {
     }
 
     fn pose(&self, ty: &BodyType, cell: &BodyCell, z_m: f64) -> Pose {
-        let [x_m, y_m] = self.middle_m(ty.size, self.world.map_position(cell.at()));
+        let [x_m, y_m] = self.middle_m(ty.boxes(self.world.map_position(cell.at())));
         let heading = match ty.role {
             Role::Door(_) => 0,
             _ => cell.facing.get().heading(),
@@ -217,7 +218,7 @@ impl<'a> Eye<'a> {
         Pose { at_m: [x_m, y_m, z_m], turn: self.turns[usize::from(heading % 4)] }
     }
 
-    fn middle_m(&self, (width, height): (u32, u32), (col, row): (u32, u32)) -> [f64; 2] {
+    fn middle_m(&self, Rect { col, row, width, height }: Rect) -> [f64; 2] {
         let box_m = self.world.map.box_size_m;
         let middle = |at: u32, size: u32| (f64::from(at) + 0.5 * f64::from(size)) * box_m;
         self.plane.place([middle(col, width), middle(row, height)])
@@ -242,7 +243,8 @@ fn side_in_words(side: Side) -> String {
 /// middle of its robot.
 fn scan(
     sensor: &SensorModel,
-    (readings, true_m): (&[Reading], &[f64]),
+    readings: &[Reading],
+    true_m: &[f64],
     side_m: f64,
     robot: EntityId,
     pose: Pose,

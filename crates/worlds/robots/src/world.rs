@@ -13,7 +13,7 @@ use sidestep_kernel::distr::{Chance, RowError};
 use sidestep_kernel::space::Position;
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{EntityId, Seed};
-use sidestep_map::GridMap;
+use sidestep_map::{GridMap, Rect};
 use std::sync::Arc;
 
 /// Boxes of a beam that are read together, even past a wall.
@@ -166,6 +166,11 @@ pub struct BodyType {
 }
 
 impl BodyType {
+    /// Returns the boxes that such a body covers when its lower-left one is `at`.
+    pub(super) fn boxes(&self, at: (u32, u32)) -> Rect {
+        Rect { col: at.0, row: at.1, width: self.size.0, height: self.size.1 }
+    }
+
     /// Returns the index in `actions` of an action at a heading.
     #[inline]
     pub fn action_index(&self, heading: u8, action: u8) -> u16 {
