@@ -8,8 +8,8 @@ use crate::agents::exchange::{self, Agreed};
 use crate::agents::grouping::{self, Found, Sighted};
 use crate::agents::intent::{self, Intent};
 use crate::agents::{
-    Agent, Concludes, Conclusion, Ended, Endpoint, Outgoing, Party, Progress, Radio, Unsound,
-    informed, sampling,
+    Agent, Concludes, Conclusion, Ended, Endpoint, Optimizing, Outgoing, Party, Progress, Radio,
+    Unsound, informed, sampling,
 };
 use crate::baseline::mvp::Resolving;
 use crate::deploy::Deployment;
@@ -153,11 +153,11 @@ pub(super) fn optimizes(
             Box::new(Any(Host::new(own, is_hierarchy, radio)))
         }
         (Deployment::Team, Estimator::Sampled { block, ageing }) => {
-            endpoint(sampling::Agent::new(own, block, ageing), radio)
+            endpoint(Optimizing::new(sampling::Agent::new(own, block, ageing)), radio)
         }
         (deployment, _) => {
             let by_model = deployment == Deployment::CompactTeam;
-            endpoint(informed::Agent::new(own, by_model), radio)
+            endpoint(Optimizing::new(informed::Agent::new(own, by_model)), radio)
         }
     }
 }
