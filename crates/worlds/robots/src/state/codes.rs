@@ -49,20 +49,6 @@ impl Intent {
     }
 }
 
-impl Coded for Intent {
-    type Code = u8;
-
-    #[inline(always)]
-    fn code(self) -> u8 {
-        self.0
-    }
-
-    #[inline(always)]
-    fn of_code(code: u8) -> Self {
-        Self(code)
-    }
-}
-
 /// The heading of a body, or of a door, which has none, whether it is open; in one byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
@@ -99,20 +85,6 @@ impl Facing {
     }
 }
 
-impl Coded for Facing {
-    type Code = u8;
-
-    #[inline(always)]
-    fn code(self) -> u8 {
-        self.0
-    }
-
-    #[inline(always)]
-    fn of_code(code: u8) -> Self {
-        Self(code)
-    }
-}
-
 /// The obstacle that stopped the last action, or none, in one word: bit 15 is set where there was one, the
 /// side is in bits 8 to 14, the kind below.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -133,20 +105,6 @@ impl LastContact {
     pub fn get(self) -> Option<Contact> {
         let side = Side::ALL[usize::from(self.0 >> 8 & 3)];
         (self != Self::NONE).then_some(Contact { kind: (self.0 & 0x7f) as u8, side })
-    }
-}
-
-impl Coded for LastContact {
-    type Code = u16;
-
-    #[inline(always)]
-    fn code(self) -> u16 {
-        self.0
-    }
-
-    #[inline(always)]
-    fn of_code(code: u16) -> Self {
-        Self(code)
     }
 }
 
@@ -178,16 +136,16 @@ impl KeptPose {
     }
 }
 
-impl Coded for KeptPose {
-    type Code = u32;
-
-    #[inline(always)]
-    fn code(self) -> u32 {
-        self.0
-    }
-
-    #[inline(always)]
-    fn of_code(code: u32) -> Self {
-        Self(code)
-    }
+/// Keeps each of some types as the number that it holds.
+macro_rules! coded {
+    ($($name:ty: $code:ty;)*) => {$(
+        impl Coded for $name {
+            type Code = $code;
+            #[inline(always)]
+            fn code(self) -> $code { self.0 }
+            #[inline(always)]
+            fn of_code(code: $code) -> Self { Self(code) }
+        }
+    )*};
 }
+coded! { Intent: u8; Facing: u8; LastContact: u16; KeptPose: u32; }
