@@ -26,7 +26,7 @@ const MAX_POSES: usize = 1 << 24;
 const TRANSPOSED: usize = 16;
 
 /// Names of the headings by number.
-pub const HEADING_NAMES: [&str; 4] = ["east", "north", "west", "south"];
+pub(crate) const HEADING_NAMES: [&str; 4] = ["east", "north", "west", "south"];
 
 const CYCLE: &str = "cycle, counted from 0";
 const HEADING: &str =
@@ -173,7 +173,7 @@ pub struct Books {
 
 impl Books {
     /// Returns the empty books of a run that records what `record` says once recording starts.
-    pub fn new(record: RecordSection) -> Self {
+    pub(crate) fn new(record: RecordSection) -> Self {
         Self { record, ..Self::default() }
     }
 

@@ -49,7 +49,7 @@ impl Compiled {
     }
 
     /// Returns the state at the start, by entity id.
-    pub fn start_snapshot(&self) -> Snapshot {
+    pub(crate) fn start_snapshot(&self) -> Snapshot {
         let kinds = self.world.kinds.len();
         let record = |&(at, heading): &((u32, u32), u8)| BodyRecord {
             at,

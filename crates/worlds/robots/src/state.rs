@@ -23,19 +23,19 @@ pub const WALL: u8 = 1;
 #[derive(Debug)]
 pub struct RobotsState {
     /// The body that stands in, or claims, each box of the padded grid.
-    pub floor: Floor,
+    pub(crate) floor: Floor,
     /// Boxes that a robot has ever covered.
-    pub visited: Marks,
+    pub(crate) visited: Marks,
     /// The changing part of each body, by slot.
     pub bodies: Box<[BodyCell]>,
     /// Kind of each body, by slot.
-    pub kinds: Box<[u8]>,
+    pub(crate) kinds: Box<[u8]>,
     /// Slot of each entity, by id.
     pub(crate) slot_of_id: Box<[Slot]>,
     /// Number of contacts of each body by kind touched, at `id * kinds + kind`.
-    pub contacts: Column<u32>,
+    pub(crate) contacts: Column<u32>,
     /// Highest bid per box in the present round; empty unless the policy is `rounds`.
-    pub bids: Box<[AtomicU64]>,
+    pub(crate) bids: Box<[AtomicU64]>,
     /// Last broadcast of each robot.
     pub(crate) voices: Voices,
     /// Poses at the start of each cycle, while a run is recorded.
@@ -47,7 +47,7 @@ pub struct RobotsState {
 #[repr(align(64))]
 pub struct BodyCell {
     /// Lower-left box, as a [`Position`] word.
-    pub anchor: Shared<u32>,
+    pub(crate) anchor: Shared<u32>,
     /// Heading; of a door, whether it is open.
     pub facing: Shared<Facing>,
     /// The action that the body is about to do in this cycle.
@@ -73,7 +73,7 @@ pub struct BodyCell {
     /// Index of its type; constant.
     pub ty: u16,
     /// Index of the action that it is about to do, see `BodyType::actions`.
-    pub action: Shared<u16>,
+    pub(crate) action: Shared<u16>,
 }
 
 impl BodyCell {
@@ -182,7 +182,7 @@ impl RobotsState {
 
     /// Returns the kind of the occupant that a word of the floor stands for.
     #[inline(always)]
-    pub fn kind_of<T: BoxWord>(&self, word: T) -> u8 {
+    pub(crate) fn kind_of<T: BoxWord>(&self, word: T) -> u8 {
         match word {
             _ if word.is_free() => FREE,
             _ if word == T::WALL => WALL,
@@ -203,7 +203,7 @@ impl RobotsState {
 
     /// Returns the type of the body in a slot.
     #[inline]
-    pub fn type_in<'a>(&self, world: &'a RobotsWorld, slot: Slot) -> &'a BodyType {
+    pub(crate) fn type_in<'a>(&self, world: &'a RobotsWorld, slot: Slot) -> &'a BodyType {
         &world.types[usize::from(self.bodies[slot as usize].ty)]
     }
 
@@ -310,7 +310,7 @@ impl RobotsState {
     }
 
     /// Returns the bytes on the heap that grow with the number of boxes, and with that of bodies.
-    pub fn heap_bytes(&self) -> (usize, usize) {
+    pub(crate) fn heap_bytes(&self) -> (usize, usize) {
         let bodies = std::mem::size_of_val(&*self.bodies)
             + std::mem::size_of_val(&*self.kinds)
             + std::mem::size_of_val(&*self.slot_of_id)
