@@ -50,6 +50,32 @@ impl Word for f64 {
     }
 }
 
+/// A value that is kept as a number which stands for it.
+pub trait Coded: Copy + Default + Send + Sync + 'static {
+    /// The number.
+    type Code: Word;
+    /// Returns the number that stands for this value.
+    fn code(self) -> Self::Code;
+    /// Returns the value that a number stands for.
+    fn of_code(code: Self::Code) -> Self;
+}
+
+impl<T: Coded> Word for T {
+    type Cell = <T::Code as Word>::Cell;
+    #[inline(always)]
+    fn cell(self) -> Self::Cell {
+        self.code().cell()
+    }
+    #[inline(always)]
+    fn load(cell: &Self::Cell) -> Self {
+        Self::of_code(T::Code::load(cell))
+    }
+    #[inline(always)]
+    fn store(cell: &Self::Cell, value: Self) {
+        T::Code::store(cell, value.code());
+    }
+}
+
 /// One value that workers share; see the module.
 pub struct Shared<T: Word>(T::Cell);
 

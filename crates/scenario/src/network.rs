@@ -13,6 +13,7 @@ use serde_json::{Value, json};
 use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{Bursts, Network, OneWay, Partition, Silence, While};
 use std::fmt::Debug;
+use std::marker::PhantomData;
 use std::ops::Range;
 
 /// The names of a world's agents in its network's section, and the defaults there.
@@ -23,11 +24,11 @@ pub trait Names {
     type Partition: DeserializeOwned + JsonSchema + Debug;
     /// A link that works one way, as written.
     type OneWay: DeserializeOwned + JsonSchema + Debug;
-    /// Limits of a latency.
-    type Latency: Rule + Copy;
 
     /// Latency unless it is given, seconds.
     const LATENCY_S: f64;
+    /// The shortest latency that a clock can resolve, seconds.
+    const SHORTEST_LATENCY_S: f64;
     /// Number of talks in a cycle, one after the other.
     const TALKS: u32;
     /// Words for the longest deadline.
@@ -77,7 +78,7 @@ impl Wrong {
 pub struct NetworkSection<N: Names> {
     loss: Option<Chance>,
     duplication: Option<Chance>,
-    latency_s: Option<Number<N::Latency>>,
+    latency_s: Option<Number<Latency<N>>>,
     max_delay_s: Option<NonNegative>,
     patience_s: Option<Positive>,
     deadline_s: Option<Positive>,
@@ -128,6 +129,32 @@ impl BurstsSection {
 
 /// A probability below 1, because some messages must get through in the end.
 type Chance = Number<FromBelow<0, 1>>;
+
+/// A time that the clock of a world can resolve.
+#[derive(Debug)]
+struct Latency<N>(PhantomData<N>);
+
+impl<N> Clone for Latency<N> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<N> Copy for Latency<N> {}
+
+impl<N: Names> Rule for Latency<N> {
+    fn allows(number: f64) -> bool {
+        number >= N::SHORTEST_LATENCY_S && number.is_finite()
+    }
+
+    fn words() -> String {
+        format!("at least {:e} s", N::SHORTEST_LATENCY_S)
+    }
+
+    fn limits() -> Value {
+        json!({ "minimum": N::SHORTEST_LATENCY_S })
+    }
+}
 
 /// A bandwidth that carries a message in the time of a run.
 #[derive(Debug, Clone, Copy)]

@@ -3,7 +3,7 @@
 use sidestep::kernel::Simulation;
 use sidestep::scenario::Source;
 use sidestep::statistics::chi_square_p;
-use sidestep::worlds::robots::effector::{ObstacleRule, Side};
+use sidestep::worlds::robots::effector::ObstacleRule;
 use sidestep::worlds::robots::exact::{Outcome, Pose};
 use sidestep::worlds::robots::{RobotsRun, robots_run};
 use std::collections::BTreeMap;
@@ -161,9 +161,8 @@ impl Tiles {
         let mut counts = BTreeMap::new();
         for body in &simulation.saved().bodies[..robots] {
             let at = ((body.at.0 % width) as i32, (body.at.1 % height) as i32);
-            let pose = Pose { col: at.0, row: at.1, heading: body.facing };
-            let side = Side::ALL[usize::from(body.contact >> 8 & 3)];
-            let contact = (body.contact != 0).then_some(((body.contact & 0x7f) as u8, side));
+            let pose = Pose { col: at.0, row: at.1, heading: body.facing.heading() };
+            let contact = body.contact.get().map(|contact| (contact.kind, contact.side));
             *counts.entry(Outcome { pose, contact }).or_insert(0) += 1;
         }
         counts

@@ -101,7 +101,7 @@ fn ways(turn: &mut Turn<'_>, flown: &Flown, intruders: &[Intruder]) -> Vec<Way> 
     };
     if let Some(notes) = &mut turn.scratch.notes {
         notes.contacts = contacts.unwrap_or_default();
-        notes.decided(world, &own, intruders, (&controls, &considered));
+        notes.decided(world, &own, intruders, &controls, &considered);
     }
     let ways = obey(turn, &own, intruders, controls);
     if let Some(notes) = &mut turn.scratch.notes {

@@ -9,6 +9,6 @@ use sidestep_scenario::{Bundle, Resolved, Source};
 ///
 /// # Errors
 /// When the text is no longer a valid scenario.
-pub fn resolve(source: &Source, compiled: &Compiled) -> Result<Resolved, InputError> {
+pub(crate) fn resolve(source: &Source, compiled: &Compiled) -> Result<Resolved, InputError> {
     Bundle::new(source, compiled.seed, compiled.cycles).finish()
 }

@@ -18,7 +18,7 @@ mod act;
 pub mod agents;
 mod avoid;
 pub mod baseline;
-pub mod bundle;
+mod bundle;
 mod decide;
 pub mod deploy;
 pub mod events;

@@ -271,27 +271,21 @@ fn not_appeared(world: &AirspaceWorld, now: Cycle) -> u64 {
 }
 
 /// Returns the metrics of a run until a cycle; `decide_s` is the time spent deciding, in seconds.
-pub fn metrics(
+pub(crate) fn metrics(
     world: &AirspaceWorld,
-    (state, now): (&AirspaceState, Cycle),
+    state: &AirspaceState,
+    now: Cycle,
     ledger: &Ledger,
     decide_s: f64,
 ) -> Metrics {
     let all = (0..world.airplanes.len() as EntityId).map(|id| airplane_metrics(world, state, id));
     let all: Vec<AirplaneMetrics> = all.collect();
     let delays: Vec<f64> = all.iter().filter_map(|a| a.delay_percent).collect();
-    let nearest = ledger.pairs.values().map(|r| r.nearest_m).min_by(f64::total_cmp);
-    let lost_ns: u64 = ledger.pairs.values().map(|r| r.lost_ns).sum();
-    let beyond_bound = |(&airplane, &cycle): (&EntityId, &Cycle)| BeyondBound {
-        at_s: world.starts_s(cycle),
-        airplane,
-        callsign: world.callsign(airplane),
-    };
     let Effort { optimizations, rounds, unconverged, traffic, beacons } = ledger.effort;
     Metrics {
-        min_separation_m: nearest,
+        min_separation_m: ledger.pairs.values().map(|r| r.nearest_m).min_by(f64::total_cmp),
         losses_of_separation: ledger.pairs.values().map(|r| u64::from(r.losses)).sum(),
-        lost_s: lost_ns as f64 / 1e9,
+        lost_s: ledger.pairs.values().map(|r| r.lost_ns).sum::<u64>() as f64 / 1e9,
         arrived: count(state, |cell| cell.arrived_step().is_some()),
         airplanes: all.len() as u64,
         mean_delay_percent: mean(delays.iter().sum(), delays.len()),
@@ -303,10 +297,7 @@ pub fn metrics(
         beacon_bytes: beacons.bytes,
         beacon_multicasts: beacons.multicasts,
         beacon_multicast_bytes: beacons.multicast_bytes,
-        network_s: world
-            .network
-            .as_ref()
-            .map(|network| network.seconds(traffic.ticks + beacons.ticks)),
+        network_s: network_s(world, traffic.ticks + beacons.ticks),
         optimizations,
         rounds_mean: mean(rounds as f64, optimizations as usize),
         unconverged,
@@ -323,8 +314,23 @@ pub fn metrics(
         orders: all.iter().map(|a| u64::from(a.orders)).sum(),
         orders_delayed: all.iter().map(|a| u64::from(a.orders_delayed)).sum(),
         too_close: too_close(world, ledger),
-        beyond_bound: ledger.beyond_bound.iter().map(beyond_bound).collect(),
+        beyond_bound: beyond_bound(world, ledger),
     }
+}
+
+/// Returns the time that talks took on the network, in seconds; none where that is reliable.
+fn network_s(world: &AirspaceWorld, ticks: u64) -> Option<f64> {
+    world.network.as_ref().map(|network| network.seconds(ticks))
+}
+
+/// Returns the airplanes whose errors exceeded the shield's bounds, by ids.
+fn beyond_bound(world: &AirspaceWorld, ledger: &Ledger) -> Vec<BeyondBound> {
+    let one = |(&airplane, &cycle): (&EntityId, &Cycle)| BeyondBound {
+        at_s: world.starts_s(cycle),
+        airplane,
+        callsign: world.callsign(airplane),
+    };
+    ledger.beyond_bound.iter().map(one).collect()
 }
 
 /// Returns the pairs for which the shield promises nothing, by the time when that began.
@@ -347,6 +353,7 @@ pub fn everybody_has_arrived(state: &AirspaceState) -> bool {
 #[cfg(test)]
 mod tests {
     use crate::airspace_run;
+    use crate::state::End;
     use sidestep_kernel::Simulation;
     use sidestep_scenario::Source;
 
@@ -363,7 +370,7 @@ mod tests {
         run.advance(30);
         let world = run.world();
         assert_eq!(world.alone_s[0], f64::INFINITY);
-        run.state().airplanes[0].arrived.set(20);
+        run.state().airplanes[0].set_end(End::Arrived(20));
         let first = super::airplane_metrics(world, run.state(), 0);
         assert_eq!((first.flown_s, first.delay_s(), first.delay_percent), (Some(20.0), None, None));
         let metrics = run.metrics();

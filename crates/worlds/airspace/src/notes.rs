@@ -54,7 +54,8 @@ impl Notes {
         world: &AirspaceWorld,
         own: &[Own],
         intruders: &[Intruder],
-        (controls, considered): (&[Option<Control>], &[Considered]),
+        controls: &[Option<Control>],
+        considered: &[Considered],
     ) {
         let Some(me) = self.place(own.iter().map(|own| own.id)) else { return };
         self.group = own.iter().map(Own::known).collect();
@@ -74,7 +75,7 @@ impl Notes {
                 course.decision(flyer.fallback)
             };
             let decisions: Vec<Decision> = flyers.iter().zip(controls).map(decision).collect();
-            self.shielded((me, &flyers), &wishes, &decisions, world.timing.dtau_s);
+            self.shielded(me, &flyers, &wishes, &decisions, world.timing.dtau_s);
         }
     }
 
@@ -91,7 +92,8 @@ impl Notes {
     /// Notes the shield's decision, and the others because of which it refused the first wish.
     fn shielded(
         &mut self,
-        (me, flyers): (usize, &[Flyer]),
+        me: usize,
+        flyers: &[Flyer],
         wishes: &[&[Way]],
         decisions: &[Decision],
         dtau_s: f64,

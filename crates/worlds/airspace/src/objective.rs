@@ -218,7 +218,7 @@ pub fn game(objective: &Objective, group: &[Options]) -> PairwiseGame {
     let mut game = PairwiseGame::new(own);
     for (i, a) in group.iter().enumerate() {
         for (j, b) in group.iter().enumerate().skip(i + 1) {
-            couple(&mut game, objective, (i, a), (j, b));
+            couple(&mut game, objective, [i, j], [a, b]);
         }
     }
     game
@@ -233,12 +233,12 @@ pub(super) fn own_costs(objective: &Objective, options: &Options) -> Vec<f64> {
     costs
 }
 
-/// Adds the costs of two airplanes to each other to a game, if there are any.
+/// Adds the costs of two players' airplanes to each other to a game, if there are any.
 pub(super) fn couple(
     game: &mut PairwiseGame,
     objective: &Objective,
-    (i, a): (usize, &Options),
-    (j, b): (usize, &Options),
+    [i, j]: [usize; 2],
+    [a, b]: [&Options; 2],
 ) {
     interrupt::look();
     if a.levels.meets(&b.levels, objective.vertical_m)
@@ -268,7 +268,7 @@ fn pair_costs(objective: &Objective, a: &Options, b: &Options) -> Option<Vec<[f6
                 if parts != [0.0; 2] {
                     let costs =
                         costs.get_or_insert_with(|| vec![[0.0; 2]; a.predictions.len() * columns]);
-                    add_to_all(costs, columns, (&p.actions, &q.actions), parts);
+                    add_to_all(costs, columns, &p.actions, &q.actions, parts);
                 }
             }
         }
@@ -281,7 +281,8 @@ fn pair_costs(objective: &Objective, a: &Options, b: &Options) -> Option<Vec<[f6
 fn add_to_all(
     costs: &mut [[f64; 2]],
     columns: usize,
-    (rows, others): (&[usize], &[usize]),
+    rows: &[usize],
+    others: &[usize],
     parts: [f64; 2],
 ) {
     for row in rows {

@@ -164,9 +164,10 @@ impl World for AirspaceWorld {
 
     fn restore(
         &self,
-        (snapshot, ledger): (Snapshot, Ledger),
+        saved: Self::Saved,
         books: &mut Books,
     ) -> Result<AirspaceState, CheckpointError> {
+        let (snapshot, ledger) = saved;
         if snapshot.airplanes.len() != self.airplanes.len() {
             return Err(CheckpointError::Damaged);
         }
@@ -235,7 +236,7 @@ impl World for AirspaceWorld {
     }
 
     fn metrics(&self, state: &AirspaceState, books: &Books, now: Cycle, _: &Effort) -> Metrics {
-        metrics::metrics(self, (state, now), &books.ledger, books.decide_ns as f64 / 1e9)
+        metrics::metrics(self, state, now, &books.ledger, books.decide_ns as f64 / 1e9)
     }
 
     fn agent_metrics(&self, state: &AirspaceState, _: &Books, _: Cycle) -> Value {

@@ -10,7 +10,7 @@ use super::deploy::Deployment;
 use super::flight::Airplane;
 use super::flight_plan::AirplaneSection;
 use super::shield::Side;
-use super::state::{AirplaneRecord, FLYING, Snapshot};
+use super::state::{AirplaneRecord, Ended, Snapshot};
 use super::world::{AirspaceWorld, Grouping, Method};
 use airplanes::{GeneratorSection, ModelSection};
 use compile::Compiler;
@@ -217,7 +217,7 @@ impl Compiled {
     pub fn start_snapshot(&self) -> Snapshot {
         let record = |(airplane, &fallback): (&Airplane, &Side)| AirplaneRecord {
             pose: airplane.start,
-            arrived: FLYING,
+            ended: Ended::NOT_YET,
             counts: [0; 4],
             fallback,
             altitude_m: match &airplane.track {

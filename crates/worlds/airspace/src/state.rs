@@ -1,5 +1,6 @@
 //! The state of a run, and its snapshot.
 
+mod end;
 mod neighborhood;
 mod snapshot;
 
@@ -10,26 +11,13 @@ use super::pilot::{Control, Memory};
 use super::shield::{Named, Side};
 use super::wish::Wish;
 use super::world::{AirspaceWorld, Method};
+pub use end::{End, Ended};
 use neighborhood::Neighborhood;
 use sidestep_kernel::column::Shared;
 use sidestep_kernel::{Cycle, EntityId, Slot, math};
 pub use snapshot::{AirplaneRecord, PairRecord, Snapshot};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
-
-/// Marks an airplane that has not arrived yet.
-pub const FLYING: u64 = u64::MAX;
-/// Flag set beside the time at which an airplane was removed, rather than arrived.
-const LEFT: u64 = 1 << 63;
-
-/// The end of a flight, with its step of `dtau` since the run's start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum End {
-    /// The airplane is at its last way-point, or at the end of its recorded way.
-    Arrived(u64),
-    /// Removed before it arrived.
-    Left(u64),
-}
 
 /// The state of an airspace; slots are ids.
 #[derive(Debug)]
@@ -70,9 +58,8 @@ pub struct Cell {
     pub heading_rad: Shared<f64>,
     /// Altitude in meters.
     pub altitude_m: Shared<f64>,
-    /// Steps of `dtau` since the run's start when it arrived, or [`FLYING`]; with the highest bit
-    /// set, the step in which it was removed.
-    pub arrived: Shared<u64>,
+    /// The end of its flight, if it has ended.
+    pub ended: Shared<Ended>,
     /// Number of way-points done with.
     pub next: Shared<u32>,
     /// Number of times that the shield changed its wish.
@@ -85,8 +72,8 @@ pub struct Cell {
     pub orders: Shared<u16>,
     /// Number of times that an order had to wait for the next `dt`.
     pub waits: Shared<u16>,
-    /// Side of the stored fallback: 0 left, 1 right.
-    pub fallback: Shared<u8>,
+    /// Side of the stored fallback.
+    pub fallback: Shared<Side>,
 }
 
 /// A pose on an orbit.
@@ -112,13 +99,13 @@ impl Cell {
 
     fn restore(&self, record: &AirplaneRecord) {
         self.set_pose(record.pose);
-        self.arrived.set(record.arrived);
+        self.ended.set(record.ended);
         let [next, overrides, orbits, orbiting] = record.counts;
         self.next.set(next);
         self.overrides.set(overrides);
         self.orbits.set(orbits);
         self.orbiting.set(orbiting);
-        self.set_side(record.fallback);
+        self.fallback.set(record.fallback);
         self.altitude_m.set(record.altitude_m);
         let [orders, waits] = record.orders;
         self.orders.set(orders);
@@ -127,24 +114,17 @@ impl Cell {
 
     /// Returns whether it has not arrived yet.
     pub fn is_flying(&self) -> bool {
-        self.arrived.get() == FLYING
+        self.ended.get() == Ended::NOT_YET
     }
 
     /// Returns the end of its flight, if it has ended.
     pub fn end(&self) -> Option<End> {
-        match self.arrived.get() {
-            FLYING => None,
-            step if step & LEFT != 0 => Some(End::Left(step & !LEFT)),
-            step => Some(End::Arrived(step)),
-        }
+        self.ended.get().get()
     }
 
     /// Stores the end of its flight.
     pub(super) fn set_end(&self, end: End) {
-        self.arrived.set(match end {
-            End::Arrived(step) => step,
-            End::Left(step) => step | LEFT,
-        });
+        self.ended.set(end.into());
     }
 
     /// Returns the steps of `dtau` since the run's start when it arrived, if it has.
@@ -158,16 +138,6 @@ impl Cell {
     /// Returns whether it was removed before it arrived.
     pub fn has_left(&self) -> bool {
         matches!(self.end(), Some(End::Left(_)))
-    }
-
-    /// Returns the side of the stored fallback.
-    pub fn side(&self) -> Side {
-        Side::BOTH[usize::from(self.fallback.get() & 1)]
-    }
-
-    /// Stores the side of a fallback.
-    pub fn set_side(&self, side: Side) {
-        self.fallback.set(side as u8);
     }
 }
 
@@ -353,9 +323,9 @@ impl AirspaceState {
     pub fn snapshot(&self, cycle: Cycle) -> Snapshot {
         let record = |(cell, turn_rate): (&Cell, &Shared<f64>)| AirplaneRecord {
             pose: cell.pose(),
-            arrived: cell.arrived.get(),
+            ended: cell.ended.get(),
             counts: [cell.next.get(), cell.overrides.get(), cell.orbits.get(), cell.orbiting.get()],
-            fallback: cell.side(),
+            fallback: cell.fallback.get(),
             altitude_m: cell.altitude_m.get(),
             orders: [cell.orders.get(), cell.waits.get()],
             turn_rate_rad_s: turn_rate.get(),

@@ -15,7 +15,7 @@
 
 mod rules;
 
-use super::flight::Point;
+use super::flight::{Point, Zone};
 use super::flight_plan::CLIMB_M_S;
 use rules::{Rules, rules};
 use sidestep_import::bluesky::{Change, ScnAircraft, ScnFile, Speed};
@@ -35,7 +35,7 @@ const AHEAD_S: f64 = 1800.0;
 /// Seconds between two decisions: a route that is given no later than this counts as known at once.
 const DT_S: f64 = 10.0;
 /// Separation of recorded traffic in meters: five nautical miles and a thousand feet.
-const ZONE: (f64, f64) = (5.0 * NAUTICAL_MILE_M, 1000.0 * FOOT_M);
+const ZONE: Zone = Zone { gap_m: 5.0 * NAUTICAL_MILE_M, vertical_m: 1000.0 * FOOT_M };
 
 /// Slowest speed in meters per second at which an aircraft is in the air.
 const SLOWEST_M_S: f64 = 1.0;
@@ -45,7 +45,10 @@ pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
     let (traffic, rules) = (&file.traffic, &bluesky_rules(name, file));
     let aircraft: Vec<UnderWay> = traffic.aircraft.iter().filter_map(under_way).collect();
     let plane = LocalPlane::about_all(aircraft.iter().map(|one| one.0.position()))?;
-    let zone = (traffic.zone_radius_nm * NAUTICAL_MILE_M, traffic.zone_half_height_ft * FOOT_M);
+    let zone = Zone {
+        gap_m: traffic.zone_radius_nm * NAUTICAL_MILE_M,
+        vertical_m: traffic.zone_half_height_ft * FOOT_M,
+    };
     let more = settings(rules) + &origin(&plane);
     let mut text = heading(name, zone, rules.look_ahead_s, &more);
     for one in &aircraft {
@@ -342,19 +345,15 @@ fn banked_deg_s(v_m_s: f64) -> f64 {
     (BANKED_M_S2 / v_m_s).to_degrees()
 }
 
-fn heading(
-    name: &str,
-    (separation_m, vertical_m): (f64, f64),
-    horizon_s: Option<f64>,
-    more: &str,
-) -> String {
+fn heading(name: &str, zone: Zone, horizon_s: Option<f64>, more: &str) -> String {
+    let Zone { gap_m, vertical_m } = zone;
     let horizon_s = horizon_s.unwrap_or(300.0);
     // Rust's own escapes are not those of TOML: an accent of its own would be `\u{301}`.
     let name = toml::Value::from(name);
     format!(
         "format = 1\nworld = \"airspace\"\nname = {name}\n\n\
          [airspace]\nvertical_m = {vertical_m:?}\nhorizon_s = {horizon_s:?}\ndt_s = {DT_S:?}\ndtau_s = 5.0\n\
-         legs = {{ turns_s = [20.0, 40.0, 60.0], until_s = [240.0] }}\n{more}\n[airplane]\nseparation_m = {separation_m:?}\n"
+         legs = {{ turns_s = [20.0, 40.0, 60.0], until_s = [240.0] }}\n{more}\n[airplane]\nseparation_m = {gap_m:?}\n"
     )
 }
 

@@ -351,7 +351,7 @@ impl AirspaceWorld {
     pub(crate) fn options(&self, known: Known, intruders: &[Intruder]) -> Options {
         let Stage { model, mission, .. } = self.stage(known.slot, known.orders);
         let actions = self.actions_of(known.slot);
-        let predictions = self.air().predictions(model, actions, mission, (known.pose, known.next));
+        let predictions = self.air().predictions(model, actions, mission, known.pose, known.next);
         Options::new(predictions, model.separation_m, self.levels(known)).beside(
             intruders,
             &self.objective,

@@ -1,8 +1,9 @@
 //! *Act*: the bodies of a group act one after the other; the environment decides.
 
+use super::decide::Contact;
 use super::effector::{Action, ObstacleRule, Side, Walk};
 use super::scene::{Scene, all_free, at};
-use super::state::{BodyCell, contact_word};
+use super::state::{BodyCell, Facing, LastContact};
 use super::world::Role;
 use super::{Event, EventKind, MotionSample, Scratch};
 use sidestep_kernel::Slot;
@@ -78,9 +79,9 @@ impl<T: BoxWord> Scene<'_, T> {
     fn make_whole(&self, walk: &Walk, slot: Slot) {
         let (floor, cell) = (self.floor, self.cell(slot));
         let base = self.base(cell);
-        cell.contact.set(0);
+        cell.contact.set(LastContact::NONE);
         if walk.turn != 0 {
-            cell.facing.set((cell.facing.get() + walk.turn) % 4);
+            cell.facing.set(cell.facing.get().turned(walk.turn));
         }
         if walk.steps.is_empty() {
             return;
@@ -118,9 +119,9 @@ impl<T: BoxWord> Scene<'_, T> {
         }
         match verdict.contact {
             None => {
-                cell.contact.set(0);
+                cell.contact.set(LastContact::NONE);
                 if walk.turn != 0 {
-                    cell.facing.set((cell.facing.get() + walk.turn) % 4);
+                    cell.facing.set(cell.facing.get().turned(walk.turn));
                 }
             }
             Some(touch) => self.touch(cell, touch, scratch),
@@ -130,7 +131,7 @@ impl<T: BoxWord> Scene<'_, T> {
     /// Notes a contact in the body's cell, in its counters and, where events are kept, as an event.
     fn touch(&self, cell: &BodyCell, touch: Touch, scratch: &mut Scratch) {
         let Touch { kind, side, by } = touch;
-        cell.contact.set(contact_word(kind, side as u8));
+        cell.contact.set(LastContact::of(Contact { kind, side }));
         let (body, kinds) = (cell.id, self.world.kinds.len());
         self.state.contacts.add(body as usize * kinds + usize::from(kind), 1);
         if scratch.keep_events {
@@ -209,13 +210,13 @@ impl<T: BoxWord> Scene<'_, T> {
     fn toggle(&self, slot: Slot, scratch: &mut Scratch) {
         let (floor, cell) = (self.floor, self.cell(slot));
         let (base, own) = (self.base(cell), &self.type_of(cell).own);
-        let opens = cell.facing.get() == 0;
+        let opens = cell.facing.get() == Facing::CLOSED;
         if !opens && !all_free(floor, base, own) {
             return;
         }
         let word = if opens { T::FREE } else { T::standing(slot) };
         own.iter().for_each(|&offset| floor.set(at(base, offset), word));
-        cell.facing.set(u8::from(opens));
+        cell.facing.set(if opens { Facing::OPEN } else { Facing::CLOSED });
         if scratch.keep_events {
             let event = if opens { EventKind::Opened } else { EventKind::Closed };
             scratch.events.push(self.event(cell, event));

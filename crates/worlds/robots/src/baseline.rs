@@ -250,7 +250,7 @@ pub fn breach(world: &RobotsWorld, snapshot: &Snapshot) -> Option<String> {
     let mut owner: Vec<Option<EntityId>> = vec![None; world.map.cells().len()];
     for (id, body) in (0..).zip(&snapshot.bodies) {
         let ty = world.type_of(id);
-        if world.is_door(id) && body.facing == 1 {
+        if world.is_door(id) && body.facing.is_open() {
             continue;
         }
         let (cols, rows) = (body.at.0..body.at.0 + ty.size.0, body.at.1..body.at.1 + ty.size.1);

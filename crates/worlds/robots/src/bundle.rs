@@ -14,7 +14,7 @@ use sidestep_scenario::{Bundle, Resolved, Source};
 ///
 /// # Errors
 /// When such a file can no longer be read.
-pub fn resolve(source: &Source, compiled: &Compiled) -> Result<Resolved, InputError> {
+pub(crate) fn resolve(source: &Source, compiled: &Compiled) -> Result<Resolved, InputError> {
     let file: Value = source.parse()?;
     let mut bundle = Bundle::new(source, compiled.seed, compiled.cycles);
     // Written even where it is the preset, because the run depends on it.

@@ -71,7 +71,7 @@ impl Side {
 }
 
 /// Largest number of steps of a path.
-pub const MAX_PATH: usize = 16;
+pub(crate) const MAX_PATH: usize = 16;
 
 /// One way an action may end, in free space.
 #[derive(Debug, Clone, PartialEq)]
@@ -154,39 +154,39 @@ impl ObstacleRule {
 /// A unit step of a body of given size at a given heading, as box offsets from the anchor
 /// that the body had before the whole transition.
 #[derive(Debug, Clone)]
-pub struct Step {
+pub(crate) struct Step {
     /// Boxes that the body enters, as index offsets.
-    pub enter: Box<[i32]>,
+    pub(crate) enter: Box<[i32]>,
     /// Boxes that it leaves, as index offsets.
-    pub leave: Box<[i32]>,
+    pub(crate) leave: Box<[i32]>,
     /// Move of the anchor in columns and rows.
-    pub delta: (i32, i32),
+    pub(crate) delta: (i32, i32),
     /// Side of the body that moves first.
-    pub side: Side,
+    pub(crate) side: Side,
 }
 
 /// A transition at a heading, prepared for walking on the grid.
 #[derive(Debug, Clone)]
-pub struct Walk {
+pub(crate) struct Walk {
     /// Its steps.
-    pub steps: Vec<Step>,
+    pub(crate) steps: Vec<Step>,
     /// Quarter turns to the left.
-    pub turn: u8,
+    pub(crate) turn: u8,
     /// All steps together, for the many walks that meet no obstacle.
-    pub whole: Whole,
+    pub(crate) whole: Whole,
 }
 
 /// The effect of a walk that meets no obstacle, as index offsets from the anchor before it.
 #[derive(Debug, Clone, Default)]
-pub struct Whole {
+pub(crate) struct Whole {
     /// Boxes entered that the body did not cover at the start; all of them must be free.
-    pub enter: Box<[i32]>,
+    pub(crate) enter: Box<[i32]>,
     /// Boxes covered at the start and not at the end.
-    pub leave: Box<[i32]>,
+    pub(crate) leave: Box<[i32]>,
     /// Boxes covered at the end and not at the start.
-    pub fill: Box<[i32]>,
+    pub(crate) fill: Box<[i32]>,
     /// Move of the anchor in columns and rows.
-    pub delta: (i32, i32),
+    pub(crate) delta: (i32, i32),
 }
 
 impl Whole {
@@ -215,41 +215,41 @@ impl Whole {
 /// The boxes that an action may sweep, as a tree of steps, depth first. It is a tree because boxes
 /// behind a wall need not be claimed: a blocked step leaves out its subtree.
 #[derive(Debug, Clone, Default)]
-pub struct Sweep {
+pub(crate) struct Sweep {
     /// The steps.
-    pub nodes: Box<[SweepNode]>,
+    pub(crate) nodes: Box<[SweepNode]>,
     /// Index offsets of the boxes entered, step after step.
-    pub boxes: Box<[i32]>,
+    pub(crate) boxes: Box<[i32]>,
 }
 
 /// One step of a [`Sweep`].
 #[derive(Debug, Clone, Copy)]
-pub struct SweepNode {
+pub(crate) struct SweepNode {
     /// Start of its boxes in [`Sweep::boxes`].
-    pub first: u32,
+    pub(crate) first: u32,
     /// End of its boxes there.
-    pub end: u32,
+    pub(crate) end: u32,
     /// Index of the next step when a wall blocks this one: the one behind its whole subtree.
-    pub after: u32,
+    pub(crate) after: u32,
 }
 
 /// An action of a body type at a heading.
 #[derive(Debug, Clone)]
-pub struct Action {
+pub(crate) struct Action {
     /// Probability of each walk.
-    pub distribution: Categorical,
+    pub(crate) distribution: Categorical,
     /// Probabilities as given, kept for exact computations and for rescaling.
-    pub probabilities: Vec<f64>,
+    pub(crate) probabilities: Vec<f64>,
     /// The walk of each outcome.
-    pub walks: Vec<Walk>,
+    pub(crate) walks: Vec<Walk>,
     /// The tree of everything that the action may sweep.
-    pub sweep: Sweep,
+    pub(crate) sweep: Sweep,
     /// The boxes of `sweep`, each listed once.
-    pub claims: Box<[i32]>,
+    pub(crate) claims: Box<[i32]>,
 }
 
 /// Unit vectors of the headings east, north, west, south.
-pub const HEADINGS: [(i32, i32); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
+pub(crate) const HEADINGS: [(i32, i32); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
 
 impl Action {
     /// Prepares an action of a `width` x `height` body for grid rows of `stride` boxes.
@@ -257,7 +257,7 @@ impl Action {
     /// # Errors
     /// Returns an error when the probabilities are not a distribution; scenarios check that
     /// earlier.
-    pub fn new(
+    pub(crate) fn new(
         transitions: &[Transition],
         heading: u8,
         body: (u32, u32),
@@ -290,7 +290,7 @@ impl Action {
 }
 
 /// Returns the offsets of the boxes that a body covers, row by row from its anchor.
-pub fn own_boxes(body: (u32, u32), stride: u32) -> Box<[i32]> {
+pub(crate) fn own_boxes(body: (u32, u32), stride: u32) -> Box<[i32]> {
     let row = |y: u32| (0..body.0).map(move |x| (y * stride + x) as i32);
     (0..body.1).flat_map(row).collect()
 }

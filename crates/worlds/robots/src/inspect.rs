@@ -17,6 +17,7 @@ use sidestep_kernel::conflict::Groups;
 use sidestep_kernel::space::BoxWord;
 use sidestep_kernel::view::{self, Inspection, MarkShape, Section, Table, Value, Who};
 use sidestep_kernel::{Cycle, EntityId, Phases, Slot};
+use sidestep_map::Rect;
 
 /// Largest number of members of a conflict group that are listed: those around the body.
 const MOST_MEMBERS: usize = 64;
@@ -36,8 +37,8 @@ impl RobotsWorld {
     }
 
     /// Returns a body's heading in words.
-    fn heading(facing: u8) -> &'static str {
-        HEADING_NAMES[usize::from(facing % 4)]
+    fn heading(heading: u8) -> &'static str {
+        HEADING_NAMES[usize::from(heading % 4)]
     }
 }
 
@@ -99,14 +100,13 @@ impl<'a, T: BoxWord> Looking<'a, T> {
     fn facing(&self) -> Value {
         let cell = self.scene.cell(self.slot);
         match &self.scene.type_of(cell).role {
-            Role::Door(_) => (if cell.facing.get() == 1 { "open" } else { "closed" }).into(),
-            _ => RobotsWorld::heading(cell.facing.get()).into(),
+            Role::Door(_) => (if cell.facing.get().is_open() { "open" } else { "closed" }).into(),
+            _ => RobotsWorld::heading(cell.facing.get().heading()).into(),
         }
     }
 
     fn last_contact(&self) -> Value {
-        let word = self.scene.cell(self.slot).contact.get();
-        let contact = super::perceive::contact_of_word(word);
+        let contact = self.scene.cell(self.slot).contact.get().get();
         let kinds = &self.scene.world.kinds;
         let words = |c: super::decide::Contact| {
             format!("{} at its {}", kinds[usize::from(c.kind)], c.side.name())
@@ -151,7 +151,7 @@ impl<'a, T: BoxWord> Looking<'a, T> {
         let world = self.scene.world;
         let col = index as u32 % world.stride - world.border;
         let row = index as u32 / world.stride - world.border;
-        world.corners_m((col, row), (1, 1))
+        world.corners_m(Rect { col, row, width: 1, height: 1 })
     }
 
     /// Tells the group that is in conflict, in its order of acting.
@@ -169,8 +169,8 @@ impl<'a, T: BoxWord> Looking<'a, T> {
                 _ => Value::number(draw, ""),
             };
             table.row([Value::count(k + 1), who.into(), draw]);
-            let corners_m =
-                world.corners_m(world.map_position(cell.at()), world.type_of(cell.id).size);
+            let boxes = world.type_of(cell.id).boxes(world.map_position(cell.at()));
+            let corners_m = world.corners_m(boxes);
             let label = format!("{}. {who}", k + 1);
             self.told.mark(view::Role::Group, label, MarkShape::Area { corners_m });
         }
@@ -185,8 +185,8 @@ impl<'a, T: BoxWord> Looking<'a, T> {
 }
 
 impl RobotsWorld {
-    /// Returns the corners of a rectangle of boxes, by its lower-left one and its size.
-    fn corners_m(&self, (col, row): (u32, u32), (width, height): (u32, u32)) -> Vec<view::Place> {
+    /// Returns the corners of a rectangle of boxes.
+    fn corners_m(&self, Rect { col, row, width, height }: Rect) -> Vec<view::Place> {
         let corner = |x: u32, y: u32| {
             let side_m = self.map.box_size_m;
             let [x_m, y_m] = self.map.plane.place([f64::from(x) * side_m, f64::from(y) * side_m]);

@@ -120,7 +120,7 @@ impl<T: BoxWord> Scene<'_, T> {
     /// Returns the heading of a body; none for doors, which have no heading and go first.
     fn heading_of(&self, cell: &BodyCell) -> Option<u8> {
         let is_door = matches!(self.type_of(cell).role, Role::Door(_));
-        (!is_door).then(|| cell.facing.get())
+        (!is_door).then(|| cell.facing.get().heading())
     }
 
     /// Returns the heading that goes first. A body with heading `h` sees on its right those with

@@ -4,7 +4,6 @@
 use super::Scratch;
 use super::decide::External;
 use super::effector::Side;
-use super::perceive::contact_of_word;
 use super::rows::HEADING_NAMES;
 use super::scene::{Scene, with_scene};
 use super::state::RobotsState;
@@ -159,14 +158,14 @@ impl<T: BoxWord> Scene<'_, T> {
                 classes.whole(row * beams + k, i64::from(reading.class));
             }
         }
-        let contact = contact_of_word(cell.contact.get());
+        let contact = cell.contact.get().get();
         let (col, line) = self.world.map_position(cell.at());
         let is_due = self.world.bodies[id as usize].is_due(self.now);
         others[0].whole(row, contact.map_or(0, |contact| i64::from(contact.kind) + 1));
         others[1].whole(row, contact.map_or(0, |contact| contact.side as i64 + 1));
         others[2].whole(2 * row, i64::from(col));
         others[2].whole(2 * row + 1, i64::from(line));
-        others[3].whole(row, i64::from(cell.facing.get()));
+        others[3].whole(row, i64::from(cell.facing.get().heading()));
         others[4].whole(row, i64::from(is_due));
         if let Some(radio) = &self.world.radio {
             scratch.heard.clear();

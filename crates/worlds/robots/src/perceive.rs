@@ -1,11 +1,11 @@
 //! *Claim*: bodies that are due perceive the frozen state, decide, and claim.
 
-use super::decide::{Contact, Decision, Heard, Memory, Percept, Sector, Trip, UNSEEN};
-use super::effector::{Side, Sweep};
+use super::decide::{Decision, Heard, Memory, Percept, Sector, Trip, UNSEEN};
+use super::effector::Sweep;
 use super::purpose;
 use super::scene::{Scene, all_free, at};
 use super::sensor::{Reading, Row};
-use super::state::{BodyCell, Intent, pose_word};
+use super::state::{BodyCell, Facing, Intent, KeptPose};
 use super::world::{Crossed, Door, MountedSensor, Mover, Radio, RobotModel, Role};
 use super::{Scratch, SensorSample};
 use sidestep_kernel::space::BoxWord;
@@ -18,7 +18,7 @@ impl<T: BoxWord> Scene<'_, T> {
         let (world, cell) = (self.world, self.cell(slot));
         if let Some(frames) = &self.state.frames {
             let index = (self.now - frames.first) as usize * frames.bodies + cell.id as usize;
-            frames.poses.set(index, pose_word(cell.at(), cell.facing.get()));
+            frames.poses.set(index, KeptPose::of(cell.at(), cell.facing.get()));
         }
         let is_due = cell.period == 1 || world.bodies[cell.id as usize].is_due(self.now);
         if !is_due && world.radio.is_some() {
@@ -62,9 +62,9 @@ impl<T: BoxWord> Scene<'_, T> {
             readings: &scratch.readings,
             sectors: &model.body.sectors,
             nearest_in: nearest,
-            contact: contact_of_word(cell.contact.get()),
+            contact: cell.contact.get().get(),
             at: self.world.map_position(cell.at()),
-            heading: cell.facing.get(),
+            heading: cell.facing.get().heading(),
             heard: &scratch.heard,
         };
         let mut memory = memory_of(cell);
@@ -141,7 +141,7 @@ impl<T: BoxWord> Scene<'_, T> {
     /// Returns for each beam of a sensor the first thing that it meets, and the distance to that in boxes.
     pub(super) fn met(&self, sensor: &MountedSensor, cell: &BodyCell) -> Vec<Option<(T, f64)>> {
         let base = self.base(cell);
-        let boxes = &*sensor.boxes[usize::from(cell.facing.get())];
+        let boxes = &*sensor.boxes[usize::from(cell.facing.get().heading())];
         let mut from = 0;
         let beam = |&end: &u16| {
             let span = from..usize::from(end);
@@ -160,7 +160,7 @@ impl<T: BoxWord> Scene<'_, T> {
     fn mover_draws(&self, mover: &Mover, cell: &BodyCell) -> Intent {
         let words = self.world.streams.block(cell.id, self.now, purpose::MOVE, 0);
         if !mover.straight.happens(words[0]) {
-            cell.facing.set((words[1] >> 30) as u8);
+            cell.facing.set(Facing::toward((words[1] >> 30) as u8));
         }
         Intent::ONLY
     }
@@ -168,7 +168,7 @@ impl<T: BoxWord> Scene<'_, T> {
     /// Returns the intent of a door: it tries to toggle when its schedule says so. A closing that
     /// a body blocks waits.
     fn door_wants(&self, door: &Door, cell: &BodyCell) -> Intent {
-        let is_open = cell.facing.get() == 1;
+        let is_open = cell.facing.get().is_open();
         let draw = || self.world.streams.block(cell.id, self.now, purpose::DOOR, 0)[0];
         let wants_open = door.wants_open(is_open, self.now, draw);
         if wants_open == is_open { Intent::IDLE } else { Intent::ONLY }
@@ -181,7 +181,7 @@ impl<T: BoxWord> Scene<'_, T> {
         let (floor, cell, claim) = (self.floor, self.cell(slot), T::claimed(slot));
         let (base, body) = (self.base(cell), self.type_of(cell));
         if !body.actions.is_empty() {
-            let action = body.action_index(cell.facing.get(), intent.number());
+            let action = body.action_index(cell.facing.get().heading(), intent.number());
             cell.action.set(action);
             let boxes = &*body.actions[usize::from(action)].claims;
             if all_free(floor, base, boxes) {
@@ -276,7 +276,7 @@ fn cast<T: BoxWord>(
     truths: &mut Vec<Row>,
 ) {
     let (floor, state, base) = (scene.floor, scene.state, scene.base(cell));
-    let boxes = &*sensor.boxes[usize::from(cell.facing.get())];
+    let boxes = &*sensor.boxes[usize::from(cell.facing.get().heading())];
     truths.clear();
     let mut from = 0;
     truths.extend(sensor.ends.iter().map(|&end| {
@@ -323,12 +323,6 @@ fn report<'a>(
             *nearest = reported.nearness.min(*nearest);
         }
     }
-}
-
-/// Returns the contact of a [`super::state::contact_word`].
-pub(super) fn contact_of_word(word: u16) -> Option<Contact> {
-    let side = Side::ALL[usize::from(word >> 8 & 3)];
-    (word != 0).then_some(Contact { kind: (word & 0x7f) as u8, side })
 }
 
 #[inline]

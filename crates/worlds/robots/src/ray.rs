@@ -8,13 +8,13 @@ use sidestep_kernel::math;
 
 /// One box that a beam crosses after it has left the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Crossing {
+pub(crate) struct Crossing {
     /// Columns east of the body's anchor (its lower-left box).
-    pub dx: i32,
+    pub(crate) dx: i32,
     /// Rows north of the anchor.
-    pub dy: i32,
+    pub(crate) dy: i32,
     /// Distance in boxes along the beam, from the body's boundary to this box's boundary.
-    pub distance: f64,
+    pub(crate) distance: f64,
 }
 
 /// Differences below this are rounding errors, of the direction's sine and cosine, or of a length
@@ -34,7 +34,7 @@ pub(crate) fn reaches(distance: f64, limit: f64) -> bool {
 /// A beam through a corner of boxes goes on to the box across it. A beam that runs along a
 /// line between boxes (even sizes, multiples of 90 degrees) counts as running on the left
 /// side of it, seen along the beam.
-pub fn crossings(size: u32, bearing_deg: f64, range: f64) -> Vec<Crossing> {
+pub(crate) fn crossings(size: u32, bearing_deg: f64, range: f64) -> Vec<Crossing> {
     // The first octant-exact direction: quarter turns are done on integers.
     let quarter = (bearing_deg / 90.0).floor();
     let rest_deg = bearing_deg - 90.0 * quarter;
@@ -44,7 +44,7 @@ pub fn crossings(size: u32, bearing_deg: f64, range: f64) -> Vec<Crossing> {
 }
 
 /// Returns the same crossing for a body turned `turns` quarters to the left.
-pub fn turn_crossing(c: Crossing, size: u32, turns: u8) -> Crossing {
+pub(crate) fn turn_crossing(c: Crossing, size: u32, turns: u8) -> Crossing {
     let last = size as i32 - 1;
     let (dx, dy) = match turns % 4 {
         0 => (c.dx, c.dy),

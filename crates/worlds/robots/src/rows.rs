@@ -5,7 +5,7 @@ use super::odometry::Claimed;
 use super::perceive::name_of;
 use super::scenario::RecordSection;
 use super::sensor::SensorModel;
-use super::state::{Frames, RobotsState, pose_of_word};
+use super::state::{Frames, RobotsState};
 use super::world::{RobotsWorld, Role};
 use super::{Event, EventKind, MotionSample, Scratch, SensorSample};
 use sidestep_kernel::ports::{
@@ -26,7 +26,7 @@ const MAX_POSES: usize = 1 << 24;
 const TRANSPOSED: usize = 16;
 
 /// Names of the headings by number.
-pub const HEADING_NAMES: [&str; 4] = ["east", "north", "west", "south"];
+pub(crate) const HEADING_NAMES: [&str; 4] = ["east", "north", "west", "south"];
 
 const CYCLE: &str = "cycle, counted from 0";
 const HEADING: &str =
@@ -173,7 +173,7 @@ pub struct Books {
 
 impl Books {
     /// Returns the empty books of a run that records the tables named in `record` once recording starts.
-    pub fn new(record: RecordSection) -> Self {
+    pub(crate) fn new(record: RecordSection) -> Self {
         Self { record, ..Self::default() }
     }
 
@@ -297,9 +297,9 @@ fn poses(world: &RobotsWorld, frames: &Frames, span: Range<Cycle>) -> Vec<Values
         for (way, &id) in ways.iter().zip(some) {
             bodies.extend(std::iter::repeat_n(id, cycles));
             at_cycle.extend(span.clone());
-            cols.extend(way.iter().map(|&pose| pose_of_word(pose).0 - world.border));
-            rows.extend(way.iter().map(|&pose| pose_of_word(pose).1 - world.border));
-            headings.extend(way.iter().map(|&pose| u32::from(pose_of_word(pose).2)));
+            cols.extend(way.iter().map(|pose| pose.col() - world.border));
+            rows.extend(way.iter().map(|pose| pose.row() - world.border));
+            headings.extend(way.iter().map(|pose| u32::from(pose.heading())));
         }
     }
     vec![

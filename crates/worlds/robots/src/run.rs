@@ -3,7 +3,7 @@
 use super::metrics::Metrics;
 use super::rows::Books;
 use super::scenario::{Behaviours, Compiled, StorageOrder};
-use super::state::{BodyRecord, RobotsState, Snapshot};
+use super::state::{BodyRecord, Facing, LastContact, RobotsState, Snapshot};
 use super::view::CYCLE_S;
 use super::world::RobotsWorld;
 use super::{Scratch, words};
@@ -49,12 +49,12 @@ impl Compiled {
     }
 
     /// Returns the state at the start, by entity id.
-    pub fn start_snapshot(&self) -> Snapshot {
+    pub(crate) fn start_snapshot(&self) -> Snapshot {
         let kinds = self.world.kinds.len();
-        let record = |&(at, facing): &((u32, u32), u8)| BodyRecord {
+        let record = |&(at, heading): &((u32, u32), u8)| BodyRecord {
             at,
-            facing,
-            contact: 0,
+            facing: Facing::toward(heading),
+            contact: LastContact::NONE,
             memory: [0; 4],
             voice: None,
             counts: [0; 3],

@@ -91,17 +91,17 @@ impl SensorModel {
 /// between at most two reports (Walker's alias method, built by Vose's algorithm). A report
 /// has its probability within 2^-31.
 #[derive(Debug, Clone)]
-pub struct ReadingTable {
+pub(crate) struct ReadingTable {
     classes: usize,
     bits: u32,
     columns: Box<[Split]>,
     /// Whether every reading is the truth, so that no draw is needed.
-    pub reliable: bool,
+    pub(crate) reliable: bool,
 }
 
 /// A true reading's row in a [`ReadingTable`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Row(u32);
+pub(crate) struct Row(u32);
 
 /// One column of a row: below the threshold the first reading is reported, else the second.
 #[derive(Debug, Clone, Copy)]
@@ -112,11 +112,11 @@ struct Split {
 
 /// A drawn reading, with its nearness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Report {
+pub(crate) struct Report {
     /// The reading.
-    pub reading: Reading,
+    pub(crate) reading: Reading,
     /// Its distance class, or [`UNSEEN`] where nothing is reported.
-    pub nearness: u8,
+    pub(crate) nearness: u8,
 }
 
 impl From<Reading> for Report {
@@ -132,7 +132,7 @@ impl ReadingTable {
     /// # Errors
     /// Returns an error when a row is not a distribution; scenarios check that earlier and say
     /// where.
-    pub fn new(sensor: &SensorModel, reliable: bool) -> Result<Self, RowError> {
+    pub(crate) fn new(sensor: &SensorModel, reliable: bool) -> Result<Self, RowError> {
         let classes = sensor.distance_classes.len() + 1;
         let observations = sensor.observations.len();
         let most = 1 + (observations - 1) * (classes - 1);
@@ -150,20 +150,20 @@ impl ReadingTable {
 
     /// Returns the row of a true reading.
     #[inline]
-    pub fn row(&self, truth: Reading) -> Row {
+    pub(crate) fn row(&self, truth: Reading) -> Row {
         let row = usize::from(truth.observation) * self.classes + usize::from(truth.class);
         Row((row << self.bits) as u32)
     }
 
     /// Returns the true reading of a row.
-    pub fn truth(&self, row: Row) -> Reading {
+    pub(crate) fn truth(&self, row: Row) -> Reading {
         let row = row.0 as usize >> self.bits;
         Reading { observation: (row / self.classes) as u8, class: (row % self.classes) as u8 }
     }
 
     /// Returns the report for the true reading of `row`, drawn with the uniform word `u`.
     #[inline]
-    pub fn report(&self, row: Row, u: u32) -> Report {
+    pub(crate) fn report(&self, row: Row, u: u32) -> Report {
         let column = (u64::from(u) << self.bits >> 32) as usize;
         let split = &self.columns[row.0 as usize | column];
         split.reports[usize::from(u << self.bits >= split.threshold)]

@@ -1,103 +1,45 @@
 //! The state of a run, in columns by slot, and its snapshot by entity id.
 
+mod codes;
+
 use super::policy::ConflictPolicy;
 use super::voice::Voices;
 use super::world::{Body, BodyType, RobotsWorld};
+pub use codes::{Facing, LastContact};
+pub(crate) use codes::{Intent, KeptPose};
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::column::{Shared, Word};
+use sidestep_kernel::column::{Coded, Shared};
 use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::space::{BoxWord, Floor, Marks, Position};
 use sidestep_kernel::{Column, Cycle, Digest, EntityId, Slot};
-use std::sync::atomic::{AtomicU8, AtomicU64};
+use std::sync::atomic::AtomicU64;
 
 /// The kind of an empty box.
 pub const FREE: u8 = 0;
 /// The kind of the static map's walls.
 pub const WALL: u8 = 1;
 
-/// The action that a body is about to do in this cycle, in one byte.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Intent(u8);
-
-impl Intent {
-    /// No action.
-    pub(super) const IDLE: Self = Self(0);
-    /// The only action of bodies without a choice: people go on, doors toggle.
-    pub(super) const ONLY: Self = Self(1);
-    /// Flag added when every box that the action may sweep is free.
-    const CLEAR: u8 = 0x80;
-
-    /// Returns the intent to do the action of this number; there are fewer than 127.
-    #[inline(always)]
-    pub(super) fn action(number: u8) -> Self {
-        Self(number + 1)
-    }
-
-    /// Returns the same intent, marked that every box it may sweep is free.
-    #[inline(always)]
-    pub(super) fn clear(self) -> Self {
-        Self(self.0 | Self::CLEAR)
-    }
-
-    /// Returns whether nothing is intended.
-    #[inline(always)]
-    pub(super) fn is_idle(self) -> bool {
-        self == Self::IDLE
-    }
-
-    /// Returns whether every box that the action may sweep is free.
-    #[inline(always)]
-    pub(super) fn is_clear(self) -> bool {
-        self.0 & Self::CLEAR != 0
-    }
-
-    /// Returns the number of the action; the body must not be idle.
-    #[inline(always)]
-    pub(super) fn number(self) -> u8 {
-        (self.0 & !Self::CLEAR) - 1
-    }
-}
-
-impl Word for Intent {
-    type Cell = AtomicU8;
-
-    #[inline(always)]
-    fn cell(self) -> AtomicU8 {
-        AtomicU8::new(self.0)
-    }
-
-    #[inline(always)]
-    fn load(cell: &AtomicU8) -> Self {
-        Self(u8::load(cell))
-    }
-
-    #[inline(always)]
-    fn store(cell: &AtomicU8, intent: Self) {
-        u8::store(cell, intent.0);
-    }
-}
-
 /// The state of a robots world.
 #[derive(Debug)]
 pub struct RobotsState {
     /// The body that stands in, or claims, each box of the padded grid.
-    pub floor: Floor,
+    pub(crate) floor: Floor,
     /// Boxes that a robot has ever covered.
-    pub visited: Marks,
+    pub(crate) visited: Marks,
     /// The changing part of each body, by slot.
     pub bodies: Box<[BodyCell]>,
     /// Kind of each body, by slot.
-    pub kinds: Box<[u8]>,
+    pub(crate) kinds: Box<[u8]>,
     /// Slot of each entity, by id.
-    pub slot_of_id: Box<[Slot]>,
+    pub(crate) slot_of_id: Box<[Slot]>,
     /// Number of contacts of each body by kind touched, at `id * kinds + kind`.
-    pub contacts: Column<u32>,
+    pub(crate) contacts: Column<u32>,
     /// Highest bid per box in the present round; empty unless the policy is `rounds`.
-    pub bids: Box<[AtomicU64]>,
+    pub(crate) bids: Box<[AtomicU64]>,
     /// Last broadcast of each robot.
     pub(crate) voices: Voices,
     /// Poses at the start of each cycle, while a run is recorded.
-    pub frames: Option<Frames>,
+    pub(crate) frames: Option<Frames>,
 }
 
 /// One body's share of the state, in one cache line.
@@ -105,13 +47,13 @@ pub struct RobotsState {
 #[repr(align(64))]
 pub struct BodyCell {
     /// Lower-left box, as a [`Position`] word.
-    pub anchor: Shared<u32>,
-    /// Heading (0 east, 1 north, 2 west, 3 south); of a door: 1 open, 0 closed.
-    pub facing: Shared<u8>,
+    pub(crate) anchor: Shared<u32>,
+    /// Heading; of a door, whether it is open.
+    pub facing: Shared<Facing>,
     /// The action that the body is about to do in this cycle.
-    pub intent: Shared<Intent>,
-    /// Outcome of the last action, see [`contact_word`].
-    pub contact: Shared<u16>,
+    pub(crate) intent: Shared<Intent>,
+    /// The obstacle that stopped the last action.
+    pub contact: Shared<LastContact>,
     /// A robot's memory; its behavior gives the words their meaning.
     pub memory: [Shared<u32>; 4],
     /// Cycles from one action to the next; constant.
@@ -131,7 +73,7 @@ pub struct BodyCell {
     /// Index of its type; constant.
     pub ty: u16,
     /// Index of the action that it is about to do, see `BodyType::actions`.
-    pub action: Shared<u16>,
+    pub(crate) action: Shared<u16>,
 }
 
 impl BodyCell {
@@ -149,41 +91,23 @@ impl BodyCell {
 
 /// Poses of all bodies over some cycles; those of one cycle are stored together.
 #[derive(Debug)]
-pub struct Frames {
+pub(crate) struct Frames {
     /// Cycle of the first pose.
-    pub first: Cycle,
+    pub(crate) first: Cycle,
     /// Number of cycles for which there is room.
-    pub capacity: usize,
+    pub(crate) capacity: usize,
     /// Number of poses per cycle, one for each body.
-    pub bodies: usize,
-    /// Poses at `(cycle - first) * bodies + id`, see [`pose_word`].
-    pub poses: Column<u32>,
+    pub(crate) bodies: usize,
+    /// Poses at `(cycle - first) * bodies + id`.
+    pub(crate) poses: Column<KeptPose>,
 }
 
 impl Frames {
     /// Returns room for `capacity` cycles of `bodies` bodies, starting with cycle `first`.
-    pub fn new(first: Cycle, capacity: usize, bodies: usize) -> Self {
-        Self { first, capacity, bodies, poses: Column::filled(capacity * bodies, 0) }
+    pub(crate) fn new(first: Cycle, capacity: usize, bodies: usize) -> Self {
+        let poses = Column::filled(capacity * bodies, KeptPose::default());
+        Self { first, capacity, bodies, poses }
     }
-}
-
-/// Returns column, row and heading in one word: the heading in bits 30 and 31, the row in bits 15 to 29,
-/// the column below.
-#[inline]
-pub fn pose_word(at: Position, facing: u8) -> u32 {
-    u32::from(facing) << 30 | at.row() << 15 | at.col()
-}
-
-/// Returns column, row and heading of a [`pose_word`].
-pub fn pose_of_word(word: u32) -> (u32, u32, u8) {
-    (word & 0x7fff, word >> 15 & 0x7fff, (word >> 30) as u8)
-}
-
-/// Returns the word of a contact: bit 15 is set, the side is in bits 8 to 14, the kind below; 0 stands for
-/// no contact.
-#[inline]
-pub fn contact_word(kind: u8, side: u8) -> u16 {
-    1 << 15 | u16::from(side) << 8 | u16::from(kind)
 }
 
 /// One body in a snapshot.
@@ -192,9 +116,9 @@ pub struct BodyRecord {
     /// Column and row of the lower-left box, in map coordinates.
     pub at: (u32, u32),
     /// See [`BodyCell::facing`].
-    pub facing: u8,
-    /// See [`contact_word`].
-    pub contact: u16,
+    pub facing: Facing,
+    /// See [`BodyCell::contact`].
+    pub contact: LastContact,
     /// The robot's memory.
     pub memory: [u32; 4],
     /// Last broadcast, if there was one.
@@ -258,7 +182,7 @@ impl RobotsState {
 
     /// Returns the kind of the occupant that a word of the floor stands for.
     #[inline(always)]
-    pub fn kind_of<T: BoxWord>(&self, word: T) -> u8 {
+    pub(crate) fn kind_of<T: BoxWord>(&self, word: T) -> u8 {
         match word {
             _ if word.is_free() => FREE,
             _ if word == T::WALL => WALL,
@@ -279,7 +203,7 @@ impl RobotsState {
 
     /// Returns the type of the body in a slot.
     #[inline]
-    pub fn type_in<'a>(&self, world: &'a RobotsWorld, slot: Slot) -> &'a BodyType {
+    pub(crate) fn type_in<'a>(&self, world: &'a RobotsWorld, slot: Slot) -> &'a BodyType {
         &world.types[usize::from(self.bodies[slot as usize].ty)]
     }
 
@@ -301,7 +225,7 @@ impl RobotsState {
     /// Returns whether the body in a slot is a door that is open.
     pub(super) fn is_open_door(&self, world: &RobotsWorld, slot: Slot) -> bool {
         let cell = &self.bodies[slot as usize];
-        world.is_door(cell.id) && cell.facing.get() == 1
+        world.is_door(cell.id) && cell.facing.get().is_open()
     }
 
     /// Returns the state in the order of ids after `cycle` cycles.
@@ -386,7 +310,7 @@ impl RobotsState {
     }
 
     /// Returns the bytes on the heap that grow with the number of boxes, and with that of bodies.
-    pub fn heap_bytes(&self) -> (usize, usize) {
+    pub(crate) fn heap_bytes(&self) -> (usize, usize) {
         let bodies = std::mem::size_of_val(&*self.bodies)
             + std::mem::size_of_val(&*self.kinds)
             + std::mem::size_of_val(&*self.slot_of_id)
@@ -406,8 +330,8 @@ impl Snapshot {
         for body in &self.bodies {
             hasher.u32(body.at.0);
             hasher.u32(body.at.1);
-            hasher.u8(body.facing);
-            hasher.u32(u32::from(body.contact));
+            hasher.u8(body.facing.code());
+            hasher.u32(u32::from(body.contact.code()));
             let voice = body.voice.unwrap_or(0);
             body.trip.iter().chain([&voice]).for_each(|&w| hasher.u64(w));
             let words = body.memory.iter().chain(&body.counts).chain(&body.contacts);

@@ -4,7 +4,7 @@ use super::effector::Side;
 use super::odometry::Claimed;
 use super::scene::{Scene, with_scene};
 use super::sensor::{NOTHING, Reading, SensorModel};
-use super::state::{BodyCell, RobotsState};
+use super::state::{BodyCell, LastContact, RobotsState};
 use super::world::{BodyType, MountedSensor, Role};
 use super::{Event, EventKind, RobotsWorld, Scratch};
 use sidestep_kernel::math::{cos, sin};
@@ -14,6 +14,7 @@ use sidestep_kernel::view::{
     Who,
 };
 use sidestep_kernel::{Cycle, EntityId, Phases};
+use sidestep_map::Rect;
 use std::f64::consts::FRAC_PI_2;
 
 /// Length of a cycle in seconds for pictures; the model itself has no time but cycles.
@@ -81,12 +82,12 @@ impl RobotsWorld {
 
     /// Returns the middle in the world of a body that has its lower-left box at `at`.
     pub(super) fn middle_m(&self, id: EntityId, at: (u32, u32)) -> [f64; 2] {
-        Eye::new(self).middle_m(self.type_of(id).size, at)
+        Eye::new(self).middle_m(self.type_of(id).boxes(at))
     }
 
     /// Returns the direction in the world of a heading, which is along the axes of the map.
-    pub(super) fn heading_rad(&self, facing: u8) -> f64 {
-        self.map.plane.yaw_rad + f64::from(facing) * FRAC_PI_2
+    pub(super) fn heading_rad(&self, heading: u8) -> f64 {
+        self.map.plane.yaw_rad + f64::from(heading) * FRAC_PI_2
     }
 
     /// Returns the readings that some robots are about to perceive.
@@ -122,7 +123,7 @@ impl RobotsWorld {
         let scan = |(sensor, true_m): (&MountedSensor, Vec<f64>)| {
             let (own, others) = readings.split_at(sensor.model.bearings_deg.len());
             readings = others;
-            scan(&sensor.model, (own, &true_m), self.side_m(id), id, pose)
+            scan(&sensor.model, own, &true_m, self.side_m(id), id, pose)
         };
         model.body.sensors.iter().zip(truths).map(scan).collect()
     }
@@ -186,14 +187,14 @@ struct Eye<'a> {
 
 impl<'a> Eye<'a> {
     fn new(world: &'a RobotsWorld) -> Self {
-        let turn = |facing| Pose::heading([0.0; 3], world.heading_rad(facing)).turn;
+        let turn = |heading| Pose::heading([0.0; 3], world.heading_rad(heading)).turn;
         Self { world, plane: world.map.plane.turned(), turns: [0, 1, 2, 3].map(turn) }
     }
 
     fn body(&self, id: EntityId, cell: &BodyCell) -> Body {
         let (ty, box_m) = (self.world.type_of(id), self.world.map.box_size_m);
         let kind = ty.visible_kind();
-        let is_open = kind == Kind::Door && cell.facing.get() == 1;
+        let is_open = kind == Kind::Door && cell.facing.get().is_open();
         // Heights are made up, because the model is a plane.
         let (width, height) = ty.size;
         let side_m = f64::from(width.min(height)) * box_m;
@@ -204,20 +205,20 @@ impl<'a> Eye<'a> {
         };
         let size_m = [f64::from(width) * box_m, f64::from(height) * box_m, height_m];
         Body::new(kind, id, self.pose(ty, cell, 0.5 * height_m), Shape::Cuboid { size_m })
-            .when(cell.contact.get() != 0, Condition::Touching)
+            .when(cell.contact.get() != LastContact::NONE, Condition::Touching)
             .when(is_open, Condition::Open)
     }
 
     fn pose(&self, ty: &BodyType, cell: &BodyCell, z_m: f64) -> Pose {
-        let [x_m, y_m] = self.middle_m(ty.size, self.world.map_position(cell.at()));
-        let facing = match ty.role {
+        let [x_m, y_m] = self.middle_m(ty.boxes(self.world.map_position(cell.at())));
+        let heading = match ty.role {
             Role::Door(_) => 0,
-            _ => cell.facing.get(),
+            _ => cell.facing.get().heading(),
         };
-        Pose { at_m: [x_m, y_m, z_m], turn: self.turns[usize::from(facing % 4)] }
+        Pose { at_m: [x_m, y_m, z_m], turn: self.turns[usize::from(heading % 4)] }
     }
 
-    fn middle_m(&self, (width, height): (u32, u32), (col, row): (u32, u32)) -> [f64; 2] {
+    fn middle_m(&self, Rect { col, row, width, height }: Rect) -> [f64; 2] {
         let box_m = self.world.map.box_size_m;
         let middle = |at: u32, size: u32| (f64::from(at) + 0.5 * f64::from(size)) * box_m;
         self.plane.place([middle(col, width), middle(row, height)])
@@ -242,7 +243,8 @@ fn side_in_words(side: Side) -> String {
 /// ranges from the middle of its robot.
 fn scan(
     sensor: &SensorModel,
-    (readings, true_m): (&[Reading], &[f64]),
+    readings: &[Reading],
+    true_m: &[f64],
     side_m: f64,
     robot: EntityId,
     pose: Pose,

@@ -98,7 +98,7 @@ impl Body<'_> {
     }
 
     fn heading(&self) -> &'static str {
-        HEADING_NAMES[usize::from(self.record.facing % 4)]
+        HEADING_NAMES[usize::from(self.record.facing.heading() % 4)]
     }
 
     fn json(&self) -> Value {
@@ -110,9 +110,9 @@ impl Body<'_> {
         });
         let Value::Object(mut place) = place else { return place };
         match self.is_door() {
-            true => place.insert("open".into(), (self.record.facing == 1).into()),
+            true => place.insert("open".into(), self.record.facing.is_open().into()),
             false => {
-                let heading_rad = self.world.heading_rad(self.record.facing);
+                let heading_rad = self.world.heading_rad(self.record.facing.heading());
                 place.insert("heading_deg".into(), heading_rad.to_degrees().into());
                 place.insert("heading".into(), self.heading().into())
             }
@@ -122,9 +122,9 @@ impl Body<'_> {
 
     fn row(&self) -> String {
         let (col, row) = self.record.at;
-        let look = match (self.is_door(), self.record.facing) {
-            (true, 1) => "open",
-            (true, _) => "closed",
+        let look = match (self.is_door(), self.record.facing.is_open()) {
+            (true, true) => "open",
+            (true, false) => "closed",
             (false, _) => self.heading(),
         };
         format!("  {:<4}  {:<10}  {col:>9}  {row:>9}  {look}\n", self.id, self.kind())

@@ -13,7 +13,7 @@ use sidestep_kernel::distr::{Chance, RowError};
 use sidestep_kernel::space::Position;
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{EntityId, Seed};
-use sidestep_map::GridMap;
+use sidestep_map::{GridMap, Rect};
 use std::sync::Arc;
 
 /// Boxes of a beam that are read together, even past a wall.
@@ -72,12 +72,12 @@ impl Regime {
     }
 
     /// Returns whether sensors are reliable.
-    pub fn reliable_sensors(self) -> bool {
+    pub(crate) fn reliable_sensors(self) -> bool {
         matches!(self, Self::Reliable | Self::Effectors)
     }
 
     /// Returns whether effectors are reliable.
-    pub fn reliable_effectors(self) -> bool {
+    pub(crate) fn reliable_effectors(self) -> bool {
         matches!(self, Self::Reliable | Self::Sensors)
     }
 }
@@ -141,7 +141,7 @@ impl Body {
     }
 
     /// Returns the number of actions that the body has started before this cycle.
-    pub fn actions_before(&self, cycle: Cycle) -> u64 {
+    pub(crate) fn actions_before(&self, cycle: Cycle) -> u64 {
         let (period, phase) = (u64::from(self.period), u64::from(self.phase));
         // Multiples of the period in `phase..cycle + phase`.
         (cycle + phase).div_ceil(period) - phase.div_ceil(period)
@@ -156,19 +156,24 @@ pub struct BodyType {
     /// Width and height in boxes.
     pub size: (u32, u32),
     /// Offsets of the boxes it covers from its anchor, in the padded grid.
-    pub own: Box<[i32]>,
+    pub(crate) own: Box<[i32]>,
     /// Whether it marks the boxes that it covers as visited, as robots do.
-    pub marks: bool,
+    pub(crate) marks: bool,
     /// Its actions: `heading * actions per heading + action`; none for a door.
-    pub actions: Arc<[Action]>,
+    pub(crate) actions: Arc<[Action]>,
     /// Its part in the world, with the data for it.
     pub role: Role,
 }
 
 impl BodyType {
+    /// Returns the boxes that such a body covers when its lower-left one is `at`.
+    pub(super) fn boxes(&self, at: (u32, u32)) -> Rect {
+        Rect { col: at.0, row: at.1, width: self.size.0, height: self.size.1 }
+    }
+
     /// Returns the index in `actions` of an action at a heading.
     #[inline]
-    pub fn action_index(&self, heading: u8, action: u8) -> u16 {
+    pub(crate) fn action_index(&self, heading: u8, action: u8) -> u16 {
         u16::from(heading) * (self.actions.len() / 4) as u16 + u16::from(action)
     }
 }
@@ -197,7 +202,7 @@ pub struct RobotModel {
 
 impl RobotModel {
     /// Returns a robot type of this body and this mind.
-    pub fn new(body: Arc<RobotBody>, behaviour: Arc<dyn Behaviour>) -> Self {
+    pub(crate) fn new(body: Arc<RobotBody>, behaviour: Arc<dyn Behaviour>) -> Self {
         let is_external = behaviour.is_external();
         Self { body, behaviour, is_external }
     }
@@ -209,11 +214,11 @@ pub struct RobotBody {
     /// Sensors, in the scenario's order.
     pub sensors: Vec<MountedSensor>,
     /// Sector of each beam of all sensors in order.
-    pub sectors: Vec<Sector>,
+    pub(crate) sectors: Vec<Sector>,
     /// The effector as data.
     pub effector: EffectorModel,
     /// The effector on this body, see [`BodyType::actions`].
-    pub actions: Arc<[Action]>,
+    pub(crate) actions: Arc<[Action]>,
 }
 
 /// A sensor on a body of a given size.
@@ -247,7 +252,7 @@ impl MountedSensor {
     ///
     /// # Errors
     /// Returns an error when a row of its matrices is not a distribution.
-    pub fn new(
+    pub(crate) fn new(
         model: SensorModel,
         size: u32,
         box_size_m: f64,
@@ -279,7 +284,7 @@ impl MountedSensor {
     }
 
     /// Returns whether every reading is the truth.
-    pub fn is_reliable(&self) -> bool {
+    pub(crate) fn is_reliable(&self) -> bool {
         self.table.reliable
     }
 
@@ -305,7 +310,7 @@ impl MountedSensor {
     /// Returns the true reading of a beam that meets `kind` at distance class `class`. A kind that
     /// the sensor cannot observe reads as nothing.
     #[inline]
-    pub fn truth(&self, kind: u8, class: u8) -> Reading {
+    pub(crate) fn truth(&self, kind: u8, class: u8) -> Reading {
         match self.model.designates[usize::from(kind)] {
             0 => self.nothing,
             observation => Reading { observation, class },
@@ -326,7 +331,7 @@ fn in_fours(mut beam: Vec<Crossing>) -> Vec<[Crossing; BEAM_STEP]> {
 #[derive(Debug, Clone)]
 pub struct Mover {
     /// Chance to continue in the same direction; otherwise a new one is drawn.
-    pub straight: Chance,
+    pub(crate) straight: Chance,
 }
 
 /// The rule by which a door opens and closes.
@@ -352,7 +357,7 @@ pub enum Door {
 
 impl Door {
     /// Returns whether the door wants to be open in this cycle.
-    pub fn wants_open(&self, is_open: bool, now: Cycle, draw: impl FnOnce() -> u32) -> bool {
+    pub(crate) fn wants_open(&self, is_open: bool, now: Cycle, draw: impl FnOnce() -> u32) -> bool {
         match *self {
             Self::Periodic { open, closed, phase } => (now + phase) % (open + closed) < open,
             Self::Random { open, close } => {
@@ -374,7 +379,7 @@ pub struct Radio {
 
 impl Radio {
     /// Returns a radio with this range in meters and this chance of losing a reception.
-    pub fn new(range_m: f64, box_size_m: f64, loss: f64) -> Self {
+    pub(crate) fn new(range_m: f64, box_size_m: f64, loss: f64) -> Self {
         // A robot exactly at the range hears, even where rounding makes the quotient smaller.
         let reach = 2.0 * (range_m / box_size_m + EPSILON);
         Self { reach2_half_boxes: (reach * reach) as u64, loss: Chance::new(loss) }
@@ -393,7 +398,7 @@ impl RobotsWorld {
     }
 
     /// Returns whether a body is a door.
-    pub fn is_door(&self, id: EntityId) -> bool {
+    pub(crate) fn is_door(&self, id: EntityId) -> bool {
         matches!(self.type_of(id).role, Role::Door(_))
     }
 

@@ -98,8 +98,8 @@ fn shielded(
         allowed.iter().map(|&k| one.ways[k].clone()).collect()
     };
     let candidates: Vec<Vec<Way>> = allowed.iter().zip(all).map(candidates).collect();
-    let frame = (world.timing.points_per_dt(), dtau_s);
-    let decisions = filter(&flyers, &candidates, frame, Certainty::Sure);
+    let steps = world.timing.points_per_dt();
+    let decisions = filter(&flyers, &candidates, steps, dtau_s, Certainty::Sure);
     let decided = decisions.into_iter().zip(&allowed).zip(all);
     decided.map(|((decision, allowed), (_, one))| one.course(decision, allowed)).collect()
 }

@@ -49,7 +49,7 @@ pub(super) fn admit(turn: &mut Turn<'_>, flown: &[Slot]) {
     let flyers: Vec<Flyer> = flown.iter().map(|&slot| flyer(turn, slot)).collect();
     let (sides, too_close) = entry_fallbacks(&flyers, |i| enters(&flown[i]));
     for (&slot, side) in flown.iter().zip(sides) {
-        state.airplanes[slot as usize].set_side(side);
+        state.airplanes[slot as usize].fallback.set(side);
     }
     for (i, j) in too_close {
         let (a, b) = (flown[i], flown[j]);

@@ -25,7 +25,7 @@ pub(super) fn carry_out(turn: &Turn<'_>, group: &[Slot], flown: &[Slot]) {
             let later = &world.later[slot as usize][usize::from(cell.orders.get())];
             cell.orders.set(cell.orders.get() + 1);
             cell.next.set(later.next.unwrap_or(cell.next.get()));
-            cell.set_side(side);
+            cell.fallback.set(side);
         }
     }
 }
@@ -41,7 +41,7 @@ fn fallback_after(
     let cell = &state.airplanes[slot as usize];
     let changes_safety = matches!(order.task, Task::Speed(_) | Task::Altitude { .. });
     if !world.shield || !changes_safety || world.is_intruder(slot, *now) {
-        return Some(cell.side());
+        return Some(cell.fallback.get());
     }
     let stage = world.stage(slot, u32::from(cell.orders.get()) + 1);
     let changed = Flyer {

@@ -49,7 +49,7 @@ pub(super) fn note(turn: &mut Turn<'_>, slot: Slot, course: &Course) {
     let cell = &state.airplanes[slot as usize];
     match *course {
         Course::Way { wish, side, .. } => {
-            cell.set_side(side);
+            cell.fallback.set(side);
             cell.orbiting.set(0);
             if wish > 0 {
                 cell.overrides.set(cell.overrides.get() + 1);
@@ -70,7 +70,7 @@ pub(super) fn note(turn: &mut Turn<'_>, slot: Slot, course: &Course) {
 fn move_held(turn: &Turn<'_>, slot: Slot) {
     let Turn { world, state, .. } = turn;
     let (side, v_m_s) =
-        (state.airplanes[slot as usize].side(), state.stage(world, slot).model.v_m_s);
+        (state.airplanes[slot as usize].fallback.get(), state.stage(world, slot).model.v_m_s);
     let omega = side.sign() * world.orbit_rad_s[slot as usize];
     let mut held = state.held(slot);
     for _ in 0..world.timing.points_per_dt() {

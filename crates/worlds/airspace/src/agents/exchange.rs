@@ -270,8 +270,8 @@ impl Agent {
                 flyers.extend(possible);
             }
         }
-        let frame = (self.steps(), self.dtau_s());
-        filter(&flyers, &candidates, frame, self.scene.certainty)[mine]
+        let (steps, dtau_s) = (self.steps(), self.dtau_s());
+        filter(&flyers, &candidates, steps, dtau_s, self.scene.certainty)[mine]
     }
 
     /// Returns the members with which an unheard airplane is named, as far as they say so themselves.

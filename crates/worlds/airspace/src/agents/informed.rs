@@ -3,11 +3,11 @@
 
 mod check;
 
-use super::Conclusion;
 use super::contact::Beacon;
-use super::link::{self, Most};
+use super::optimizer::{Optimizer, Step};
 use super::own_ship::OwnShip;
 use super::party::Unsound;
+use super::{Decided, Most};
 use crate::flight::{Known, Point, Prediction};
 use crate::objective::{Options, couple, own_costs};
 use serde::{Deserialize, Serialize};
@@ -114,17 +114,16 @@ pub struct Agent {
     /// Number of rounds made.
     round: u32,
     calm: u32,
-    decided: Option<Conclusion>,
 }
 
 impl Agent {
-    /// Returns an agent that has not sent anything yet.
-    pub fn new(own: OwnShip, by_model: bool) -> Self {
+    /// Returns one that has not sent anything yet.
+    pub(crate) fn new(own: OwnShip, by_model: bool) -> Self {
         let mut members: Vec<Member> =
             (0..own.briefing.ids.len()).map(|_| Member::default()).collect();
         members[own.me].options = Some(own.options.clone());
         let player = Player::new(own.options.predictions.len());
-        Self { own, by_model, members, game: None, player, round: 0, calm: 0, decided: None }
+        Self { own, by_model, members, game: None, player, round: 0, calm: 0 }
     }
 
     fn announcement(&self) -> Message {
@@ -141,21 +140,6 @@ impl Agent {
         self.own.settings().estimator == Estimator::Exact
     }
 
-    /// Continues as far as the messages heard allow.
-    fn go_on(&mut self) -> Vec<Message> {
-        let mut said = Vec::new();
-        if self.game.is_none() {
-            if self.members.iter().any(|m| m.options.is_none()) {
-                return said;
-            }
-            self.meet();
-        }
-        while self.decided.is_none() && self.awaits_in_round().is_empty() {
-            said.extend(if self.is_exact() { self.exact_step() } else { self.sampled_step() });
-        }
-        said
-    }
-
     /// Sets up the game and the first distributions, once all options are known.
     fn meet(&mut self) {
         let objective = &self.own.briefing.objective;
@@ -165,7 +149,7 @@ impl Agent {
             for j in i + 1..all.len() {
                 // An exact player needs only the pairs that it is part of.
                 if !self.is_exact() || i == self.own.me || j == self.own.me {
-                    couple(&mut game, objective, (i, all[i]), (j, all[j]));
+                    couple(&mut game, objective, [i, j], [all[i], all[j]]);
                 }
             }
         }
@@ -199,20 +183,18 @@ impl Agent {
         self.members[self.own.me].q.contains_key(&(self.round + 1))
     }
 
-    fn exact_step(&mut self) -> Option<Message> {
+    fn exact_step(&mut self) -> Step<Message> {
         let round = self.round + 1;
         if !self.has_moved() {
-            return Some(self.exact_update(round));
+            return Step::Say(self.exact_update(round));
         }
         let most = self.members.iter().map(|m| m.change(round)).fold(0.0, f64::max);
         let stop = self.own.settings().stop;
         self.calm = stop.calm(self.calm, most);
         self.round = round;
         self.members.iter_mut().for_each(|m| m.forget_before(round));
-        if self.calm >= stop.calm_rounds || round >= stop.max_rounds {
-            self.decide();
-        }
-        None
+        let is_over = self.calm >= stop.calm_rounds || round >= stop.max_rounds;
+        if is_over { Step::Conclude } else { Step::Done }
     }
 
     fn exact_update(&mut self, round: u32) -> Message {
@@ -233,28 +215,24 @@ impl Agent {
     }
 
     /// Draws samples, unless it has; else learns from the samples of all.
-    fn sampled_step(&mut self) -> Option<Message> {
-        let Estimator::Sampled { block, ageing } = self.own.settings().estimator else {
-            return None;
-        };
+    fn sampled_step(&mut self, block: usize, ageing: f64) -> Step<Message> {
         let (me, round) = (self.own.me, self.round);
         if !self.members[me].samples.contains_key(&round) {
-            return Some(self.draw(block));
+            return Step::Say(self.draw(block));
         }
         if round > 0 {
             let most = self.members.iter().map(|m| m.change(round)).fold(0.0, f64::max);
             let stop = self.own.settings().stop;
             self.calm = stop.calm(self.calm, most);
             if self.calm >= stop.calm_rounds || round >= stop.max_rounds {
-                self.decide();
-                return None;
+                return Step::Conclude;
             }
         }
         let change = self.learn(block, ageing);
         self.round += 1;
         self.members[me].changes.insert(self.round, change);
         self.members.iter_mut().for_each(|m| m.forget_before(round));
-        Some(self.draw(block))
+        Step::Say(self.draw(block))
     }
 
     fn draw(&mut self, block: usize) -> Message {
@@ -281,30 +259,25 @@ impl Agent {
         let settings = *self.own.settings();
         self.player.update(settings.update, settings.cooling)
     }
-
-    fn decide(&mut self) {
-        let decided = self.own.decided(&self.player, self.round, self.calm);
-        let beacons = self.members.iter_mut().map(|m| m.beacon.take()).collect();
-        self.decided = Some(Conclusion { decided, beacons });
-    }
 }
 
-impl link::Agent for Agent {
+impl Optimizer for Agent {
     type Message = Message;
-    type Outcome = Conclusion;
+
+    fn own(&self) -> &OwnShip {
+        &self.own
+    }
 
     fn round(&self) -> u32 {
         self.round
     }
 
-    fn start(&mut self) -> Vec<Message> {
-        let mut said = vec![self.announcement()];
-        said.extend(self.go_on());
-        said
+    fn opening(&mut self) -> Message {
+        self.announcement()
     }
 
-    fn check(&self, from: usize, message: &Message) -> Result<(), Unsound> {
-        self.admits(from, message)
+    fn admits(&self, from: usize, message: &Message) -> Result<(), Unsound> {
+        self.checked(from, message)
     }
 
     fn most(&self) -> Most {
@@ -320,10 +293,7 @@ impl link::Agent for Agent {
         Most { bytes, messages: rounds.saturating_add(2) }
     }
 
-    fn on_message(&mut self, from: usize, message: Message) -> Vec<Message> {
-        if self.decided.is_some() {
-            return Vec::new();
-        }
+    fn hear(&mut self, from: usize, message: Message) {
         let member = &mut self.members[from];
         match message {
             Message::Ways { beacon, ways } => {
@@ -348,13 +318,9 @@ impl link::Agent for Agent {
                 member.changes.insert(round, change);
             }
         }
-        self.go_on()
     }
 
-    fn awaits(&self) -> Vec<usize> {
-        if self.decided.is_some() {
-            return Vec::new();
-        }
+    fn missing(&self) -> Vec<usize> {
         if self.game.is_some() {
             return self.awaits_in_round();
         }
@@ -362,11 +328,18 @@ impl link::Agent for Agent {
         (0..self.members.len()).filter(unknown).collect()
     }
 
-    fn expects(&self, other: usize) -> bool {
-        self.own.expects(other)
+    fn step(&mut self) -> Step<Message> {
+        if self.game.is_none() {
+            self.meet();
+            return Step::Done;
+        }
+        match self.own.settings().estimator {
+            Estimator::Exact => self.exact_step(),
+            Estimator::Sampled { block, ageing } => self.sampled_step(block, ageing),
+        }
     }
 
-    fn without(&mut self, other: usize, _: bool) -> Vec<Message> {
+    fn lose(&mut self, other: usize, _: bool) {
         let member = &mut self.members[other];
         member.gone = true;
         if member.options.is_none() {
@@ -378,18 +351,13 @@ impl link::Agent for Agent {
         if self.game.is_some() && member.samples.is_empty() {
             member.samples.insert(0, Vec::new());
         }
-        self.go_on()
     }
 
-    fn at_deadline(&mut self) {
-        self.decide();
+    fn decided(&self) -> Option<Decided> {
+        self.own.decided(&self.player, self.round, self.calm)
     }
 
-    fn is_done(&self) -> bool {
-        self.decided.is_some()
-    }
-
-    fn outcome(&self) -> Option<Conclusion> {
-        self.decided.clone()
+    fn take_beacons(&mut self) -> Vec<Option<Beacon>> {
+        self.members.iter_mut().map(|m| m.beacon.take()).collect()
     }
 }

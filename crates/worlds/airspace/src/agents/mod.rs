@@ -26,6 +26,7 @@ pub mod grouping;
 pub mod informed;
 pub mod intent;
 mod link;
+mod optimizer;
 mod own_ship;
 pub mod packet;
 mod party;
@@ -35,6 +36,7 @@ pub mod traffic;
 
 use contact::Beacon;
 pub use link::{Agent, Endpoint, Most, Radio};
+pub(crate) use optimizer::Optimizing;
 pub use own_ship::{Briefing, Filed, OwnShip};
 pub use party::{Concludes, Ended, Outgoing, Party, Progress, Unsound};
 use serde::{Deserialize, Serialize};

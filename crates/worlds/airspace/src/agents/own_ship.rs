@@ -70,7 +70,7 @@ impl Briefing {
             separation_m: beacon.separation_m,
             ..model.clone()
         };
-        let predictions = self.air.predictions(&model, actions, mission, (beacon.pose, next));
+        let predictions = self.air.predictions(&model, actions, mission, beacon.pose, next);
         Options::new(predictions, beacon.separation_m, beacon.levels).beside(
             &self.intruders,
             &self.objective,
@@ -89,7 +89,8 @@ impl Briefing {
         &self,
         place: usize,
         player: &Player,
-        (rounds, calm): (u32, u32),
+        rounds: u32,
+        calm: u32,
     ) -> Option<Decided> {
         let Settings { estimator, choice, stop, .. } = self.settings;
         let drawn = match estimator {
@@ -187,7 +188,7 @@ impl OwnShip {
     /// Returns the decision of a player of samples or of distributions after some rounds, of which
     /// the last `calm` were calm; none, if it has not learned anything.
     pub(super) fn decided(&self, player: &Player, rounds: u32, calm: u32) -> Option<Decided> {
-        self.briefing.decided(self.me, player, (rounds, calm))
+        self.briefing.decided(self.me, player, rounds, calm)
     }
 
     /// Returns whether another one was heard lately, or is met for the first time.

@@ -1,10 +1,10 @@
 //! The paper's Algorithm 1: an agent per airplane that samples, predicts, and shares both.
 
-use super::Conclusion;
 use super::contact::Beacon;
-use super::link::{self, Most};
+use super::optimizer::{Optimizer, Step};
 use super::own_ship::OwnShip;
 use super::party::Unsound;
+use super::{Decided, Most};
 use crate::flight::{Levels, Prediction};
 use crate::objective::{Options, own_costs};
 use serde::{Deserialize, Serialize};
@@ -86,12 +86,11 @@ pub struct Agent {
     change: f64,
     samples: Vec<usize>,
     members: Vec<Member>,
-    decided: Option<Conclusion>,
 }
 
 impl Agent {
-    /// Returns an agent that has not sent anything yet.
-    pub fn new(own: OwnShip, block: usize, ageing: f64) -> Self {
+    /// Returns one that has not sent anything yet.
+    pub(crate) fn new(own: OwnShip, block: usize, ageing: f64) -> Self {
         Self {
             own_costs: own_costs(&own.briefing.objective, &own.options),
             player: Player::new(own.options.predictions.len()),
@@ -103,7 +102,6 @@ impl Agent {
             calm: 0,
             change: f64::INFINITY,
             samples: Vec::new(),
-            decided: None,
         }
     }
 
@@ -129,24 +127,6 @@ impl Agent {
     /// Returns whether its own costs of this round are sent.
     fn has_costed(&self) -> bool {
         self.members[self.own.me].costs.contains_key(&self.round)
-    }
-
-    /// Continues as far as the messages heard allow.
-    fn go_on(&mut self) -> Vec<Message> {
-        let mut said = Vec::new();
-        while self.decided.is_none() && link::Agent::awaits(self).is_empty() {
-            if !self.has_costed() {
-                if self.is_settled() {
-                    self.decide();
-                    break;
-                }
-                said.push(self.cost());
-            } else {
-                self.learn();
-                said.push(self.predictions());
-            }
-        }
-        said
     }
 
     /// Returns whether the distributions have settled (line 25). All agents know how far each has
@@ -200,29 +180,20 @@ impl Agent {
         let round = self.round;
         self.members.iter_mut().for_each(|m| m.forget_before(round));
     }
-
-    fn decide(&mut self) {
-        let decided = self.own.decided(&self.player, self.round, self.calm);
-        let beacons = self.members.iter_mut().map(|m| m.beacon.take()).collect();
-        self.decided = Some(Conclusion { decided, beacons });
-    }
 }
 
-impl link::Agent for Agent {
+impl Optimizer for Agent {
     type Message = Message;
-    type Outcome = Conclusion;
+
+    fn opening(&mut self) -> Message {
+        self.predictions()
+    }
 
     fn round(&self) -> u32 {
         self.round
     }
 
-    fn start(&mut self) -> Vec<Message> {
-        let mut said = vec![self.predictions()];
-        said.extend(self.go_on());
-        said
-    }
-
-    fn check(&self, from: usize, message: &Message) -> Result<(), Unsound> {
+    fn admits(&self, from: usize, message: &Message) -> Result<(), Unsound> {
         let briefing = &*self.own.briefing;
         match message {
             Message::Predictions { round, change, beacon, ways } => {
@@ -246,10 +217,7 @@ impl link::Agent for Agent {
         Most { bytes, messages: rounds.saturating_add(1).saturating_mul(2) }
     }
 
-    fn on_message(&mut self, from: usize, message: Message) -> Vec<Message> {
-        if self.decided.is_some() {
-            return Vec::new();
-        }
+    fn hear(&mut self, from: usize, message: Message) {
         let member = &mut self.members[from];
         match message {
             Message::Predictions { round, change, beacon, ways } => {
@@ -261,13 +229,9 @@ impl link::Agent for Agent {
                 member.costs.insert(round, costs);
             }
         }
-        self.go_on()
     }
 
-    fn awaits(&self) -> Vec<usize> {
-        if self.decided.is_some() {
-            return Vec::new();
-        }
+    fn missing(&self) -> Vec<usize> {
         let missing = |member: &Member| match self.has_costed() {
             false => !member.ways.contains_key(&self.round),
             true => !member.costs.contains_key(&self.round),
@@ -275,13 +239,20 @@ impl link::Agent for Agent {
         self.others().filter(|(_, m)| !m.is_gone() && missing(m)).map(|(j, _)| j).collect()
     }
 
-    fn expects(&self, other: usize) -> bool {
-        self.own.expects(other)
+    fn step(&mut self) -> Step<Message> {
+        if self.has_costed() {
+            self.learn();
+            Step::Say(self.predictions())
+        } else if self.is_settled() {
+            Step::Conclude
+        } else {
+            Step::Say(self.cost())
+        }
     }
 
     /// Leaves out the other's part of the costs from now on. A settled agent keeps its last
     /// message; a silent one is presumed where it was.
-    fn without(&mut self, other: usize, is_settled: bool) -> Vec<Message> {
+    fn lose(&mut self, other: usize, is_settled: bool) {
         let member = &mut self.members[other];
         let last = member.ways.values().next_back().and_then(|ways| ways.first());
         member.presumed = Some(match (&member.beacon, last) {
@@ -291,18 +262,17 @@ impl link::Agent for Agent {
             (Some(beacon), _) => self.own.presumed_from(beacon),
             _ => self.own.presumed(other),
         });
-        self.go_on()
     }
 
-    fn at_deadline(&mut self) {
-        self.decide();
+    fn own(&self) -> &OwnShip {
+        &self.own
     }
 
-    fn is_done(&self) -> bool {
-        self.decided.is_some()
+    fn take_beacons(&mut self) -> Vec<Option<Beacon>> {
+        self.members.iter_mut().map(|m| m.beacon.take()).collect()
     }
 
-    fn outcome(&self) -> Option<Conclusion> {
-        self.decided.clone()
+    fn decided(&self) -> Option<Decided> {
+        self.own.decided(&self.player, self.round, self.calm)
     }
 }

@@ -40,14 +40,6 @@ impl Moving {
     }
 }
 
-fn dot(a: Point, b: Point) -> f64 {
-    a[0] * b[0] + a[1] * b[1]
-}
-
-fn minus(a: Point, b: Point) -> Point {
-    [a[0] - b[0], a[1] - b[1]]
-}
-
 fn length(a: Point) -> f64 {
     math::hypot(a[0], a[1])
 }

@@ -6,9 +6,10 @@
 //! of the other's zone. It keeps to this, also after the conflict is no longer predicted, until the
 //! two are past their closest point and apart; then it flies to its way-point again.
 
-use super::{Moving, Reactive, dot, length, minus};
+use super::{Moving, Reactive, length};
 use crate::flight::Point;
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::geometry::{dot, sub};
 use sidestep_kernel::{Slot, math};
 
 /// Closest approaches nearer than this have no direction of their own, so every airplane turns to the
@@ -98,8 +99,8 @@ fn of_slot<'a>(by_slot: &[&'a Moving], slot: Slot) -> Option<&'a Moving> {
 /// Returns the closest approach of two airplanes if one enters the other's zone within the time of
 /// looking ahead, or has entered it.
 fn conflict(own: &Moving, other: &Moving, settings: Reactive) -> Option<Closest> {
-    let (zone_m, apart) = (own.zone_m(other, settings), minus(other.at, own.at));
-    let closing = minus(other.velocity, own.velocity);
+    let (zone_m, apart) = (own.zone_m(other, settings), sub(other.at, own.at));
+    let closing = sub(other.velocity, own.velocity);
     let speed2 = dot(closing, closing).max(STILL);
     let in_s = -dot(apart, closing) / speed2;
     let at = [apart[0] + closing[0] * in_s, apart[1] + closing[1] * in_s];
@@ -129,7 +130,7 @@ fn resolved_rad(
 /// Returns the change of the other's velocity, seen from `own`, with which it would miss the zone.
 fn shift(own: &Moving, other: &Moving, closest: &Closest, settings: Reactive) -> Point {
     let zone_m = own.zone_m(other, settings) * RESOLVES;
-    let apart = minus(other.at, own.at);
+    let apart = sub(other.at, own.at);
     let (distance_m, mut at) = (length(apart).max(1e-9), closest.at);
     let mut miss_m = length(at);
     if miss_m <= HEAD_ON_M {
@@ -148,7 +149,7 @@ fn shift(own: &Moving, other: &Moving, closest: &Closest, settings: Reactive) ->
 
 /// Returns whether a conflict that was found is still to be minded.
 fn is_on(own: &Moving, other: &Moving, settings: Reactive) -> bool {
-    let (apart, closing) = (minus(other.at, own.at), minus(other.velocity, own.velocity));
+    let (apart, closing) = (sub(other.at, own.at), sub(other.velocity, own.velocity));
     let (distance_m, zone_m) = (length(apart), own.zone_m(other, settings));
     let is_past = dot(apart, closing) > 0.0;
     let angle_rad = math::wrap_angle(own.heading_rad - other.heading_rad).abs();

@@ -8,8 +8,9 @@
 //! one that violates the half-planes least. The margin on separations allows for the time that
 //! turning takes.
 
-use super::{Moving, Reactive, dot, length, minus};
+use super::{Moving, Reactive, length};
 use crate::flight::Point;
+use sidestep_kernel::geometry::{dot, sub};
 use sidestep_kernel::math;
 
 /// Number of headings among which an airplane chooses, evenly spaced from the preferred one on.
@@ -56,7 +57,7 @@ pub(in super::super) fn heading_rad<'a>(
 
 /// Returns the velocities of `own` that avoid one neighbor: if that one yields, it does its half.
 fn half_plane(own: &Moving, other: &Moving, settings: Reactive, step_s: f64) -> HalfPlane {
-    let (apart, relative) = (minus(other.at, own.at), minus(own.velocity, other.velocity));
+    let (apart, relative) = (sub(other.at, own.at), sub(own.velocity, other.velocity));
     let radius_m = own.zone_m(other, settings);
     let distance2 = dot(apart, apart);
     let is_too_near = distance2 <= radius_m * radius_m;
@@ -125,7 +126,7 @@ mod tests {
             let lacks = (least - dot(normal, own.velocity)).max(0.0);
             let nearest = [own.velocity[0] + lacks * normal[0], own.velocity[1] + lacks * normal[1]];
             let theirs = by_library(&own, &other);
-            let off = minus(nearest, theirs);
+            let off = sub(nearest, theirs);
             prop_assert!(length(off) < 0.02 + 1e-3 * lacks, "{nearest:?} {theirs:?}");
         }
 

@@ -105,10 +105,11 @@ impl Air {
         model: &Model,
         actions: &[Action],
         mission: &[Point],
-        (pose, next): (Pose, usize),
+        pose: Pose,
+        next: usize,
     ) -> Vec<Prediction> {
         interrupt::look();
-        let mission = self.drifted(mission, (pose.at, next), model.v_m_s);
+        let mission = self.drifted(mission, pose.at, next, model.v_m_s);
         let pilot = self.pilot(model, &mission);
         actions.iter().map(|action| pilot.predict(*action, pose, next, &self.timing)).collect()
     }
@@ -126,7 +127,7 @@ impl Air {
 
     /// Returns the mission as seen from the moving air: each way-point at its place when the
     /// airplane reaches it.
-    fn drifted(&self, mission: &[Point], (mut at, next): (Point, usize), v_m_s: f64) -> Vec<Point> {
+    fn drifted(&self, mission: &[Point], mut at: Point, next: usize, v_m_s: f64) -> Vec<Point> {
         let mut drifted = mission.to_vec();
         if self.is_still() {
             return drifted;

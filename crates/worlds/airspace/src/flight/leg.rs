@@ -9,6 +9,7 @@
 //! it: the distance in a formation never changes, so that no halving would show which way it turns.
 
 use super::motion::{Point, Pose, sinc};
+use sidestep_kernel::geometry::{dot, sub};
 use sidestep_kernel::math;
 
 /// Turn rate in radians per second below which a leg counts as straight: in a whole day it would
@@ -48,6 +49,13 @@ pub struct Leg {
     pub climb_m_s: f64,
     /// Velocity of the air, in meters per second.
     pub drift_m_s: Point,
+}
+
+/// A stretch of time.
+#[derive(Debug, Clone, Copy)]
+struct Span {
+    from_s: f64,
+    until_s: f64,
 }
 
 /// Place, velocity and acceleration at one moment.
@@ -162,20 +170,19 @@ impl Approach {
 
     /// Adds the time that two legs have in common; it must not lie before times that were added already.
     pub fn add(&mut self, a: &Leg, b: &Leg, zone: Zone) {
-        let (from_s, until_s) = (a.from_s.max(b.from_s), a.until_s.min(b.until_s));
-        let Some((from_s, until_s)) = on_one_level(a, b, (from_s, until_s), zone.vertical_m) else {
-            return;
-        };
+        let common = Span { from_s: a.from_s.max(b.from_s), until_s: a.until_s.min(b.until_s) };
+        let Some(level) = on_one_level(a, b, common, zone.vertical_m) else { return };
         let pair = Pair { a, b };
-        let mut moments = vec![from_s];
-        pair.turning_points((from_s, until_s), &mut moments);
-        moments.push(until_s);
+        let mut moments = vec![level.from_s];
+        pair.turning_points(level, &mut moments);
+        moments.push(level.until_s);
         let gap_m = zone.gap_m - ROUNDED_M;
         for ends in moments.windows(2) {
             let (at_from, at_to) = (pair.apart_m(ends[0]), pair.apart_m(ends[1]));
             self.nearest_m = self.nearest_m.min(at_from).min(at_to);
             // Between turning points the distance only grows or only shrinks.
-            let edge = || pair.edge_s((ends[0], ends[1]), at_from < at_to, gap_m);
+            let between = Span { from_s: ends[0], until_s: ends[1] };
+            let edge = || pair.edge_s(between, at_from < at_to, gap_m);
             match (at_from < gap_m, at_to < gap_m) {
                 (true, true) => self.lose(ends[0], ends[1]),
                 (true, false) => self.lose(ends[0], edge()),
@@ -199,12 +206,8 @@ pub fn is_lost(a: &Leg, b: &Leg, t_s: f64, zone: Zone) -> bool {
 }
 
 /// Returns the part of an interval in which two legs are on one level.
-fn on_one_level(
-    a: &Leg,
-    b: &Leg,
-    (from_s, until_s): (f64, f64),
-    vertical_m: f64,
-) -> Option<(f64, f64)> {
+fn on_one_level(a: &Leg, b: &Leg, within: Span, vertical_m: f64) -> Option<Span> {
+    let Span { from_s, until_s } = within;
     let above_m = a.altitude_at_m(from_s) - b.altitude_at_m(from_s);
     let climb_m_s = a.climb_m_s - b.climb_m_s;
     let (mut first_s, mut last_s) = (from_s, until_s);
@@ -215,7 +218,8 @@ fn on_one_level(
     } else if above_m.abs() >= vertical_m {
         return None;
     }
-    (first_s <= last_s && from_s <= until_s).then_some((first_s, last_s))
+    let part = Span { from_s: first_s, until_s: last_s };
+    (first_s <= last_s && from_s <= until_s).then_some(part)
 }
 
 /// Two legs, seen from the first.
@@ -228,11 +232,10 @@ struct Pair<'a> {
 impl Pair<'_> {
     fn motion(&self, t_s: f64) -> Motion {
         let (a, b) = (self.a.motion(t_s), self.b.motion(t_s));
-        let minus = |b: Point, a: Point| [b[0] - a[0], b[1] - a[1]];
         Motion {
-            at: minus(b.at, a.at),
-            velocity: minus(b.velocity, a.velocity),
-            acceleration: minus(b.acceleration, a.acceleration),
+            at: sub(b.at, a.at),
+            velocity: sub(b.velocity, a.velocity),
+            acceleration: sub(b.acceleration, a.acceleration),
         }
     }
 
@@ -249,13 +252,13 @@ impl Pair<'_> {
 
     /// Adds the moments within an interval at which the distance turns from shrinking to growing or
     /// back, in order. Returns the number of intervals that it took.
-    fn turning_points(&self, (from_s, until_s): (f64, f64), found: &mut Vec<f64>) -> u64 {
+    fn turning_points(&self, within: Span, found: &mut Vec<f64>) -> u64 {
         if self.turns_as_one() {
-            self.alignments((from_s, until_s), found);
+            self.alignments(within, found);
             return 1;
         }
-        let ends = [self.slope(from_s).0, self.slope(until_s).0];
-        self.search((from_s, until_s), ends, self.most_bend(from_s, until_s), found)
+        let ends = [self.slope(within.from_s).0, self.slope(within.until_s).0];
+        self.search(within, ends, self.most_bend(within), found)
     }
 
     /// Returns whether both turn at one rate in the same air, so that one is on a circle as the other sees it.
@@ -271,7 +274,7 @@ impl Pair<'_> {
     /// The relative velocity `w` turns as both do, so that half of the first derivative of the squared distance
     /// from `d` is `d·w cos(ωs) + (d×w + w²/ω) sin(ωs)` (`d×w` with the normal that `w` turns to). Its zeros are
     /// computed without the center, which is far away where both fly almost straight.
-    fn alignments(&self, (from_s, until_s): (f64, f64), found: &mut Vec<f64>) {
+    fn alignments(&self, Span { from_s, until_s }: Span, found: &mut Vec<f64>) {
         let (omega_rad_s, long_s) = (self.a.omega_rad_s, until_s - from_s);
         let Motion { at, velocity: [vx, vy], .. } = self.motion(from_s);
         let cos_part = -omega_rad_s * dot(at, [vx, vy]);
@@ -291,9 +294,10 @@ impl Pair<'_> {
     }
 
     /// Returns a bound on how fast half of the second derivative changes in an interval.
-    fn most_bend(&self, from_s: f64, until_s: f64) -> f64 {
+    fn most_bend(&self, within: Span) -> f64 {
+        let Span { from_s, until_s } = within;
         let s = until_s - from_s;
-        let [speed_m_s, pull, jerk] = self.most_apart(from_s, until_s);
+        let [speed_m_s, pull, jerk] = self.most_apart(within);
         let start = self.motion(from_s);
         let speed_m_s = speed_m_s.min(math::hypot(start.velocity[0], start.velocity[1]) + pull * s);
         let apart_m = math::hypot(start.at[0], start.at[1]) + speed_m_s * s;
@@ -303,7 +307,7 @@ impl Pair<'_> {
     /// Returns bounds on the relative velocity, acceleration and jerk in an interval. These are differences of
     /// two turning vectors, which are small where the vectors have almost one length and direction, as those of
     /// airplanes that fly almost in formation.
-    fn most_apart(&self, from_s: f64, until_s: f64) -> [f64; 3] {
+    fn most_apart(&self, Span { from_s, until_s }: Span) -> [f64; 3] {
         let Pair { a, b } = self;
         let heading_rad =
             |leg: &Leg| leg.pose.heading_rad + leg.omega_rad_s * (from_s - leg.from_s);
@@ -324,13 +328,8 @@ impl Pair<'_> {
     }
 
     /// Adds the zeros of the slope. Returns the number of intervals that it took.
-    fn search(
-        &self,
-        (from_s, until_s): (f64, f64),
-        ends: [f64; 2],
-        bend: f64,
-        found: &mut Vec<f64>,
-    ) -> u64 {
+    fn search(&self, within: Span, ends: [f64; 2], bend: f64, found: &mut Vec<f64>) -> u64 {
+        let Span { from_s, until_s } = within;
         let half_s = 0.5 * (until_s - from_s);
         if half_s < FINEST_S {
             return 1;
@@ -341,7 +340,7 @@ impl Pair<'_> {
             // The slope only rises or only falls, so it has at most one zero.
             if (ends[0] < 0.0) != (ends[1] < 0.0) {
                 let slope = |t_s: f64| self.slope(t_s);
-                found.push(zero_s((from_s, until_s), ends[0] < 0.0, slope));
+                found.push(zero_s(within, ends[0] < 0.0, slope));
             }
             return 1;
         }
@@ -351,14 +350,15 @@ impl Pair<'_> {
         if half_s < FLAT_S && is_flat(varies_m2, self.apart_m(middle_s)) {
             return 1;
         }
-        let before = self.search((from_s, middle_s), [ends[0], at_middle], bend, found);
-        before + self.search((middle_s, until_s), [at_middle, ends[1]], bend, found)
+        let halves = [Span { from_s, until_s: middle_s }, Span { from_s: middle_s, until_s }];
+        let before = self.search(halves[0], [ends[0], at_middle], bend, found);
+        before + self.search(halves[1], [at_middle, ends[1]], bend, found)
     }
 
     /// Returns when the distance passes `gap_m` in an interval in which it only grows or only
     /// shrinks.
-    fn edge_s(&self, interval_s: (f64, f64), grows: bool, gap_m: f64) -> f64 {
-        zero_s(interval_s, grows, |t_s| {
+    fn edge_s(&self, within: Span, grows: bool, gap_m: f64) -> f64 {
+        zero_s(within, grows, |t_s| {
             let Motion { at, velocity, .. } = self.motion(t_s);
             (0.5 * (dot(at, at) - gap_m * gap_m), dot(at, velocity))
         })
@@ -370,17 +370,10 @@ fn is_flat(varies_m2: f64, apart_m: f64) -> bool {
     varies_m2 < FLAT_M * apart_m.max(0.5 * FLAT_M)
 }
 
-fn dot(a: Point, b: Point) -> f64 {
-    a[0] * b[0] + a[1] * b[1]
-}
-
 /// Returns the zero of a function that only rises, or only falls, from its values and slopes: by
 /// Newton's steps, and by halving where these lead out of the interval.
-fn zero_s(
-    (mut from_s, mut until_s): (f64, f64),
-    rises: bool,
-    of: impl Fn(f64) -> (f64, f64),
-) -> f64 {
+fn zero_s(within: Span, rises: bool, of: impl Fn(f64) -> (f64, f64)) -> f64 {
+    let Span { mut from_s, mut until_s } = within;
     let mut t_s = 0.5 * (from_s + until_s);
     for _ in 0..100 {
         let (value, slope) = of(t_s);
@@ -466,7 +459,8 @@ mod tests {
                     let a = leg([0.0, 0.0], 0.3, 250.0, omega_rad_s);
                     let b = leg([apart_m, 0.0], 0.3 + off, 250.0, omega_rad_s * (1.0 + off));
                     let pair = Pair { a: &a, b: &b };
-                    let looks = pair.turning_points((0.0, 60.0), &mut Vec::new());
+                    let looks =
+                        pair.turning_points(Span { from_s: 0.0, until_s: 60.0 }, &mut Vec::new());
                     assert!(looks < 20_000, "{omega_rad_s} {off} {apart_m}: {looks} intervals");
                 }
             }

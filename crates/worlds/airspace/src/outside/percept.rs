@@ -5,6 +5,7 @@ use crate::flight::{Known, Point, Stage, distance_m};
 use crate::intruder::Intruder;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::control::{Bounds, CellsMut, Space};
+use sidestep_kernel::geometry::sub;
 use sidestep_kernel::math::{atan2, hypot, wrap_angle};
 use sidestep_kernel::{EntityId, Slot};
 use std::array::from_fn;
@@ -100,7 +101,7 @@ impl Percept {
             heading_rad: within_a_turn(own.pose.heading_rad),
             speed_m_s: model.v_m_s,
             turn_rate_rad_s: state.turn_rate_rad_s(own.slot),
-            way_point: ahead.first().map_or([0.0; 2], |&goal| minus(goal, own.pose.at)),
+            way_point: ahead.first().map_or([0.0; 2], |&goal| sub(goal, own.pose.at)),
             way_points_left: ahead.len(),
             delay_s: delay_s(turn, own, ahead),
             neighbors: neighbors(turn, own, all),
@@ -172,7 +173,7 @@ fn neighbors(turn: &Turn<'_>, own: &Known, all: &[Seen]) -> Vec<Neighbor> {
     let separation_m = world.stage(own.slot, own.orders).model.separation_m;
     let neighbor = |(_, seen): (f64, &Seen)| Neighbor {
         seen: *seen,
-        apart: minus(seen.at, own.pose.at),
+        apart: sub(seen.at, own.pose.at),
         above_m: seen.altitude_m - own.altitude_m,
         separation_m: separation_m.max(seen.separation_m),
         is_named: named.binary_search(&seen.slot).is_ok(),
@@ -204,10 +205,6 @@ fn delay_s(turn: &Turn<'_>, own: &Known, ahead: &[Point]) -> f64 {
 /// Returns a heading within half a turn to either side; one that already is stays the same to the bit.
 fn within_a_turn(heading_rad: f64) -> f64 {
     if heading_rad.abs() <= PI { heading_rad } else { wrap_angle(heading_rad) }
-}
-
-fn minus(a: Point, b: Point) -> Point {
-    [a[0] - b[0], a[1] - b[1]]
 }
 
 /// Returns the spaces of the percepts of a team's airplanes.

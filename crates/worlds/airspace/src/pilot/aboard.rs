@@ -305,10 +305,7 @@ impl Pilot {
     fn talk(&mut self, topic: Topic, tick: u64) {
         let Some(turn) = &mut self.turn else { return };
         let world = &*self.world;
-        let known: Arc<[EntityId]> = match topic {
-            Topic::Shield => turn.in_scene().into(),
-            Topic::Group | Topic::Decision => turn.members.clone(),
-        };
+        let known = turn.known_in(topic);
         let Turn { sight, schedule, members, unheard, considered, .. } = turn;
         let (begins, ends) = schedule.of(topic, tick);
         let id = match topic {
@@ -332,7 +329,7 @@ impl Pilot {
             Topic::Shield => {
                 let allowed = allowed(world, sight, considered);
                 let ways: Vec<_> = allowed.iter().map(|&k| considered.ways[k].clone()).collect();
-                let party = proposes(world, (sight, unheard), contacts, &ways, radio);
+                let party = proposes(world, sight, unheard, contacts, &ways, radio);
                 Stage::Shielding(Talk::new(frame, party), allowed)
             }
             Topic::Group => Stage::Grouping(Talk::new(frame, looks(world, sight, contacts, radio))),
@@ -341,7 +338,7 @@ impl Pilot {
                 Stage::Deciding(Talk::new(frame, party))
             }
             Topic::Decision => {
-                let party = optimizes(world, (sight, unheard), contacts, radio);
+                let party = optimizes(world, sight, unheard, contacts, radio);
                 Stage::Deciding(Talk::new(frame, party))
             }
         };

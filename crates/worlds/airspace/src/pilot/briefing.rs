@@ -32,7 +32,8 @@ pub(super) fn brief(world: &AirspaceWorld, sight: &Sight, not_heard: &[Sighted])
 /// Returns the knowledge of an airplane's agent; `contacts` hold its knowledge of others from earlier cycles.
 pub(super) fn own_ship(
     world: &AirspaceWorld,
-    (sight, unheard): (&Sight, &[Sighted]),
+    sight: &Sight,
+    unheard: &[Sighted],
     contacts: &Contacts,
 ) -> OwnShip {
     let (briefing, known) = (brief(world, sight, unheard), sight.own.known());

@@ -78,7 +78,7 @@ impl Own {
             altitude_m: cell.altitude_m.get(),
             next: cell.next.get(),
             orders: cell.orders.get().into(),
-            fallback: cell.side(),
+            fallback: cell.fallback.get(),
             refusals: cell.overrides.get(),
             named: state.named_with(slot).to_vec(),
             wish: state.wish(slot),
@@ -147,7 +147,7 @@ impl Sighted {
             id: slot,
             pose: seen(world, slot, now, cell.pose()),
             altitude_m: cell.altitude_m.get(),
-            orbit: (cell.orbiting.get() > 0).then(|| cell.side()),
+            orbit: (cell.orbiting.get() > 0).then(|| cell.fallback.get()),
         }
     }
 

@@ -8,8 +8,8 @@ use crate::agents::exchange::{self, Agreed};
 use crate::agents::grouping::{self, Found, Sighted};
 use crate::agents::intent::{self, Intent};
 use crate::agents::{
-    Agent, Concludes, Conclusion, Ended, Endpoint, Outgoing, Party, Progress, Radio, Unsound,
-    informed, sampling,
+    Agent, Concludes, Conclusion, Ended, Endpoint, Optimizing, Outgoing, Party, Progress, Radio,
+    Unsound, informed, sampling,
 };
 use crate::baseline::mvp::Resolving;
 use crate::deploy::Deployment;
@@ -141,22 +141,23 @@ fn expected(sight: &Sight, contacts: &Contacts) -> Vec<bool> {
 /// Returns the deployment's party to an optimization, among airplanes nearby that are `unheard`.
 pub(super) fn optimizes(
     world: &AirspaceWorld,
-    (sight, unheard): (&Sight, &[Sighted]),
+    sight: &Sight,
+    unheard: &[Sighted],
     contacts: &Contacts,
     radio: Radio,
 ) -> Box<Speaker> {
-    let own = own_ship(world, (sight, unheard), contacts);
+    let own = own_ship(world, sight, unheard, contacts);
     match (world.deployment, world.settings.estimator) {
         (Deployment::Pim | Deployment::HierarchicalPim, _) => {
             let is_hierarchy = world.deployment == Deployment::HierarchicalPim;
             Box::new(Any(Host::new(own, is_hierarchy, radio)))
         }
         (Deployment::Team, Estimator::Sampled { block, ageing }) => {
-            endpoint(sampling::Agent::new(own, block, ageing), radio)
+            endpoint(Optimizing::new(sampling::Agent::new(own, block, ageing)), radio)
         }
         (deployment, _) => {
             let by_model = deployment == Deployment::CompactTeam;
-            endpoint(informed::Agent::new(own, by_model), radio)
+            endpoint(Optimizing::new(informed::Agent::new(own, by_model)), radio)
         }
     }
 }
@@ -188,7 +189,8 @@ pub(super) fn tells(
 /// Returns the party to the shield's exchange of an airplane that may fly some ways.
 pub(super) fn proposes(
     world: &AirspaceWorld,
-    (sight, unheard): (&Sight, &[Sighted]),
+    sight: &Sight,
+    unheard: &[Sighted],
     contacts: &Contacts,
     ways: &[Way],
     radio: Radio,

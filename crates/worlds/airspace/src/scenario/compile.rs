@@ -111,16 +111,13 @@ impl<'a> Compiler<'a> {
         let timing = self.timing()?;
         let replay = self.replay(&timing);
         let airplanes = self.airplanes(&streams, replay)?;
-        let radius_m = airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
-        let tolerance_m = section.tolerance_m.map_or((radius_m / 5.0).max(1.0), f64::from);
         let vertical_m = section.vertical_m.map_or(300.0, f64::from) - ROUNDED_M;
-        let network = self.network(&timing, &airplanes)?;
         let world = AirspaceWorld {
+            network: self.network(&timing, &airplanes)?,
             wind_m_s: self.wind_m_s(&airplanes)?,
+            passing: self.passing(&airplanes),
             airplanes: Arc::new(airplanes),
             timing,
-            network,
-            passing: Passing { tolerance_m, passes: true },
             objective: self.objective(vertical_m, timing.dtau_s),
             settings: self.settings()?,
             holds_s: section.holds_s.0.clone(),
@@ -129,10 +126,7 @@ impl<'a> Compiler<'a> {
             mvp: section.mvp.or(MVP),
             orca: section.orca.or(ORCA),
             deployment: section.deployment,
-            groups: section
-                .groups
-                .as_ref()
-                .map_or_else(Grouping::default, |given| *given.get_ref()),
+            groups: section.groups.as_ref().map(|given| *given.get_ref()).unwrap_or_default(),
             group_bytes: (section.group_memory_gib.map_or(2.0, f64::from) * GIB) as u64,
             shield: section.shield.0,
             vertical_m,
@@ -152,6 +146,14 @@ impl<'a> Compiler<'a> {
             teams: Arc::default(),
         };
         Ok(world.prepared(self.known))
+    }
+
+    /// Returns the rule for way-points: reached within a fifth of the largest separation, unless given.
+    fn passing(&self, airplanes: &[Airplane]) -> Passing {
+        let radius_m = airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
+        let given = self.file.airspace.tolerance_m;
+        let tolerance_m = given.map_or((radius_m / 5.0).max(1.0), f64::from);
+        Passing { tolerance_m, passes: true }
     }
 
     fn disturbance(&self) -> Disturbance {

@@ -7,10 +7,8 @@ use crate::flight::Timing;
 use crate::flight::{FlightOrder, Task};
 use schemars::JsonSchema;
 use serde::Deserialize;
-use serde_json::{Value, json};
 use sidestep_kernel::network::{self, Network};
 use sidestep_kernel::{EntityId, InputError};
-use sidestep_scenario::Rule;
 use sidestep_scenario::network::{Names, Wrong, check_once, check_sides, during, for_ever};
 
 pub(super) type NetworkSection = sidestep_scenario::network::NetworkSection<Airplanes>;
@@ -60,24 +58,6 @@ pub(super) struct OneWay {
     until_s: f64,
 }
 
-/// A time above 0 that a clock can resolve.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Latency;
-
-impl Rule for Latency {
-    fn allows(number: f64) -> bool {
-        number >= 1e-6 && number.is_finite()
-    }
-
-    fn words() -> String {
-        "at least 1e-6 s".into()
-    }
-
-    fn limits() -> Value {
-        json!({ "minimum": 1e-6 })
-    }
-}
-
 /// The airplanes of a scenario, so many, with ids from 0 on.
 #[derive(Debug)]
 pub(super) struct Airplanes(usize);
@@ -99,9 +79,9 @@ impl Names for Airplanes {
     type Silence = Silence;
     type Partition = Partition;
     type OneWay = OneWay;
-    type Latency = Latency;
 
     const LATENCY_S: f64 = 0.001;
+    const SHORTEST_LATENCY_S: f64 = 1e-6;
     const TALKS: u32 = 2;
     const LONGEST_DEADLINE: &str = "at most half of dt_s: it holds for the optimization and again for the \
                                     shield's exchange";

@@ -1,12 +1,13 @@
 //! Orbits, which are the shield's fallbacks, and a test of whether motions stay apart.
 //!
 //! Ways are compared with a safe bound on how fast two airplanes can close in, halving intervals
-//! until the bound decides ([`stays_apart`]); orbits of one turn rate have a closed form, of
+//! until the bound decides ([`apart_for`]); orbits of one turn rate have a closed form, of
 //! opposite ones a common period that is searched the same way, and of any others are kept apart
 //! as whole circles.
 
 use crate::flight::{Point, Pose, distance_m};
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::column::Coded;
 use sidestep_kernel::math;
 
 /// Length in seconds below which an interval is no longer halved: undecided counts as too near.
@@ -36,6 +37,20 @@ impl Side {
             Self::Left => 1.0,
             Self::Right => -1.0,
         }
+    }
+}
+
+impl Coded for Side {
+    type Code = u8;
+
+    #[inline(always)]
+    fn code(self) -> u8 {
+        self as u8
+    }
+
+    #[inline(always)]
+    fn of_code(code: u8) -> Self {
+        Self::BOTH[usize::from(code & 1)]
     }
 }
 
@@ -107,65 +122,61 @@ impl Orbit {
             let period_s = std::f64::consts::TAU / self.omega_rad_s.abs();
             let closing_m_s = self.speed_m_s() + other.speed_m_s();
             let apart = |t_s: f64| distance_m(self.at(t_s), other.at(t_s));
-            return stays_apart(&apart, (0.0, period_s), closing_m_s, gap_m);
+            return apart_for(&apart, period_s, closing_m_s, gap_m);
         }
         false
     }
 }
 
 /// Returns whether a distance that changes by at most `closing_m_s` per second stays at least
-/// `gap_m` for some seconds; the answer is never wrongly yes.
+/// `gap_m` for some seconds. Found by halving; the answer is never wrongly yes.
 pub(crate) fn apart_for(
     distance_m: &impl Fn(f64) -> f64,
     seconds: f64,
     closing_m_s: f64,
     gap_m: f64,
 ) -> bool {
-    stays_apart(distance_m, (0.0, seconds), closing_m_s, gap_m)
+    let finest_s = FINEST_S.max(FINEST_PART * seconds);
+    let halving = Halving { distance_m, closing_m_s, finest_s, gap_m };
+    let (from, to) = (halving.look(0.0), halving.look(seconds));
+    from.far_m >= gap_m && to.far_m >= gap_m && halving.stays_apart(from, to)
 }
 
-/// Returns whether a distance that changes by at most `closing_m_s` per second stays at least
-/// `gap_m` during the interval. Found by halving; the answer is never wrongly yes.
-pub(crate) fn stays_apart(
-    distance_m: &impl Fn(f64) -> f64,
-    (from_s, to_s): (f64, f64),
+/// A search for a moment at which a distance is less than `gap_m`.
+struct Halving<'a, F> {
+    distance_m: &'a F,
     closing_m_s: f64,
+    /// Length in seconds below which an interval is no longer halved.
+    finest_s: f64,
     gap_m: f64,
-) -> bool {
-    let (at_from, at_to) = (distance_m(from_s), distance_m(to_s));
-    if at_from < gap_m || at_to < gap_m {
-        return false;
-    }
-    let finest_s = FINEST_S.max(FINEST_PART * (to_s - from_s));
-    halve(distance_m, (from_s, at_from), (to_s, at_to), (closing_m_s, finest_s), gap_m)
 }
 
-fn halve(
-    distance_m: &impl Fn(f64) -> f64,
-    (from_s, at_from): (f64, f64),
-    (to_s, at_to): (f64, f64),
-    (closing_m_s, finest_s): (f64, f64),
-    gap_m: f64,
-) -> bool {
-    // The smallest distance possible between the two ends.
-    let nearest = 0.5 * (at_from + at_to - closing_m_s * (to_s - from_s));
-    if nearest >= gap_m {
-        return true;
+/// A distance at a moment.
+#[derive(Clone, Copy)]
+struct Look {
+    t_s: f64,
+    far_m: f64,
+}
+
+impl<F: Fn(f64) -> f64> Halving<'_, F> {
+    fn look(&self, t_s: f64) -> Look {
+        Look { t_s, far_m: (self.distance_m)(t_s) }
     }
-    if to_s - from_s < finest_s {
-        return false;
+
+    /// Returns whether the distance is large enough between two looks, at which it is.
+    fn stays_apart(&self, from: Look, to: Look) -> bool {
+        let long_s = to.t_s - from.t_s;
+        // The smallest distance possible between the two ends.
+        let nearest = 0.5 * (from.far_m + to.far_m - self.closing_m_s * long_s);
+        if nearest >= self.gap_m {
+            return true;
+        }
+        if long_s < self.finest_s {
+            return false;
+        }
+        let middle = self.look(0.5 * (from.t_s + to.t_s));
+        middle.far_m >= self.gap_m && self.stays_apart(from, middle) && self.stays_apart(middle, to)
     }
-    let middle_s = 0.5 * (from_s + to_s);
-    let at_middle = distance_m(middle_s);
-    at_middle >= gap_m
-        && halve(
-            distance_m,
-            (from_s, at_from),
-            (middle_s, at_middle),
-            (closing_m_s, finest_s),
-            gap_m,
-        )
-        && halve(distance_m, (middle_s, at_middle), (to_s, at_to), (closing_m_s, finest_s), gap_m)
 }
 
 #[cfg(test)]
@@ -183,7 +194,7 @@ mod tests {
                     looks.set(looks.get() + 1);
                     500.0 + above_m
                 };
-                let _ = stays_apart(&distance, (0.0, period_s), 70.0, 500.0);
+                let _ = apart_for(&distance, period_s, 70.0, 500.0);
                 assert!(looks.get() <= 2_200_000, "{period_s} s, {above_m} m: {}", looks.get());
             }
         }
@@ -207,7 +218,7 @@ mod tests {
             base in 300.0f64..800.0, swing in 0.0f64..300.0, rate in 0.01f64..0.2, gap_m in 200.0f64..600.0,
         ) {
             let distance = |t_s: f64| base + swing * math::cos(rate * t_s);
-            let found = stays_apart(&distance, (0.0, 60.0), swing * rate + 1e-9, gap_m);
+            let found = apart_for(&distance, 60.0, swing * rate + 1e-9, gap_m);
             let nearest = (0..6000).map(|k| distance(f64::from(k) / 100.0)).fold(f64::INFINITY, f64::min);
             if found {
                 prop_assert!(nearest >= gap_m - 1e-6);

@@ -1,7 +1,7 @@
 //! Plans: a way for one `dt`, and then an orbit forever.
 
 use super::flyer::Flyer;
-use super::orbit::{Orbit, Side, stays_apart};
+use super::orbit::{Orbit, Side, apart_for};
 use crate::flight::{Pose, distance_m};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::interrupt;
@@ -106,7 +106,7 @@ impl Plan {
                 plan.poses[k].step(plan.flyer.v_m_s, plan.omegas_rad_s[k], t_s).at
             };
             let apart = |t_s: f64| distance_m(at(self, t_s), at(other, t_s));
-            stays_apart(&apart, (0.0, self.dtau_s), closing_m_s, gap_m)
+            apart_for(&apart, self.dtau_s, closing_m_s, gap_m)
         })
     }
 

@@ -30,10 +30,11 @@ pub enum Certainty {
 pub fn filter(
     flyers: &[Flyer],
     candidates: &[Vec<Way>],
-    frame: (usize, f64),
+    steps: usize,
+    dtau_s: f64,
     certainty: Certainty,
 ) -> Vec<Decision> {
-    let mut search = Search::new(flyers, candidates, frame, certainty);
+    let mut search = Search::new(flyers, candidates, steps, dtau_s, certainty);
     search.until_compatible();
     search.better_again();
     search.plans.iter().map(|p| Decision { candidate: p.candidate, fallback: p.side }).collect()
@@ -54,7 +55,8 @@ impl<'a> Search<'a> {
     fn new(
         flyers: &'a [Flyer],
         candidates: &'a [Vec<Way>],
-        (steps, dtau_s): (usize, f64),
+        steps: usize,
+        dtau_s: f64,
         certainty: Certainty,
     ) -> Self {
         let fallbacks: Vec<Plan> =

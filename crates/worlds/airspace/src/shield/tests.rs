@@ -98,7 +98,7 @@ proptest! {
             wishes.iter().map(way).collect()
         }).collect();
         let certainty = if mixable { Certainty::Mixable } else { Certainty::Sure };
-        let mut decisions = filter(&flyers, &candidates, (STEPS, DTAU_S), certainty);
+        let mut decisions = filter(&flyers, &candidates, STEPS, DTAU_S, certainty);
         if mixable {
             for ((decision, follows), flyer) in decisions.iter_mut().zip(follow).zip(&flyers) {
                 if !follows {
@@ -158,7 +158,7 @@ proptest! {
         let flyers = [flyer(0.0, 0.0, 0.0, 0), flyer(x, 0.0, 3.0, 1)];
         let way = || Way { omegas_rad_s: vec![part * flyers[0].orbit_rad_s; STEPS] };
         let wishes = [vec![way()], vec![way()]];
-        let decisions = filter(&flyers, &wishes, (STEPS, DTAU_S), Certainty::Sure);
+        let decisions = filter(&flyers, &wishes, STEPS, DTAU_S, Certainty::Sure);
         prop_assert!(decisions.iter().all(|d| d.candidate == Some(0)));
     }
 }
@@ -183,7 +183,7 @@ fn two_that_came_in_too_close_are_left_to_the_method_and_nobody_else_is() {
     let straight = || vec![Way { omegas_rad_s: vec![0.0; STEPS] }];
     let wishes = [straight(), straight()];
     let of_each_other = [close(0.0, 0, 1), close(100.0, 1, 0)];
-    let wanted = filter(&of_each_other, &wishes, (STEPS, DTAU_S), Certainty::Sure);
+    let wanted = filter(&of_each_other, &wishes, STEPS, DTAU_S, Certainty::Sure);
     assert!(wanted.iter().all(|d| d.candidate == Some(0)), "{wanted:?}");
     // In each other's way, and both are named with others.
     let mut of_others = [close(0.0, 0, 7), close(0.0, 1, 8)];
@@ -192,7 +192,7 @@ fn two_that_came_in_too_close_are_left_to_the_method_and_nobody_else_is() {
     of_others.iter_mut().for_each(|f| f.fallback = Side::Right);
     assert!(nearest_on_orbits(&of_others, 400) > 500.0);
     assert!(of_others[0].is_safe_with(&of_others[1]));
-    let kept = filter(&of_others, &wishes, (STEPS, DTAU_S), Certainty::Sure);
+    let kept = filter(&of_others, &wishes, STEPS, DTAU_S, Certainty::Sure);
     assert!(kept.iter().any(|d| d.candidate.is_none()), "{kept:?}");
 }
 

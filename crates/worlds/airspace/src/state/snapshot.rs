@@ -1,5 +1,6 @@
 //! Snapshots of a state by id, and their digests.
 
+use super::end::Ended;
 use crate::agents::contact::Contacts;
 use crate::baseline::mvp::Resolving;
 use crate::flight::Pose;
@@ -7,6 +8,7 @@ use crate::pilot::Control;
 use crate::shield::Side;
 use crate::wish::Wish;
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::column::Coded;
 use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::{Cycle, Digest, EntityId};
 
@@ -15,8 +17,8 @@ use sidestep_kernel::{Cycle, Digest, EntityId};
 pub struct AirplaneRecord {
     /// Pose at the start of the cycle.
     pub pose: Pose,
-    /// See [`super::Cell::arrived`].
-    pub arrived: u64,
+    /// See [`super::Cell::ended`].
+    pub ended: Ended,
     /// Number of way-points done with, overrides, orbits, and orbits in a row.
     pub counts: [u32; 4],
     /// Side of the stored fallback.
@@ -80,9 +82,9 @@ impl Snapshot {
         self.held.iter().for_each(|pose| hash_pose(&mut hasher, pose));
         for airplane in &self.airplanes {
             hash_pose(&mut hasher, &airplane.pose);
-            hasher.u64(airplane.arrived);
+            hasher.u64(airplane.ended.code());
             airplane.counts.iter().for_each(|&n| hasher.u32(n));
-            hasher.u8(airplane.fallback as u8);
+            hasher.u8(airplane.fallback.code());
             // Left out without orders, because the altitude then is the scenario's, or that of the
             // track.
             let [orders, waits] = airplane.orders;

@@ -4,10 +4,8 @@ use super::{ChainSpec, Compiler};
 use crate::deploy::kind::Deployment;
 use schemars::JsonSchema;
 use serde::Deserialize;
-use serde_json::{Value, json};
 use sidestep_kernel::network::{self, Network};
 use sidestep_kernel::{EntityId, InputError};
-use sidestep_scenario::Rule;
 use sidestep_scenario::network::{Names, Wrong, check_sides, during, for_ever};
 
 pub(super) type NetworkSection = sidestep_scenario::network::NetworkSection<Connectors>;
@@ -66,24 +64,6 @@ pub(super) struct OneWay {
     until_s: f64,
 }
 
-/// A time above 0 that a clock can resolve.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Latency;
-
-impl Rule for Latency {
-    fn allows(number: f64) -> bool {
-        number >= 1e-7 && number.is_finite()
-    }
-
-    fn words() -> String {
-        "at least 1e-7 s".into()
-    }
-
-    fn limits() -> Value {
-        json!({ "minimum": 1e-7 })
-    }
-}
-
 /// The connectors of a scenario: their number in each chain. On the network they are counted on, chain
 /// after chain.
 #[derive(Debug)]
@@ -114,10 +94,10 @@ impl Names for Connectors {
     type Silence = Silence;
     type Partition = Partition;
     type OneWay = OneWay;
-    type Latency = Latency;
 
     // That of a bus along the chain.
     const LATENCY_S: f64 = 1e-5;
+    const SHORTEST_LATENCY_S: f64 = 1e-7;
     const TALKS: u32 = 1;
     const LONGEST_DEADLINE: &str = "at most dt_s";
 

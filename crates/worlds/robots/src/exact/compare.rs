@@ -139,7 +139,7 @@ fn pose(simulation: &RobotsRun) -> Pose {
     let (world, state) = (simulation.world(), simulation.state());
     let slot = world.robots()[0];
     let (col, row) = world.map_position(state.at(slot));
-    let heading = state.bodies[slot as usize].facing.get();
+    let heading = state.bodies[slot as usize].facing.get().heading();
     Pose { col: col as i32, row: row as i32, heading }
 }
 

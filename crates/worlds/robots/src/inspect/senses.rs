@@ -103,7 +103,7 @@ impl<T: BoxWord> Looking<'_, T> {
         let (world, cell) = (self.scene.world, self.scene.cell(self.slot));
         let bearing_rad = beam.bearing_deg.to_radians();
         let to_boundary_m = to_boundary_m(world.side_m(self.id), bearing_rad);
-        let toward_rad = world.heading_rad(cell.facing.get()) + bearing_rad;
+        let toward_rad = world.heading_rad(cell.facing.get().heading()) + bearing_rad;
         let [x_m, y_m, z_m] = self.place();
         let line = |beyond_m: f64| {
             let reach_m = to_boundary_m + beyond_m.min(beam.sensor.model.range_m);

@@ -193,8 +193,7 @@ impl<'a> Compiler<'a> {
         let stride = self.stride();
         let rows = self.map.height() + 2 * self.border;
         let radio = self.radio();
-        let asks = |ty: &BodyType| matches!(&ty.role, Role::Robot(model) if model.behaviour.asks());
-        let has_asks = self.types.iter().any(asks);
+        let has_asks = self.has_asks();
         let kind_rank = self.kind_rank()?;
         let mut world = RobotsWorld {
             walls: padded(&self.map, self.border, stride, rows),
@@ -233,6 +232,12 @@ impl<'a> Compiler<'a> {
 
     fn stride(&self) -> u32 {
         self.map.width() + 2 * self.border
+    }
+
+    /// Returns whether some robots ask each other to make room.
+    fn has_asks(&self) -> bool {
+        let asks = |ty: &BodyType| matches!(&ty.role, Role::Robot(model) if model.behaviour.asks());
+        self.types.iter().any(asks)
     }
 
     fn radio(&self) -> Option<Radio> {

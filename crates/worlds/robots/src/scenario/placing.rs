@@ -3,7 +3,7 @@
 use crate::purpose;
 use sidestep_kernel::EntityId;
 use sidestep_kernel::stream::Streams;
-use sidestep_map::{Cell, GridMap};
+use sidestep_map::{Cell, GridMap, Rect};
 
 /// Marks a box without an occupant.
 const NOBODY: u32 = u32::MAX;
@@ -34,33 +34,28 @@ impl Floor {
         Self { width: map.width(), height: map.height(), occupant }
     }
 
-    /// Places a body at `(col, row)`.
-    pub(super) fn place(
-        &mut self,
-        id: EntityId,
-        at: (u32, u32),
-        size: (u32, u32),
-    ) -> Result<(), Obstacle> {
-        if let Some(obstacle) = self.obstacle(at, size) {
+    /// Places a body on some boxes, which may leave the map.
+    pub(super) fn place(&mut self, id: EntityId, boxes: Rect) -> Result<(), Obstacle> {
+        if let Some(obstacle) = self.obstacle(boxes) {
             return Err(obstacle);
         }
-        for row in at.1..at.1 + size.1 {
-            for col in at.0..at.0 + size.0 {
+        for row in boxes.row..boxes.row + boxes.height {
+            for col in boxes.col..boxes.col + boxes.width {
                 self.occupant[(row * self.width + col) as usize] = id;
             }
         }
         Ok(())
     }
 
-    fn obstacle(&self, (col, row): (u32, u32), (w, h): (u32, u32)) -> Option<Obstacle> {
+    fn obstacle(&self, Rect { col, row, width, height }: Rect) -> Option<Obstacle> {
         let inside = |at: u32, extent: u32, limit: u32| {
             at.checked_add(extent).is_some_and(|end| end <= limit)
         };
-        if !inside(col, w, self.width) || !inside(row, h, self.height) {
+        if !inside(col, width, self.width) || !inside(row, height, self.height) {
             return Some(Obstacle::Outside);
         }
-        for r in row..row + h {
-            for c in col..col + w {
+        for r in row..row + height {
+            for c in col..col + width {
                 match self.occupant[(r * self.width + c) as usize] {
                     NOBODY => {}
                     WALL => return Some(Obstacle::Wall(c, r)),
@@ -84,11 +79,12 @@ impl Floor {
         if across == 0 || up == 0 {
             return None;
         }
+        let covered = |at: (u32, u32)| Rect { col: at.0, row: at.1, width: size.0, height: size.1 };
         let mut draws = streams.draws(id, 0, purpose::PLACE);
         let mut at = (col, row);
         for _ in 0..TRIES {
             at = (col + draws.below(across), row + draws.below(up));
-            if self.place(id, at, size).is_ok() {
+            if self.place(id, covered(at)).is_ok() {
                 return Some(at);
             }
         }
@@ -97,7 +93,7 @@ impl Floor {
         let from = u64::from(at.1 - row) * u64::from(across) + u64::from(at.0 - col);
         (0..boxes).map(|k| (from + k) % boxes).find_map(|k| {
             let at = (col + (k % u64::from(across)) as u32, row + (k / u64::from(across)) as u32);
-            self.place(id, at, size).is_ok().then_some(at)
+            self.place(id, covered(at)).is_ok().then_some(at)
         })
     }
 

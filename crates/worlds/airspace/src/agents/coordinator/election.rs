@@ -3,28 +3,27 @@
 use super::Passenger;
 use super::epoch::{Epoch, Position, is_majority};
 use super::messages::{Candidacy, Message};
-use super::seat::{Copy, Post, Seat, Standing};
+use super::seat::{Copy, Missed, Post, Seat, Standing};
 use crate::agents::party::Unsound;
 
 impl<P: Passenger> Seat<P> {
-    /// Stands for election, after the coordinator could not reach `lost` from here, or was not
-    /// heard of.
-    pub(super) fn stand(
-        &mut self,
-        (lost, was_lost): (Option<usize>, bool),
-        ship: &P::Ship,
-        tick: u64,
-    ) {
+    /// Stands for election, since the coordinator is missed.
+    pub(super) fn stand(&mut self, missed: Missed, ship: &P::Ship, tick: u64) {
         let Some(patience) = self.rules.patience else { return };
         self.stood = 1 + self.promised.number.max(self.stood);
         let epoch = Epoch { number: self.stood, owner: self.rules.me as u16 };
         let has = self.copy.as_ref().map(|copy| copy.at);
+        let was_lost = missed != Missed::Unheard;
         let asks = Candidacy { epoch, seen: self.seen, has, was_lost };
         let mut votes = vec![false; self.rules.group];
         votes[self.rules.me] = true;
         let heard = votes.clone();
         let due = tick + self.answer_ticks();
         let (tries_left, is_elected) = (patience.tries.saturating_sub(1), is_majority(&votes));
+        let lost = match missed {
+            Missed::OnHop(to) => Some(to),
+            Missed::Unheard | Missed::Outdated => None,
+        };
         self.post = Post::Standing(Standing { asks, lost, votes, heard, tries_left, due });
         if is_elected {
             return self.bring_back(ship, tick);
@@ -82,7 +81,8 @@ impl<P: Passenger> Seat<P> {
     pub(super) fn on_vote(
         &mut self,
         from: usize,
-        (epoch, copy): (Epoch, Option<Copy>),
+        epoch: Epoch,
+        copy: Option<Copy>,
         ship: &P::Ship,
         tick: u64,
     ) -> Result<(), Unsound> {

@@ -1,7 +1,7 @@
 //! A host: the airplane's part in all coordinators of its group.
 
 use super::epoch::Epoch;
-use super::messages;
+use super::messages::{self, Reader};
 use super::seat::{Seat, Sent, Stay};
 use super::{Here, Passenger, Rules, Ship, Step};
 use crate::agents::party::Unsound;
@@ -43,10 +43,11 @@ impl<P: Passenger> Hosting<P> {
         bytes: &[u8],
         tick: u64,
     ) -> Result<(), Unsound> {
-        let size = (self.rules.group, self.seats.len());
-        let (seat, message, state) = messages::read(bytes, [from, self.rules.me], size)?;
+        let Rules { me, group, .. } = *self.rules;
+        let reader = Reader { me, group, seats: self.seats.len() };
+        let (seat, message, state) = messages::read(bytes, from, reader)?;
         let seat = &mut self.seats[usize::from(seat)];
-        seat.on_message(from, (message, state), &self.ship, tick)?;
+        seat.on_message(from, message, state, &self.ship, tick)?;
         self.settle(tick);
         Ok(())
     }

@@ -53,16 +53,23 @@ pub(super) fn written(seat: u16, message: &Message, state: &[u8]) -> Draft {
     Draft::with(&(seat, message), state)
 }
 
-/// Returns a message from host `from` to host `me` of a group of `group` hosts and `seats`
-/// coordinators.
+/// A host that reads messages.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reader {
+    /// Its place in the group.
+    pub me: usize,
+    /// Number of hosts of the group.
+    pub group: usize,
+    /// Number of coordinators of the group.
+    pub seats: usize,
+}
+
+/// Returns a message from host `from` to its reader.
 ///
 /// # Errors
 /// When it can be no such message.
-pub(super) fn read(
-    bytes: &[u8],
-    [from, me]: [usize; 2],
-    (group, seats): (usize, usize),
-) -> Result<Read<'_>, Unsound> {
+pub(super) fn read(bytes: &[u8], from: usize, reader: Reader) -> Result<Read<'_>, Unsound> {
+    let Reader { me, group, seats } = reader;
     let read = postcard::take_from_bytes::<(u16, Message)>(bytes);
     let ((seat, message), state) = read.map_err(|_| Unsound::Form)?;
     Unsound::Airplane.unless(from < group && from != me)?;

@@ -59,6 +59,17 @@ pub(super) struct Standing {
     pub due: u64,
 }
 
+/// The reason for which a host misses a coordinator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Missed {
+    /// It was not heard of for long.
+    Unheard,
+    /// A newer epoch was accepted elsewhere, while it was in this host's care.
+    Outdated,
+    /// It could not reach this host from here.
+    OnHop(usize),
+}
+
 /// One coordinator, as one host sees it.
 #[derive(Debug, Clone)]
 pub(super) struct Seat<P> {
@@ -172,18 +183,19 @@ impl<P: Passenger> Seat<P> {
     pub(super) fn on_message(
         &mut self,
         from: usize,
-        (message, state): (Message, &[u8]),
+        message: Message,
+        state: &[u8],
         ship: &P::Ship,
         tick: u64,
     ) -> Result<(), Unsound> {
         match message {
-            Message::Hop(at) => self.on_hop(from, (at, state), ship, tick)?,
+            Message::Hop(at) => self.on_hop(from, at, state, ship, tick)?,
             Message::Vote(epoch, copy) => {
                 let copy = copy.map(|at| Copy { at, state: state.into() });
-                self.on_vote(from, (epoch, copy), ship, tick)?;
+                self.on_vote(from, epoch, copy, ship, tick)?;
             }
             Message::Ack(at) => self.on_ack(from, at, tick),
-            Message::Alive(at, ago) => self.on_alive(from, (at, ago), tick),
+            Message::Alive(at, ago) => self.on_alive(from, at, ago, tick),
             Message::Stale(epoch) => self.on_stale(epoch, ship, tick),
             Message::Elect(candidacy) => self.on_elect(from, candidacy, tick),
         }
@@ -196,7 +208,8 @@ impl<P: Passenger> Seat<P> {
     fn on_hop(
         &mut self,
         from: usize,
-        (at, state): (Position, &[u8]),
+        at: Position,
+        state: &[u8],
         ship: &P::Ship,
         tick: u64,
     ) -> Result<(), Unsound> {
@@ -230,7 +243,7 @@ impl<P: Passenger> Seat<P> {
     }
 
     /// Takes the news that it was alive some ticks ago.
-    fn on_alive(&mut self, from: usize, (at, ago): (Position, u64), tick: u64) {
+    fn on_alive(&mut self, from: usize, at: Position, ago: u64, tick: u64) {
         if at.epoch < self.promised {
             return self.send(from, &Message::Stale(self.promised), &[]);
         }
@@ -268,10 +281,10 @@ impl<P: Passenger> Seat<P> {
         self.promised = epoch;
         match std::mem::replace(&mut self.post, Post::Empty) {
             Post::Empty => {}
-            Post::Leaving { .. } => self.stand((None, true), ship, tick),
+            Post::Leaving { .. } => self.stand(Missed::Outdated, ship, tick),
             Post::Aboard(Stay { passenger, .. }) => {
                 self.copy = Some(Copy { at: self.taken, state: passenger.written().into() });
-                self.stand((None, true), ship, tick);
+                self.stand(Missed::Outdated, ship, tick);
             }
             Post::Standing(standing) if standing.asks.epoch > epoch => {
                 self.post = Post::Standing(standing);
@@ -293,7 +306,7 @@ impl<P: Passenger> Seat<P> {
             return;
         }
         match &mut self.post {
-            Post::Empty => self.stand((None, false), ship, tick),
+            Post::Empty => self.stand(Missed::Unheard, ship, tick),
             Post::Standing(_) => self.ask_again(tick),
             Post::Aboard(stay) if stay.beat_at <= tick => {
                 stay.beat_at = tick + self.rules.beat_ticks();
@@ -330,7 +343,7 @@ impl<P: Passenger> Seat<P> {
             self.post = Post::Empty;
         } else {
             // It may have arrived all the same, so it goes on in a new epoch or not at all.
-            self.stand((Some(to), true), ship, tick);
+            self.stand(Missed::OnHop(to), ship, tick);
         }
     }
 

@@ -136,7 +136,7 @@ impl Gathered {
         match briefing.settings.estimator {
             Estimator::Exact => self.optimize(briefing),
             Estimator::Sampled { block, ageing } => {
-                self.sampled_round(briefing, (block, ageing), is_late);
+                self.sampled_round(briefing, block, ageing, is_late);
             }
         }
         self.airplanes.iter_mut().for_each(Visited::drop_ways);
@@ -150,7 +150,7 @@ impl Gathered {
         let mut game = PairwiseGame::new(own);
         for i in 0..all.len() {
             for j in i + 1..all.len() {
-                couple(&mut game, &briefing.objective, (i, &all[i]), (j, &all[j]));
+                couple(&mut game, &briefing.objective, [i, j], [&all[i], &all[j]]);
             }
         }
         let places: Vec<usize> = self.airplanes.iter().map(|a| a.place).collect();
@@ -166,18 +166,17 @@ impl Gathered {
     }
 
     /// Makes a round with samples.
-    fn sampled_round(&mut self, briefing: &Briefing, sampling: (usize, f64), is_late: bool) {
+    fn sampled_round(&mut self, briefing: &Briefing, block: usize, ageing: f64, is_late: bool) {
         interrupt::look();
         let stop = briefing.settings.stop;
-        let change = self.learn(briefing, sampling);
+        let change = self.learn(briefing, block, ageing);
         self.calm = stop.calm(self.calm, change);
         self.round += 1;
         let is_over = self.calm >= stop.calm_rounds || self.round >= stop.max_rounds;
         if is_over || is_late {
             for airplane in self.airplanes.iter_mut().filter(|a| !a.is_presumed) {
                 let Some(player) = &airplane.player else { continue };
-                let rounds = (self.round, self.calm);
-                airplane.decided = briefing.decided(airplane.place, player, rounds);
+                airplane.decided = briefing.decided(airplane.place, player, self.round, self.calm);
             }
             self.is_final = true;
         }
@@ -185,7 +184,7 @@ impl Gathered {
 
     /// Computes the costs once all ways of a round are known, summed in the same order as everywhere
     /// else, and updates every player. Returns the largest change of a probability.
-    fn learn(&mut self, briefing: &Briefing, (block, ageing): (usize, f64)) -> f64 {
+    fn learn(&mut self, briefing: &Briefing, block: usize, ageing: f64) -> f64 {
         let (objective, all) = (&briefing.objective, &self.airplanes);
         let part = |i: usize, k: usize| {
             let own = &all[i];

@@ -6,7 +6,7 @@ use sidestep_collectives::Estimator;
 
 impl Agent {
     /// Checks a message of the agent at place `from`.
-    pub(super) fn admits(&self, from: usize, message: &Message) -> Result<(), Unsound> {
+    pub(super) fn checked(&self, from: usize, message: &Message) -> Result<(), Unsound> {
         let briefing = &*self.own.briefing;
         let filed = &briefing.filed[from];
         let actions = filed.actions.len();

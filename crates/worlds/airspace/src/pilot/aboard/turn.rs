@@ -109,6 +109,14 @@ impl Turn {
         }
     }
 
+    /// Returns the ids of those that the party to a talk is to know, rising.
+    pub(super) fn known_in(&self, topic: Topic) -> Arc<[EntityId]> {
+        match topic {
+            Topic::Shield => self.in_scene().into(),
+            Topic::Group | Topic::Decision => self.members.clone(),
+        }
+    }
+
     /// Returns the ids of the airplanes that the party to the present talk knows, by their places.
     fn spoken_to(&self) -> Vec<EntityId> {
         match self.stage {
@@ -119,7 +127,7 @@ impl Turn {
 
     /// Returns the ids of all airplanes that the shield minds: its group, and those nearby that are not heard,
     /// rising.
-    pub(super) fn in_scene(&self) -> Vec<EntityId> {
+    fn in_scene(&self) -> Vec<EntityId> {
         let unheard = self.unheard.iter().map(|one| one.id);
         let mut all: Vec<EntityId> = self.members.iter().copied().chain(unheard).collect();
         all.sort_unstable();

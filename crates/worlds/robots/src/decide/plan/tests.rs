@@ -130,7 +130,7 @@ fn longest_alone(run: &RobotsRun) -> Cycle {
         let crate::world::Role::Robot(model) = &world.type_of(id).role else { return 0 };
         let way = &model.behaviour.ways()[0];
         let (mut at, mut cycles) = (world.map_position(run.state().body(id).at()), 0);
-        let mut heading = run.state().body(id).facing.get();
+        let mut heading = run.state().body(id).facing.get().heading();
         while let Some(direction) = way.direction(at.0, at.1) {
             let turn = (4 + direction - heading) % 4;
             let (east, north) = crate::effector::HEADINGS[usize::from(direction)];

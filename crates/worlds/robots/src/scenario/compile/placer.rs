@@ -102,9 +102,10 @@ impl Round<'_> {
         size: (u32, u32),
     ) -> Result<(u32, u32), InputError> {
         let at = place.get_ref().at;
-        match self.floor.place(id, at, size) {
+        let boxes = Rect { col: at.0, row: at.1, width: size.0, height: size.1 };
+        match self.floor.place(id, boxes) {
             Ok(()) => Ok(at),
-            Err(obstacle) => Err(self.in_the_way(place.span(), at, size, obstacle)),
+            Err(obstacle) => Err(self.in_the_way(place.span(), boxes, obstacle)),
         }
     }
 
@@ -128,14 +129,9 @@ impl Round<'_> {
         })
     }
 
-    fn in_the_way(
-        &self,
-        span: Range<usize>,
-        at: (u32, u32),
-        size: (u32, u32),
-        obstacle: Obstacle,
-    ) -> InputError {
-        let body = format!("a body of {} x {} boxes at [{}, {}]", size.0, size.1, at.0, at.1);
+    fn in_the_way(&self, span: Range<usize>, boxes: Rect, obstacle: Obstacle) -> InputError {
+        let Rect { col, row, width, height } = boxes;
+        let body = format!("a body of {width} x {height} boxes at [{col}, {row}]");
         let cause = match obstacle {
             Obstacle::Outside => {
                 let (width, height) = (self.placer.map.width(), self.placer.map.height());
