@@ -45,7 +45,7 @@ impl<const D: usize> ChainWorld<D> {
         let mut scratch = Scratch::new(self);
         scratch.notes = Some(Box::new(Notes { slot, ..Notes::default() }));
         let mut told = Inspection::new(who, now, self.title(who));
-        let (after, group) = self.try_cycle(&state.copied(), now, slot, (&mut scratch, &mut told));
+        let (after, group) = self.try_cycle(&state.copied(), now, slot, &mut scratch, &mut told);
         let notes = *scratch.notes.take()?;
         let asked =
             Asked { world: self, slot, kind, k: part as usize, before, after, notes, scratch };
@@ -68,7 +68,8 @@ impl<const D: usize> ChainWorld<D> {
         state: &ChainState<D>,
         now: Cycle,
         slot: Slot,
-        (scratch, told): (&mut Scratch<D>, &mut Inspection),
+        scratch: &mut Scratch<D>,
+        told: &mut Inspection,
     ) -> (Body<D>, Vec<Slot>) {
         let clock = &ManualClock::default();
         let turn = &mut Turn { world: self, state, now, clock, scratch };

@@ -423,18 +423,18 @@ impl Metrics {
         let sum = |count: fn(&Tally) -> u64| tallies.iter().map(count).sum::<u64>();
         let most = |value: fn(&Tally) -> f64| tallies.iter().map(value).fold(0.0, f64::max);
         let vetoes_of = |k: usize| tallies.iter().map(|t| t.vetoes[k]).sum::<u64>();
-        let least = tallies.iter().map(|t| t.min_clearance_m).fold(f64::INFINITY, f64::min);
-        let own = tallies.iter().map(|t| t.min_own_gap_m).fold(f64::INFINITY, f64::min);
+        let least = |value: fn(&Tally) -> f64| {
+            let least = tallies.iter().map(value).fold(f64::INFINITY, f64::min);
+            Some(least).filter(|m| m.is_finite())
+        };
         let steps = sum(|t| t.steps);
+        let robots = tallies.iter().fold(RobotTally::default(), |all, t| all.add(&t.robots));
         let by_reason = (0..Reason::ALL.len()).map(|k| (Reason::ALL[k].name(), vetoes_of(k)));
-        let given_up = (0..).zip(tallies).flat_map(|(chain, tally)| {
-            tally.given_up.iter().map(move |what| ChainGivenUp { chain, what: what.clone() })
-        });
         Self {
             steps,
             vetoes: (0..Reason::ALL.len()).map(vetoes_of).sum(),
             penetrations: sum(|t| t.penetrations),
-            min_clearance_m: Some(least).filter(|m| m.is_finite()),
+            min_clearance_m: least(|t| t.min_clearance_m),
             max_rod_violation_m: most(|t| t.max_rod_violation_m),
             progress: progress.iter().sum::<f64>() / progress.len().max(1) as f64,
             steps_per_cpu_s: timed_steps as f64 / cpu_s.max(1e-9),
@@ -444,12 +444,12 @@ impl Metrics {
             max_slave_step_m: most(|t| t.max_slave_step_m),
             max_speed_m_s: most(|t| t.max_speed_m_s),
             longest_inside_steps: tallies.iter().map(|t| t.longest_inside_steps).max().unwrap_or(0),
-            min_own_gap_m: Some(own).filter(|m| m.is_finite()),
+            min_own_gap_m: least(|t| t.min_own_gap_m),
             done: sum(|t| t.done),
             reformed: sum(|t| t.reformed),
             not_reformed: sum(|t| t.not_reformed),
             missing_parts: sum(|t| t.missing_parts),
-            given_up: given_up.collect(),
+            given_up: given_up(tallies),
             rungs: tallies.iter().fold(RungTally::default(), |all, t| all.add(&t.rungs)),
             escapes: tallies.iter().fold(EscapeTally::default(), |all, t| all.joined(&t.escapes)),
             messages: sum(|t| t.messages),
@@ -458,9 +458,16 @@ impl Metrics {
             contacts_lost: sum(|t| t.contacts_lost),
             deadlines_missed: sum(|t| t.deadlines_missed),
             stood: sum(|t| t.stood),
-            robots: RobotMetrics::of(
-                &tallies.iter().fold(RobotTally::default(), |all, t| all.add(&t.robots)),
-            ),
+            robots: RobotMetrics::of(&robots),
         }
     }
+}
+
+/// Returns what the chains gave up.
+fn given_up(tallies: &[Tally]) -> Vec<ChainGivenUp> {
+    let of_one = |(chain, tally): (EntityId, &Tally)| {
+        let what = tally.given_up.clone().into_iter();
+        what.map(move |what| ChainGivenUp { chain, what })
+    };
+    (0..).zip(tallies).flat_map(of_one).collect()
 }

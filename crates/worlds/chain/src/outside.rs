@@ -135,10 +135,10 @@ impl<const D: usize> ChainWorld<D> {
             let near = |slot: &Slot| {
                 *slot != id && boxes[*slot as usize].meets(&boxes[id as usize].grown(self.look_m))
             };
-            scratch.gather(self, state, now, (0..state.len() as Slot).filter(near));
+            scratch.around.gather(self, state, now, (0..state.len() as Slot).filter(near));
             let body = &state.body(id as usize);
             let mut row = Row { row, rooms: room.iter_mut() };
-            self.observe_body(id, body, &scratch.obstacles, &mut row);
+            self.observe_body(id, body, &scratch.around.all, &mut row);
             if !ordered.is_empty() {
                 self.observe_answer(id, body, &mut row);
             }

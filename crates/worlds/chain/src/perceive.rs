@@ -46,11 +46,11 @@ impl<'a, const D: usize> Looking<'a, D> {
         let (leader, stood) = (body.leader(task), body.stood);
         drop(body);
         self.see_others(slot, task.agent, navigator, &leader);
-        self.scratch.gather(world, state, now, std::iter::empty());
+        self.scratch.around.gather(world, state, now, std::iter::empty());
         let noise = &mut world.streams.draws(slot, now, purpose::LASER);
-        let Scratch { obstacles, scan, seen, .. } = &mut *self.scratch;
+        let Scratch { around, scan, seen, .. } = &mut *self.scratch;
         let target = navigator.goal.as_ref().and_then(Goal::target);
-        let around = Surroundings { obstacles: obstacles.in_plane()?, bodies: seen, target };
+        let around = Surroundings { obstacles: around.all.in_plane()?, bodies: seen, target };
         let is_patient = world.starts_s(u64::from(stood)) < STANDS_S;
         let percept = navigator.leader.perceive(&leader.pose, &around, noise, scan, is_patient);
         Some(Sight { navigator, agent: task.agent, leader, percept })

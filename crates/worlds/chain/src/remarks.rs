@@ -9,8 +9,9 @@ use sidestep_scenario::Remark;
 /// Returns the remarks, in the order of the chains.
 pub(super) fn remarks<const D: usize>(compiled: &Compiled<D>) -> Vec<Remark> {
     let chains = || compiled.world.chains.iter().enumerate();
-    let slow = chains().find_map(|chain| slow(&compiled.world, chain));
-    chains().filter_map(unlimited).chain(slow).chain(idle(compiled)).collect()
+    let slow = chains().find_map(|(k, spec)| slow(&compiled.world, k, spec));
+    let unlimited = chains().filter_map(|(k, spec)| unlimited(k, spec));
+    unlimited.chain(slow).chain(idle(compiled)).collect()
 }
 
 /// Returns notes on rules that are given and have no effect.
@@ -41,10 +42,7 @@ fn is_held<const D: usize>(spec: &ChainSpec<D>) -> bool {
 }
 
 /// Returns a warning on a chain whose agents talk too slowly to move all of it in a cycle.
-fn slow<const D: usize>(
-    world: &ChainWorld<D>,
-    (k, spec): (usize, &ChainSpec<D>),
-) -> Option<Remark> {
+fn slow<const D: usize>(world: &ChainWorld<D>, k: usize, spec: &ChainSpec<D>) -> Option<Remark> {
     let network = world.network.as_ref()?;
     let rods = spec.start.rods().len();
     let led_m = spec.tasks.iter().map(|task| task.speed_m_s * world.dt_s).fold(0.0, f64::max);
@@ -68,8 +66,8 @@ fn slow<const D: usize>(
 }
 
 /// Returns a note on joints for whose speed the model gives no limit.
-fn unlimited<const D: usize>((k, chain): (usize, &ChainSpec<D>)) -> Option<Remark> {
-    let arm = chain.arm.as_deref()?;
+fn unlimited<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Option<Remark> {
+    let arm = spec.arm.as_deref()?;
     let speeds = arm.serial.variables.iter().zip(arm.follower.speeds());
     let taken = |(v, speed): (&Variable, &f64)| {
         let unit = if v.motion == Motion::Turn { "rad/s" } else { "m/s" };

@@ -9,7 +9,7 @@ use super::rods::geometry::{Point, in_dimensions};
 use super::rods::obstacle::{Obstacle, Obstacles};
 use super::rods::own_body::OwnBody;
 use super::rods::propagate::Propagator;
-use super::state::ChainState;
+use super::state::{Body, ChainState};
 use super::swarm::laser::{Body as Seen, Scan};
 use super::world::{ChainWorld, OTHER_CHAIN, push_parts};
 use sidestep_kernel::{Cycle, Slot};
@@ -19,15 +19,8 @@ use sidestep_kernel::{Cycle, Slot};
 pub struct Scratch<const D: usize> {
     pub(crate) propagator: Propagator<D>,
     pub(crate) escaper: Option<Escaper<D>>,
-    /// The world's obstacles, the moving ones where they are at the start of `moment`, and the
-    /// parts of other chains.
-    pub(crate) obstacles: Obstacles<D>,
-    /// The same without other chains, if there are any.
-    solid: Obstacles<D>,
-    moment: Option<Cycle>,
-    /// Moving obstacles, and parts of other chains.
-    guests: Vec<Obstacle<D>>,
-    has_others: bool,
+    /// The obstacles around a chain.
+    pub(crate) around: Around<D>,
     /// Robots around a robot.
     pub(crate) seen: Vec<Seen>,
     /// Chains near a robot.
@@ -35,16 +28,10 @@ pub struct Scratch<const D: usize> {
     pub(crate) scan: Scan,
     /// Boxes around a chain's rods.
     pub(crate) own: OwnBody<D>,
-    /// Positions before a cycle.
-    pub(crate) before: Vec<Point<D>>,
-    /// Joint values of an arm before a cycle,
-    pub(crate) joints_before: Vec<f64>,
-    /// and after it got out of the way.
-    pub(crate) joints_escaped: Vec<f64>,
-    /// Least gap around a robot in this cycle, meters.
-    pub(crate) robots_gap_m: f64,
-    /// Positions after parts got out of the way.
-    pub(crate) escaped: Vec<Point<D>>,
+    /// Places of a chain before a cycle,
+    pub(crate) before: Places<D>,
+    /// and after parts got out of the way.
+    pub(crate) escaped: Places<D>,
     /// Events of this task.
     pub(crate) events: Vec<Event>,
     /// Notes for an inspection of a chain; none in a run.
@@ -53,29 +40,56 @@ pub struct Scratch<const D: usize> {
     pub(crate) shown: Option<Vec<Shown<D>>>,
 }
 
+/// The obstacles around a chain at a given moment.
+#[derive(Debug, Clone)]
+pub(crate) struct Around<const D: usize> {
+    /// The world's obstacles, the moving ones where they are at the start of `moment`, and the
+    /// parts of other chains.
+    pub(crate) all: Obstacles<D>,
+    /// The same without other chains, if there are any.
+    solid: Obstacles<D>,
+    moment: Option<Cycle>,
+    /// Moving obstacles, and parts of other chains.
+    guests: Vec<Obstacle<D>>,
+    has_others: bool,
+}
+
+/// The places of a chain's connectors at some time of its cycle.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Places<const D: usize> {
+    pub(crate) points: Vec<Point<D>>,
+    /// Joint values of an arm.
+    pub(crate) joints: Vec<f64>,
+}
+
 impl<const D: usize> Scratch<D> {
     /// Returns a scratch that has gathered nothing yet.
     pub(crate) fn new(world: &ChainWorld<D>) -> Self {
         Self {
             propagator: Propagator::new(world.rules),
             escaper: world.escape.map(Escaper::new),
-            obstacles: (*world.obstacles).clone(),
-            solid: (*world.obstacles).clone(),
-            moment: None,
-            guests: Vec::new(),
-            has_others: false,
+            around: Around::new(world),
             seen: Vec::new(),
             near: Vec::new(),
             scan: Scan::default(),
             own: OwnBody::default(),
-            before: Vec::new(),
-            joints_before: Vec::new(),
-            joints_escaped: Vec::new(),
-            robots_gap_m: f64::INFINITY,
-            escaped: Vec::new(),
+            before: Places::default(),
+            escaped: Places::default(),
             events: Vec::new(),
             notes: None,
             shown: None,
+        }
+    }
+}
+
+impl<const D: usize> Around<D> {
+    fn new(world: &ChainWorld<D>) -> Self {
+        Self {
+            all: (*world.obstacles).clone(),
+            solid: (*world.obstacles).clone(),
+            moment: None,
+            guests: Vec::new(),
+            has_others: false,
         }
     }
 
@@ -107,13 +121,31 @@ impl<const D: usize> Scratch<D> {
         for slot in others {
             push_parts(&mut self.guests, slot, &state.body(slot as usize).chain);
         }
-        self.obstacles.set_moving(&self.guests).expect(CHECKED);
+        self.all.set_moving(&self.guests).expect(CHECKED);
         (self.moment, self.has_others) = (Some(moment), has_others);
     }
 
     /// Returns the obstacles that are solid to robots: of other chains the robots, not the rods.
     pub(crate) fn solid(&self) -> &Obstacles<D> {
-        if self.has_others { &self.solid } else { &self.obstacles }
+        if self.has_others { &self.solid } else { &self.all }
+    }
+}
+
+impl<const D: usize> Places<D> {
+    /// Notes the places of a chain.
+    pub(crate) fn note(&mut self, body: &Body<D>) {
+        self.points.clear();
+        self.points.extend_from_slice(body.chain.points());
+        self.joints.clear();
+        self.joints.extend_from_slice(body.joints.as_deref().unwrap_or_default());
+    }
+
+    /// Puts a chain back to these places.
+    pub(crate) fn put_back(&self, body: &mut Body<D>) {
+        body.chain.points_mut().copy_from_slice(&self.points);
+        if let Some(joints) = &mut body.joints {
+            joints.clone_from(&self.joints);
+        }
     }
 }
 

@@ -1,77 +1,105 @@
 //! Moves out of the way of approaching obstacles, and back from places where a chain must not be.
 
-use super::Acting;
+use super::joints::Jointed;
+use super::{Acting, Setting};
 use crate::events::{Event, EventKind};
+use crate::motion::escape::Escaper;
 use crate::rods::geometry::{Bounds, Point, distance, in_dimensions};
 use crate::rods::veto::{Reason, Veto};
+use crate::scratch::Places;
+use crate::state::Body;
 
 /// Relative tolerance for ways at exactly the greatest speed.
 const ROUNDING: f64 = 1e-9;
 
-impl<const D: usize> Acting<'_, D> {
-    /// Moves parts that an obstacle comes too near to, whichever connector leads.
-    pub(super) fn get_out_of_the_way(&mut self) {
-        let Some(escaper) = &mut self.scratch.escaper else { return };
+/// A chain's means to be where nothing hits it.
+pub(super) struct Escaping<'a, const D: usize> {
+    pub(super) escaper: Option<&'a mut Escaper<D>>,
+    /// Its places after parts got out of the way.
+    pub(super) escaped: &'a mut Places<D>,
+    /// The box that it stays in.
+    pub(super) claim: Bounds<D>,
+}
+
+impl<const D: usize> Escaping<'_, D> {
+    /// Moves parts that an obstacle comes too near to, whichever connector leads. Returns whether the chain is
+    /// pressed, so that its initiator gives way.
+    pub(super) fn get_out_of_the_way(
+        &mut self,
+        setting: Setting<'_, D>,
+        acting: &mut Acting<'_, D>,
+    ) -> bool {
+        let Some(escaper) = &mut self.escaper else { return false };
+        let Acting { body, before, propagator, told, .. } = acting;
         let escaped = escaper.escape(
-            &mut self.body.chain,
-            &self.scratch.obstacles,
-            &mut self.scratch.propagator,
-            &self.scratch.before,
-            &mut self.body.way_out,
+            &mut body.chain,
+            setting.obstacles,
+            propagator,
+            &before.points,
+            &mut body.way_out,
         );
         // Out of the range of coordinates nothing escapes.
-        let Ok(escaped) = escaped else { return };
-        self.joints_escape();
-        self.body.tally.escapes.add(&escaped);
-        self.note(|notes| notes.escapes = escaped.moves);
-        self.scratch.escaped.copy_from_slice(self.body.chain.points());
-        if let Some(joints) = &self.body.joints {
-            self.scratch.joints_escaped.clone_from(joints);
+        let Ok(escaped) = escaped else { return false };
+        if let Some(mut arm) = Jointed::of(setting, before, body) {
+            arm.escape();
         }
-        self.take_leader_along();
+        body.tally.escapes.add(&escaped);
+        told.note(|notes| notes.escapes = escaped.moves);
+        self.escaped.note(body);
+        take_leader_along(setting, body);
         // Only the first of several cycles of escape in a row is an event.
-        let first = escaped.first.filter(|_| !self.body.tally.is_escaping);
+        let first = escaped.first.filter(|_| !body.tally.is_escaping);
         if let Some((connector, obstacle)) = first {
-            let event = self.event(EventKind::Escape, connector, escaped.moves as f64);
-            self.scratch.events.push(Event { obstacle: Some(obstacle), ..event });
+            let (kind, moves) = (EventKind::Escape, escaped.moves as f64);
+            let event = told.event(&body.chain, kind, connector, moves);
+            told.events.push(Event { obstacle: Some(obstacle), ..event });
         }
-        self.body.tally.is_escaping = escaped.moves > 0;
-        self.gives_way = escaped.is_pressed;
+        body.tally.is_escaping = escaped.moves > 0;
+        escaped.is_pressed
+    }
+
+    /// Returns whether a connector got out of the way of something in this cycle.
+    pub(super) fn has_fled(&self, k: usize, before: &Places<D>) -> bool {
+        self.escaped.points.get(k) != before.points.get(k)
     }
 
     /// Takes back moves that would leave the claim, because other chains do not expect the chain
-    /// there; also moves that, together with escapes, would be faster than escapes may be.
-    pub(super) fn keep_to_bounds(&mut self) {
-        let most_m = match &self.world.escape {
-            Some(escape) => escape.speed_max_m_s * self.world.dt_s * (1.0 + ROUNDING),
-            None if self.world.chains.len() == 1 => return,
+    /// there; also moves that, together with escapes, would be faster than escapes may be. Returns the objection to
+    /// them.
+    pub(super) fn keep_to_bounds(
+        &self,
+        setting: Setting<'_, D>,
+        body: &mut Body<D>,
+        before: &Places<D>,
+    ) -> Option<Veto<D>> {
+        let world = setting.world;
+        let most_m = match &world.escape {
+            Some(escape) => escape.speed_max_m_s * world.dt_s * (1.0 + ROUNDING),
+            None if world.chains.len() == 1 => return None,
             None => f64::INFINITY,
         };
         let is_beyond = |(p, was): (&Point<D>, &Point<D>)| {
             distance(*p, *was) > most_m || !self.claim.meets(&Bounds::of(&[*p]))
         };
-        let mut ways = self.body.chain.points().iter().zip(&self.scratch.before);
-        let Some(by) = ways.position(is_beyond) else { return };
-        self.body.chain.points_mut().copy_from_slice(&self.scratch.escaped);
-        if let Some(joints) = &mut self.body.joints {
-            joints.clone_from(&self.scratch.joints_escaped);
-        }
-        let from = self.task().map_or(0, |task| task.agent);
-        let reached = self.body.chain.points()[from];
-        self.take_leader_along();
-        self.vetoed(&Veto { by, from, reason: Reason::StepLimit, obstacle: None, reached });
+        let mut ways = body.chain.points().iter().zip(&before.points);
+        let by = ways.position(is_beyond)?;
+        self.escaped.put_back(body);
+        let from = setting.task(body).map_or(0, |task| task.agent);
+        let reached = body.chain.points()[from];
+        take_leader_along(setting, body);
+        Some(Veto { by, from, reason: Reason::StepLimit, obstacle: None, reached })
     }
+}
 
-    /// Keeps a leader on wheels at its connector, wherever that was moved to; if it is a robot, it follows
-    /// on its wheels, from where it is.
-    fn take_leader_along(&mut self) {
-        let agent = self.task().map(|task| task.agent);
-        let (Some(leader), Some(agent)) = (&mut self.body.driving.leader, agent) else { return };
-        let at = in_dimensions(self.body.chain.points()[agent]);
-        match self.body.robots.get(agent) {
-            None => leader.pose.at = at,
-            Some(robot) if leader.pose.at != at => leader.pose = robot.pose,
-            Some(_) => {}
-        }
+/// Keeps a leader on wheels at its connector, wherever that was moved to; if it is a robot, it follows
+/// on its wheels, from where it is.
+fn take_leader_along<const D: usize>(setting: Setting<'_, D>, body: &mut Body<D>) {
+    let agent = setting.task(body).map(|task| task.agent);
+    let (Some(leader), Some(agent)) = (&mut body.driving.leader, agent) else { return };
+    let at = in_dimensions(body.chain.points()[agent]);
+    match body.robots.get(agent) {
+        None => leader.pose.at = at,
+        Some(robot) if leader.pose.at != at => leader.pose = robot.pose,
+        Some(_) => {}
     }
 }

@@ -1,11 +1,13 @@
 //! Changes to chains: parts that fail, and chains that break and are joined again (slides R8, R10,
 //! F3).
 
-use super::Acting;
+use super::Setting;
+use super::told::Told;
 use crate::events::{Event, EventKind};
+use crate::rods::chain::Chain;
 use crate::rods::geometry::{Point, add, distance};
 use crate::rods::rebuild::{MayCome, Reformed, reform};
-use crate::state::{Scattered, flat};
+use crate::state::{Body, Scattered, flat};
 use crate::world::{Change, FARTHEST_THROW, What, purpose};
 use sidestep_kernel::distr::normal;
 use std::ops::RangeInclusive;
@@ -13,113 +15,134 @@ use std::ops::RangeInclusive;
 /// Attempts to find a free place where a part may fall.
 const THROWS: usize = 100;
 
-impl<const D: usize> Acting<'_, D> {
-    /// Applies the changes at the start of a cycle.
-    pub(super) fn change(&mut self) {
-        let (spec, now) = (self.spec, self.now);
-        for change in spec.changes.iter().filter(|change| change.cycle == now) {
-            self.apply(change);
+/// Applies the changes at the start of a cycle.
+pub(super) fn change<const D: usize>(
+    setting: Setting<'_, D>,
+    body: &mut Body<D>,
+    told: &mut Told<'_, D>,
+) {
+    let Setting { spec, now, .. } = setting;
+    for change in spec.changes.iter().filter(|change| change.cycle == now) {
+        apply(change, setting, body, told);
+    }
+}
+
+fn apply<const D: usize>(
+    change: &Change<D>,
+    setting: Setting<'_, D>,
+    body: &mut Body<D>,
+    told: &mut Told<'_, D>,
+) {
+    body.catch_up();
+    body.plan = None;
+    change.constrain(&mut body.chain);
+    match &change.what {
+        What::Failed { connector, .. }
+        | What::Mobility { connector, .. }
+        | What::MaxBend { connector, .. } => {
+            told.tell(&body.chain, EventKind::Changed, *connector, 0.0);
         }
-    }
-
-    fn apply(&mut self, change: &Change<D>) {
-        self.body.catch_up();
-        self.body.plan = None;
-        change.constrain(&mut self.body.chain);
-        match &change.what {
-            What::Failed { connector, .. }
-            | What::Mobility { connector, .. }
-            | What::MaxBend { connector, .. } => self.tell(EventKind::Changed, *connector, 0.0),
-            What::Scatter { connectors, by_m, apart_m } => {
-                self.scatter(connectors, *by_m);
-                for point in &mut self.body.chain.points_mut()[connectors.end() + 1..] {
-                    *point = add(*point, *apart_m);
-                }
-                let n = connectors.clone().count() as f64;
-                self.tell(EventKind::Broken, *connectors.start(), n);
+        What::Scatter { connectors, by_m, apart_m } => {
+            scatter(setting, body, connectors, *by_m);
+            for point in &mut body.chain.points_mut()[connectors.end() + 1..] {
+                *point = add(*point, *apart_m);
             }
-            What::Reform { may_come, speed_m_s } => self.begin_reform(*may_come, *speed_m_s),
+            let n = connectors.clone().count() as f64;
+            told.tell(&body.chain, EventKind::Broken, *connectors.start(), n);
         }
+        What::Reform { may_come, speed_m_s } => begin_reform(body, told, *may_come, *speed_m_s),
     }
+}
 
-    /// Throws parts about: each to a free place near its own, if there is one. Parts that are fixed
-    /// or have failed stay.
-    fn scatter(&mut self, connectors: &RangeInclusive<usize>, by_m: f64) {
-        let draws = &mut self.world.streams.draws(self.slot, self.now, purpose::SCATTER);
-        let chain = &mut self.body.chain;
-        for k in connectors.clone() {
-            if chain.connectors()[k].is_still() {
-                continue;
-            }
-            let (at, radius_m) = (chain.points()[k], chain.connectors()[k].radius_m);
-            let mut throw = || normal(draws).clamp(-FARTHEST_THROW, FARTHEST_THROW);
-            let mut place = || at.map(|x| x + by_m * throw());
-            let is_free =
-                |p: &Point<D>| self.scratch.obstacles.clearance_m([*p; 2], radius_m, 1.0) > 0.0;
-            let free = (0..THROWS).map(|_| place()).find(is_free);
-            chain.points_mut()[k] = free.unwrap_or(at);
+/// Throws parts about: each to a free place near its own, if there is one. Parts that are fixed
+/// or have failed stay.
+fn scatter<const D: usize>(
+    setting: Setting<'_, D>,
+    body: &mut Body<D>,
+    connectors: &RangeInclusive<usize>,
+    by_m: f64,
+) {
+    let draws = &mut setting.draws(purpose::SCATTER);
+    let chain = &mut body.chain;
+    for k in connectors.clone() {
+        if chain.connectors()[k].is_still() {
+            continue;
         }
-        self.body.scattered = Some(Scattered {
-            first: *connectors.start() as u32,
-            last: *connectors.end() as u32,
-            speed_m_s: 0.0,
-            goals_m: Vec::new(),
-            waited: 0,
-        });
+        let (at, radius_m) = (chain.points()[k], chain.connectors()[k].radius_m);
+        let mut throw = || normal(draws).clamp(-FARTHEST_THROW, FARTHEST_THROW);
+        let mut place = || at.map(|x| x + by_m * throw());
+        let is_free = |p: &Point<D>| setting.obstacles.clearance_m([*p; 2], radius_m, 1.0) > 0.0;
+        let free = (0..THROWS).map(|_| place()).find(is_free);
+        chain.points_mut()[k] = free.unwrap_or(at);
     }
+    body.scattered = Some(Scattered {
+        first: *connectors.start() as u32,
+        last: *connectors.end() as u32,
+        speed_m_s: 0.0,
+        goals_m: Vec::new(),
+        waited: 0,
+    });
+}
 
-    /// Finds the places where the scattered parts have to be. A chain that an earlier change has joined stays as it is.
-    fn begin_reform(&mut self, may_come: MayCome, speed_m_s: f64) {
-        let Some(scattered) = &self.body.scattered else { return };
-        let (first, last) = (scattered.first as usize, scattered.last as usize);
-        let (whole, came) = self.reformed(first..=last, may_come);
-        let (kind, value) = match came {
-            Reformed::Whole { double_passes } => {
-                if let Some(scattered) = &mut self.body.scattered {
-                    (scattered.goals_m, scattered.speed_m_s) = (flat(&whole), speed_m_s);
-                    scattered.waited = 0;
-                }
-                (EventKind::Reforming, double_passes as f64)
-            }
-            Reformed::GapTooLong { have_m, need_m, missing } => {
-                return self.gap_is_too_long(first, need_m - have_m, missing);
-            }
-            Reformed::NotReached { off_m } => (EventKind::NotReformed, off_m),
-        };
-        self.body.tally.not_reformed += u64::from(kind != EventKind::Reforming);
-        self.tell(kind, first, value);
-    }
+/// Finds the places where the scattered parts have to be. A chain that an earlier change has joined stays as it is.
+fn begin_reform<const D: usize>(
+    body: &mut Body<D>,
+    told: &mut Told<'_, D>,
+    may_come: MayCome,
+    speed_m_s: f64,
+) {
+    let Some(scattered) = &mut body.scattered else { return };
+    let (first, last) = (scattered.first as usize, scattered.last as usize);
+    let (whole, came) = reformed(&body.chain, first..=last, may_come);
+    let (kind, value) = match came {
+        Reformed::Whole { double_passes } => {
+            (scattered.goals_m, scattered.speed_m_s) = (flat(&whole), speed_m_s);
+            scattered.waited = 0;
+            (EventKind::Reforming, double_passes as f64)
+        }
+        Reformed::GapTooLong { have_m, need_m, missing } => {
+            return gap_is_too_long(body, told, first, need_m - have_m, missing);
+        }
+        Reformed::NotReached { off_m } => (EventKind::NotReformed, off_m),
+    };
+    body.tally.not_reformed += u64::from(kind != EventKind::Reforming);
+    told.tell(&body.chain, kind, first, value);
+}
 
-    /// Tells the length and the number of parts that are wanting.
-    fn gap_is_too_long(&mut self, first: usize, wanting_m: f64, missing: usize) {
-        let tally = &mut self.body.tally;
-        tally.not_reformed += 1;
-        tally.missing_parts = tally.missing_parts.max(missing as u64);
-        let event = self.event(EventKind::GapTooLong, first, wanting_m);
-        self.scratch.events.push(Event { missing: missing as u32, ..event });
-    }
+/// Tells the length and the number of parts that are wanting.
+fn gap_is_too_long<const D: usize>(
+    body: &mut Body<D>,
+    told: &mut Told<'_, D>,
+    first: usize,
+    wanting_m: f64,
+    missing: usize,
+) {
+    let tally = &mut body.tally;
+    tally.not_reformed += 1;
+    tally.missing_parts = tally.missing_parts.max(missing as u64);
+    let event = told.event(&body.chain, EventKind::GapTooLong, first, wanting_m);
+    told.events.push(Event { missing: missing as u32, ..event });
+}
 
-    /// Returns where the connectors would be if the chain were whole, and whether it can be.
-    /// Connectors that never move do not move for that either.
-    fn reformed(
-        &self,
-        scattered: RangeInclusive<usize>,
-        may_come: MayCome,
-    ) -> (Vec<Point<D>>, Reformed) {
-        let chain = &self.body.chain;
-        let mut whole = chain.clone();
-        // An end cannot come from outside the range of coordinates.
-        let came = reform(&mut whole, scattered, may_come)
-            .unwrap_or(Reformed::NotReached { off_m: chain.max_rod_violation_m() });
-        let stays = |k: &usize| chain.connectors()[*k].is_still();
-        let would_move = |k: usize| whole.points()[k] != chain.points()[k];
-        let came = match (0..whole.points().len()).filter(stays).find(|&k| would_move(k)) {
-            None => came,
-            Some(k) => {
-                let off_m = distance(whole.points()[k], chain.points()[k]);
-                Reformed::NotReached { off_m }
-            }
-        };
-        (whole.points().to_vec(), came)
-    }
+/// Returns where the connectors would be if the chain were whole, and whether it can be.
+/// Connectors that never move do not move for that either.
+fn reformed<const D: usize>(
+    chain: &Chain<D>,
+    scattered: RangeInclusive<usize>,
+    may_come: MayCome,
+) -> (Vec<Point<D>>, Reformed) {
+    let mut whole = chain.clone();
+    // An end cannot come from outside the range of coordinates.
+    let came = reform(&mut whole, scattered, may_come)
+        .unwrap_or(Reformed::NotReached { off_m: chain.max_rod_violation_m() });
+    let stays = |k: &usize| chain.connectors()[*k].is_still();
+    let would_move = |k: usize| whole.points()[k] != chain.points()[k];
+    let came = match (0..whole.points().len()).filter(stays).find(|&k| would_move(k)) {
+        None => came,
+        Some(k) => {
+            let off_m = distance(whole.points()[k], chain.points()[k]);
+            Reformed::NotReached { off_m }
+        }
+    };
+    (whole.points().to_vec(), came)
 }

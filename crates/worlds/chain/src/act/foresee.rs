@@ -1,42 +1,47 @@
 //! The choice of an initiator that decides for itself, while something approaches: to go as it wants, or to rest.
 
-use super::Acting;
-use super::drive::Wish;
+use super::Initiator;
+use super::situation::is_held;
+use super::wish::Wish;
 use crate::driver::Task;
-use crate::motion::escape::Lead;
-use crate::rods::chain::{Connector, Mobility};
+use crate::motion::escape::{Escaper, Lead};
+use crate::rods::chain::Chain;
 use crate::rods::geometry::{in_dimensions, sub};
 use crate::rods::veto::Source;
+use crate::state::Body;
 
-impl<const D: usize> Acting<'_, D> {
-    /// Lets an initiator give way to what approaches, if roll-outs tell that the chain is then inside for less time.
-    pub(super) fn look_ahead(&mut self, task: &Task<D>, wish: Wish<D>) {
-        let Some(escaper) = &self.scratch.escaper else { return };
-        let Some(every) = escaper.chooses_every() else { return };
-        match self.lead_by(task, wish) {
-            None => self.body.way_out.set_rests(false),
-            Some(lead) if (self.now + u64::from(self.slot)).is_multiple_of(every) => {
-                let around = (&self.body.chain, &self.scratch.obstacles);
-                escaper.choose(around, &self.world.rules, &lead, &mut self.body.way_out);
-            }
-            Some(_) => {}
+/// Returns whether an initiator gives way to what approaches, because roll-outs tell that the chain is then inside
+/// for less time.
+pub(super) fn gives_way<const D: usize>(
+    who: Initiator<'_, D>,
+    body: &mut Body<D>,
+    escaper: Option<&Escaper<D>>,
+    wish: Wish<D>,
+) -> bool {
+    let Some(escaper) = escaper else { return false };
+    let Some(every) = escaper.chooses_every() else { return false };
+    let setting = who.setting;
+    match lead_by(who.task, &body.chain, wish) {
+        None => body.way_out.set_rests(false),
+        Some(lead) if (setting.now + u64::from(setting.slot)).is_multiple_of(every) => {
+            let (rules, way_out) = (&setting.world.rules, &mut body.way_out);
+            escaper.choose(&body.chain, setting.obstacles, rules, &lead, way_out);
         }
-        self.gives_way |= self.body.way_out.rests();
+        Some(_) => {}
     }
+    body.way_out.rests()
+}
 
-    /// Returns an initiator's wish to lead; none if it has none, or no choice: operators are obeyed, and chains that are
-    /// held somewhere move by return passes, which cost too much to be rolled out.
-    fn lead_by(&self, task: &Task<D>, wish: Wish<D>) -> Option<Lead<D>> {
-        let chain = &self.body.chain;
-        let is_held = |c: &Connector<D>| c.is_still() || c.mobility != Mobility::Free;
-        if task.source() != Source::Autonomous || chain.connectors().iter().any(is_held) {
-            return None;
-        }
-        let to = match wish {
-            Wish::Go(to) => to,
-            Wish::Steer(pose) => in_dimensions(pose.at),
-            _ => return None,
-        };
-        Some(Lead { k: task.agent, way_m: sub(to, chain.points()[task.agent]) })
+/// Returns an initiator's wish to lead; none if it has none, or no choice: operators are obeyed, and chains that are
+/// held somewhere move by return passes, which cost too much to be rolled out.
+fn lead_by<const D: usize>(task: &Task<D>, chain: &Chain<D>, wish: Wish<D>) -> Option<Lead<D>> {
+    if task.source() != Source::Autonomous || is_held(chain) {
+        return None;
     }
+    let to = match wish {
+        Wish::Go(to) => to,
+        Wish::Steer(steered) => in_dimensions(steered.pose.at),
+        _ => return None,
+    };
+    Some(Lead { k: task.agent, way_m: sub(to, chain.points()[task.agent]) })
 }

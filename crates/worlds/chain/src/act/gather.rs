@@ -1,12 +1,15 @@
 //! Scattered parts of a broken chain on their way to the places where they are joined again (slide F3).
 
-use super::Acting;
+use super::Setting;
+use super::told::Told;
 use crate::events::{Event, EventKind};
 use crate::rods::TOLERANCE_M;
+use crate::rods::chain::Chain;
 use crate::rods::geometry::{Point, toward};
+use crate::rods::obstacle::Obstacles;
 use crate::rods::passage::in_the_way;
 use crate::rods::sweep::Sweep;
-use crate::state::Scattered;
+use crate::state::{Body, Scattered};
 use std::ops::Range;
 
 /// Parts of a step that are tried one after the other where something is in the way.
@@ -22,54 +25,99 @@ struct Tried {
     blocked_by: Option<u32>,
 }
 
-impl<const D: usize> Acting<'_, D> {
-    /// Moves scattered parts straight to the places where they are joined again, as far as nothing is in their way; the
-    /// chain is whole when all are there and there is room for their rods.
-    pub(super) fn come_together(&mut self) {
-        let going = |s: &&Scattered| !s.goals_m.is_empty();
-        let Some(scattered) = self.body.scattered.as_ref().filter(going) else { return };
-        let (first, last) = (scattered.first as usize, scattered.last as usize);
-        let step_m = scattered.speed_m_s * self.world.dt_s;
-        let goals = scattered.goals_m.chunks_exact(D);
-        let goals: Vec<Point<D>> = goals.map(|at| std::array::from_fn(|i| at[i])).collect();
+/// The connectors of a broken chain, and the places where they are joined again.
+struct Parts<'a, const D: usize> {
+    chain: &'a mut Chain<D>,
+    goals: Vec<Point<D>>,
+    obstacles: &'a Obstacles<D>,
+    /// Longest way of a part in a cycle, meters.
+    step_m: f64,
+}
+
+/// Moves scattered parts straight to the places where they are joined again, as far as nothing is in their way; the
+/// chain is whole when all are there and there is room for their rods.
+pub(super) fn come_together<const D: usize>(
+    setting: Setting<'_, D>,
+    body: &mut Body<D>,
+    told: &mut Told<'_, D>,
+) {
+    let going = |s: &&Scattered| !s.goals_m.is_empty();
+    let Some(scattered) = body.scattered.as_ref().filter(going) else { return };
+    let (first, last) = (scattered.first as usize, scattered.last as usize);
+    let step_m = scattered.speed_m_s * setting.world.dt_s;
+    let goals = scattered.goals_m.chunks_exact(D);
+    let goals: Vec<Point<D>> = goals.map(|at| std::array::from_fn(|i| at[i])).collect();
+    let obstacles = setting.obstacles;
+    let mut parts = Parts { chain: &mut body.chain, goals, obstacles, step_m };
+    let tried = parts.go_on(first, last);
+    if !parts.are_there() {
+        return wait_for(setting, body, told, &tried);
+    }
+    match parts.in_a_new_rod(first - 1..last + 1) {
+        None => is_whole_again(body, told, first),
+        blocked_by => wait_for(setting, body, told, &Tried { blocked_by, ..tried }),
+    }
+}
+
+/// Ends the state of being broken.
+fn is_whole_again<const D: usize>(body: &mut Body<D>, told: &mut Told<'_, D>, first: usize) {
+    body.scattered = None;
+    body.tally.reformed += 1;
+    told.tell(&body.chain, EventKind::Reformed, first, 0.0);
+}
+
+/// Counts the time in which nothing went on, and gives up after too much of it.
+fn wait_for<const D: usize>(
+    setting: Setting<'_, D>,
+    body: &mut Body<D>,
+    told: &mut Told<'_, D>,
+    tried: &Tried,
+) {
+    let Some(scattered) = &mut body.scattered else { return };
+    scattered.waited = if tried.has_moved { 0 } else { scattered.waited.saturating_add(1) };
+    if setting.world.starts_s(scattered.waited) <= PATIENCE_S {
+        return;
+    }
+    (scattered.speed_m_s, scattered.goals_m, scattered.waited) = (0.0, Vec::new(), 0);
+    let first = scattered.first as usize;
+    body.tally.not_reformed += 1;
+    let off_m = body.chain.max_rod_violation_m();
+    let event = told.event(&body.chain, EventKind::NotReformed, first, off_m);
+    told.events.push(Event { obstacle: tried.blocked_by, ..event });
+}
+
+impl<const D: usize> Parts<'_, D> {
+    /// Moves the scattered connectors, from the first to the last, and the ends beside them.
+    fn go_on(&mut self, first: usize, last: usize) -> Tried {
         let mut tried = Tried::default();
         // A whole end that comes along goes as one, because its rods hold.
-        let ends = [0..first, last + 1..goals.len()];
+        let ends = [0..first, last + 1..self.goals.len()];
         for part in (first..=last).map(|k| k..k + 1).chain(ends) {
-            let one = self.gather_part(part, &goals, step_m);
+            let one = self.gather(part);
             tried.has_moved |= one.has_moved;
             tried.blocked_by = tried.blocked_by.or(one.blocked_by);
         }
-        if self.body.chain.points() != goals {
-            return self.wait_for(first, &tried);
-        }
-        match self.in_a_new_rod(first - 1..last + 1) {
-            None => self.is_whole_again(first),
-            blocked_by => self.wait_for(first, &Tried { blocked_by, ..tried }),
-        }
+        tried
     }
 
-    /// Ends the state of being broken.
-    fn is_whole_again(&mut self, first: usize) {
-        self.body.scattered = None;
-        self.body.tally.reformed += 1;
-        self.tell(EventKind::Reformed, first, 0.0);
+    fn are_there(&self) -> bool {
+        self.chain.points() == self.goals
     }
 
     /// Moves connectors and the rods between them toward their places.
-    fn gather_part(&mut self, part: Range<usize>, goals: &[Point<D>], step_m: f64) -> Tried {
-        let from = self.body.chain.points()[part.clone()].to_vec();
-        let goals = &goals[part.clone()];
+    fn gather(&mut self, part: Range<usize>) -> Tried {
+        let from = self.chain.points()[part.clone()].to_vec();
+        let goals = &self.goals[part.clone()];
         let mut tried = Tried::default();
         if from == goals {
             return tried;
         }
         for shorter in SHORTER {
-            let ways = from.iter().zip(goals);
-            let to: Vec<_> = ways.map(|(p, goal)| toward(*p, *goal, shorter * step_m)).collect();
+            let (ways, step_m) = (from.iter().zip(goals), shorter * self.step_m);
+            let to: Vec<_> = ways.map(|(p, goal)| toward(*p, *goal, step_m)).collect();
             match self.in_its_way(part.start, &from, &to) {
                 None => {
-                    self.body.chain.points_mut()[part].copy_from_slice(&to);
+                    self.chain.points_mut()[part].copy_from_slice(&to);
                     return Tried { has_moved: true, ..tried };
                 }
                 by => tried.blocked_by = tried.blocked_by.or(by),
@@ -80,14 +128,13 @@ impl<const D: usize> Acting<'_, D> {
 
     /// Returns the obstacle in the way of connectors, the first of which is `k`, and of the rods between them.
     fn in_its_way(&self, k: usize, from: &[Point<D>], to: &[Point<D>]) -> Option<u32> {
-        let (chain, obstacles) = (&self.body.chain, &self.scratch.obstacles);
         let of_connector = |i: usize| {
             let sweep = Sweep { from: [from[i]; 2], to: [to[i]; 2] };
-            in_the_way(sweep, chain.connectors()[k + i].radius_m, obstacles)
+            in_the_way(sweep, self.chain.connectors()[k + i].radius_m, self.obstacles)
         };
         let of_rod = |i: usize| {
             let sweep = Sweep { from: [from[i], from[i + 1]], to: [to[i], to[i + 1]] };
-            in_the_way(sweep, chain.rods()[k + i].radius_m, obstacles)
+            in_the_way(sweep, self.chain.rods()[k + i].radius_m, self.obstacles)
         };
         let blocked = (0..from.len()).find_map(of_connector);
         blocked.or_else(|| (0..from.len().saturating_sub(1)).find_map(of_rod))
@@ -95,25 +142,10 @@ impl<const D: usize> Acting<'_, D> {
 
     /// Returns an obstacle in which one of these rods would be, now that their ends are in place.
     fn in_a_new_rod(&self, mut rods: Range<usize>) -> Option<u32> {
-        let chain = &self.body.chain;
         rods.find_map(|rod| {
-            let ends = [chain.points()[rod], chain.points()[rod + 1]];
-            let radius_m = chain.rods()[rod].radius_m - TOLERANCE_M;
-            self.scratch.obstacles.first_at(ends, radius_m)
+            let ends = [self.chain.points()[rod], self.chain.points()[rod + 1]];
+            let radius_m = self.chain.rods()[rod].radius_m - TOLERANCE_M;
+            self.obstacles.first_at(ends, radius_m)
         })
-    }
-
-    /// Counts the time in which nothing went on, and gives up after too much of it.
-    fn wait_for(&mut self, first: usize, tried: &Tried) {
-        let Some(scattered) = &mut self.body.scattered else { return };
-        scattered.waited = if tried.has_moved { 0 } else { scattered.waited.saturating_add(1) };
-        if self.world.starts_s(scattered.waited) <= PATIENCE_S {
-            return;
-        }
-        (scattered.speed_m_s, scattered.goals_m, scattered.waited) = (0.0, Vec::new(), 0);
-        self.body.tally.not_reformed += 1;
-        let off_m = self.body.chain.max_rod_violation_m();
-        let event = self.event(EventKind::NotReformed, first, off_m);
-        self.scratch.events.push(Event { obstacle: tried.blocked_by, ..event });
     }
 }

@@ -4,19 +4,21 @@
 #[cfg(test)]
 mod tests;
 
-use super::Acting;
+use super::situation::is_held;
+use super::{Acting, Initiator, Setting};
 use crate::arms::arm::Arm;
 use crate::arms::kinematics::Aim;
 use crate::arms::plan::JointSpace;
 use crate::clearance::least_clearance;
-use crate::driver::Task;
 use crate::driver::errand::Errand;
 use crate::motion::go::TOLERANCE_M;
 use crate::motion::replan::Climbed;
-use crate::rods::chain::{Connector, Mobility};
+use crate::rods::chain::Chain;
 use crate::rods::geometry::{Point, between, distance};
 use crate::rods::passage::passed;
 use crate::rods::veto::{Motion, Moved, Outcome, Reason, Source, Veto};
+use crate::scratch::Places;
+use crate::state::Body;
 
 /// Parts of a motion that are tried, each half of the one before.
 const TRIES: usize = 6;
@@ -28,12 +30,18 @@ const NEARER: f64 = 0.25;
 const ROUNDING: f64 = 1e-9;
 
 /// A connector that leads, and where to.
-type Led<const D: usize> = (usize, Point<D>);
+#[derive(Clone, Copy)]
+struct Led<const D: usize> {
+    k: usize,
+    to: Point<D>,
+}
 
 /// A posture of an arm: its joints, and where they put its connectors.
 struct Posed<const D: usize> {
     joints: Vec<f64>,
     points: Vec<Point<D>>,
+    /// The connectors that it is to lead, and their targets.
+    led: Vec<Led<D>>,
 }
 
 /// The motion that joints are to follow.
@@ -43,77 +51,79 @@ struct Wanted<'b, const D: usize> {
     led: &'b [Led<D>],
 }
 
-impl<'a, const D: usize> Acting<'a, D> {
-    fn arm(&self) -> Option<&'a Arm> {
-        self.spec.arm.as_deref()
-    }
+/// An arm whose joints come along with its chain.
+pub(super) struct Jointed<'a, const D: usize> {
+    setting: Setting<'a, D>,
+    before: &'a Places<D>,
+    arm: &'a Arm,
+    chain: &'a mut Chain<D>,
+    joints: &'a mut Vec<f64>,
+}
 
-    /// Notes the joints of an arm at the start of its cycle.
-    pub(super) fn note_joints(&mut self) {
-        let joints = self.body.joints.as_deref().unwrap_or_default();
-        self.scratch.joints_before.clear();
-        self.scratch.joints_before.extend_from_slice(joints);
-        self.scratch.joints_escaped.clone_from(&self.scratch.joints_before);
+/// Returns the distance at which an initiator is where a script wants it, meters: where a connector is held, return
+/// passes bring it only so near.
+pub(super) fn there_m<const D: usize>(setting: Setting<'_, D>, chain: &Chain<D>) -> f64 {
+    match setting.spec.arm.as_deref() {
+        Some(arm) => arm.follower.exact_m(),
+        None if !chain.is_plain() && is_held(chain) => TOLERANCE_M,
+        None => chain.least_move_m(),
     }
+}
 
-    /// Returns the distance at which an initiator is where a script wants it, meters: where a connector is held, return
-    /// passes bring it only so near.
-    pub(super) fn there_m(&self) -> f64 {
-        let chain = &self.body.chain;
-        let is_held = |c: &Connector<D>| c.is_still() || c.mobility != Mobility::Free;
-        match self.arm() {
-            Some(arm) => arm.follower.exact_m(),
-            None if !chain.is_plain() && chain.connectors().iter().any(is_held) => TOLERANCE_M,
-            None => chain.least_move_m(),
+/// Lets the joints come along with an initiator's motion; what they cannot do is vetoed.
+pub(super) fn come_along<const D: usize>(
+    who: Initiator<'_, D>,
+    acting: &mut Acting<'_, D>,
+    to: Point<D>,
+    climbed: Climbed<D>,
+) -> Climbed<D> {
+    let Some(mut arm) = Jointed::of(who.setting, acting.before, acting.body) else {
+        return climbed;
+    };
+    let k = who.task.agent;
+    let (has_moved, at) = match climbed {
+        // The chain reaches a place to some tolerance, the joints exactly.
+        Climbed::Straight(_) => (true, to),
+        Climbed::Shorter { .. } | Climbed::Sideways { .. } => (true, arm.chain.points()[k]),
+        _ => (false, to),
+    };
+    let followed = arm.follow(&[Led { k, to: at }], TRIES).or_else(|veto| {
+        let decides = who.task.source() == Source::Autonomous;
+        if decides && arm.approach(Led { k, to }) { Ok(()) } else { Err(veto) }
+    });
+    match followed {
+        Ok(()) if has_moved => climbed,
+        Ok(()) => Climbed::Straight(alone(k)),
+        Err(veto) => {
+            acting.vetoed(&veto);
+            if has_moved { Climbed::Vetoed(veto) } else { climbed }
         }
     }
+}
 
-    /// Lets the joints follow an initiator's motion; what they cannot do is vetoed.
-    pub(super) fn joints_climb(
-        &mut self,
-        task: &Task<D>,
-        to: Point<D>,
-        climbed: Climbed<D>,
-    ) -> Climbed<D> {
-        if self.body.joints.is_none() {
-            return climbed;
-        }
-        let k = task.agent;
-        let (has_moved, at) = match climbed {
-            // The chain reaches a place to some tolerance, the joints exactly.
-            Climbed::Straight(_) => (true, to),
-            Climbed::Shorter { .. } | Climbed::Sideways { .. } => {
-                (true, self.body.chain.points()[k])
-            }
-            _ => (false, to),
-        };
-        let followed = self.joints_follow(&[(k, at)], TRIES).or_else(|veto| {
-            let comes_nearer = task.source() == Source::Autonomous && self.joints_approach((k, to));
-            if comes_nearer { Ok(()) } else { Err(veto) }
-        });
-        match followed {
-            Ok(()) if has_moved => climbed,
-            Ok(()) => Climbed::Straight(alone(k)),
-            Err(veto) => {
-                self.vetoed(&veto);
-                if has_moved { Climbed::Vetoed(veto) } else { climbed }
-            }
-        }
+impl<'a, const D: usize> Jointed<'a, D> {
+    /// Returns the arm that a chain represents, if it does.
+    pub(super) fn of(
+        setting: Setting<'a, D>,
+        before: &'a Places<D>,
+        body: &'a mut Body<D>,
+    ) -> Option<Self> {
+        let (arm, joints) = (setting.spec.arm.as_deref()?, body.joints.as_mut()?);
+        Some(Self { setting, before, arm, chain: &mut body.chain, joints })
     }
 
     /// Lets the joints carry out an order: all of it, or nothing.
-    pub(super) fn joints_obey(
+    pub(super) fn obey(
         &mut self,
         errand: &Errand<D>,
         part: f64,
         outcome: Outcome<D>,
     ) -> Outcome<D> {
-        if self.body.joints.is_none() {
-            return outcome;
-        }
         let followed = match errand.motion(part) {
-            Motion::Connector { k, to } => self.joints_follow(&[(k, to)], 1),
-            Motion::Rod { i, to } => self.joints_follow(&[(i, to[0]), (i + 1, to[1])], 1),
+            Motion::Connector { k, to } => self.follow(&[Led { k, to }], 1),
+            Motion::Rod { i, to: [to, next] } => {
+                self.follow(&[Led { k: i, to }, Led { k: i + 1, to: next }], 1)
+            }
         };
         match (followed, outcome) {
             (Ok(()), Outcome::Vetoed(_)) => Outcome::Moved(alone(errand.first)),
@@ -129,7 +139,7 @@ impl<'a, const D: usize> Acting<'a, D> {
     ///
     /// # Errors
     /// When no part goes: the objection to the least. Then everything is as before the motion.
-    fn joints_follow(&mut self, led: &[Led<D>], tries: usize) -> Result<(), Veto<D>> {
+    fn follow(&mut self, led: &[Led<D>], tries: usize) -> Result<(), Veto<D>> {
         let (from, guide) = self.back_to_joints();
         let guide = (guide != from).then_some(&guide[..]);
         let guided = Wanted { from: &from, guide, led };
@@ -138,8 +148,8 @@ impl<'a, const D: usize> Acting<'a, D> {
         let mut part = 1.0;
         for _ in 0..tries {
             for wanted in [&guided, &free] {
-                let (posed, led) = self.posed(wanted, part);
-                match self.joints_object(&from, &posed, &led) {
+                let posed = self.posed(wanted, part);
+                match self.objection(&from, &posed) {
                     None => {
                         self.take(posed);
                         return Ok(());
@@ -153,13 +163,14 @@ impl<'a, const D: usize> Acting<'a, D> {
     }
 
     /// Brings an initiator nearer to a place to which its joints cannot take it straight; returns whether it came.
-    fn joints_approach(&mut self, (k, to): Led<D>) -> bool {
+    fn approach(&mut self, led: Led<D>) -> bool {
+        let Led { k, to } = led;
         let (from, _) = self.back_to_joints();
-        let wanted = Wanted { from: &from, guide: None, led: &[(k, to)] };
-        let (posed, _) = self.posed(&wanted, 1.0);
+        let mut posed = self.posed(&Wanted { from: &from, guide: None, led: &[led] }, 1.0);
         let left_m = distance(posed.points[k], to);
+        posed.led[0].to = posed.points[k];
         let comes = left_m <= (1.0 - NEARER) * distance(from[k], to)
-            && self.joints_object(&from, &posed, &[(k, posed.points[k])]).is_none();
+            && self.objection(&from, &posed).is_none();
         if comes {
             self.take(posed);
         }
@@ -168,10 +179,7 @@ impl<'a, const D: usize> Acting<'a, D> {
 
     /// Brings the joints along a motion of the chain out of the way: to where nothing objects or, where parts are
     /// in something already, to where they are in it least.
-    pub(super) fn joints_escape(&mut self) {
-        if self.body.joints.is_none() {
-            return;
-        }
+    pub(super) fn escape(&mut self) {
         let (from, guide) = self.back_to_joints();
         if guide == from {
             return;
@@ -180,8 +188,8 @@ impl<'a, const D: usize> Acting<'a, D> {
         let mut best: Option<Posed<D>> = None;
         let (mut least_m, mut part) = (self.clearance_m(&from), 1.0);
         for _ in 0..ESCAPES {
-            let (posed, _) = self.posed(&wanted, part);
-            let Some(veto) = self.joints_object(&from, &posed, &[]) else {
+            let posed = self.posed(&wanted, part);
+            let Some(veto) = self.objection(&from, &posed) else {
                 best = Some(posed);
                 break;
             };
@@ -198,20 +206,15 @@ impl<'a, const D: usize> Acting<'a, D> {
 
     /// Puts the chain back to where its joints are; returns where that is, and where the chain was.
     fn back_to_joints(&mut self) -> (Vec<Point<D>>, Vec<Point<D>>) {
-        let (Some(arm), Some(joints)) = (self.arm(), &self.body.joints) else {
-            return Default::default();
-        };
-        let from: Vec<Point<D>> = arm.places(joints);
-        let guide = self.body.chain.points().to_vec();
-        self.body.chain.points_mut().copy_from_slice(&from);
+        let from: Vec<Point<D>> = self.arm.places(self.joints);
+        let guide = self.chain.points().to_vec();
+        self.chain.points_mut().copy_from_slice(&from);
         (from, guide)
     }
 
-    /// Returns the posture in which the joints follow a part of a motion, and where that leads to.
-    fn posed(&self, wanted: &Wanted<'_, D>, part: f64) -> (Posed<D>, Vec<Led<D>>) {
-        let (Some(arm), Some(joints)) = (self.arm(), &self.body.joints) else {
-            return (Posed { joints: Vec::new(), points: Vec::new() }, Vec::new());
-        };
+    /// Returns the posture in which the joints follow a part of a motion.
+    fn posed(&self, wanted: &Wanted<'_, D>, part: f64) -> Posed<D> {
+        let arm = self.arm;
         let on_the_way = |k: usize, to: Point<D>| match part < 1.0 {
             true => between(wanted.from[k], to, part),
             false => to,
@@ -220,39 +223,34 @@ impl<'a, const D: usize> Acting<'a, D> {
             let places = guide.iter().enumerate();
             places.map(|(k, to)| arm.in_base(on_the_way(k, *to))).collect::<Vec<_>>()
         });
-        let led: Vec<Led<D>> = wanted.led.iter().map(|(k, to)| (*k, on_the_way(*k, *to))).collect();
-        let aim = |(k, to): &Led<D>| Aim { connector: *k, at_m: arm.in_base(*to) };
+        let on_its_way = |&Led { k, to }: &Led<D>| Led { k, to: on_the_way(k, to) };
+        let led: Vec<Led<D>> = wanted.led.iter().map(on_its_way).collect();
+        let aim = |led: &Led<D>| Aim { connector: led.k, at_m: arm.in_base(led.to) };
         let aims: Vec<Aim> = led.iter().map(aim).collect();
-        let room = arm.follower.room(&self.scratch.joints_before, self.world.dt_s);
-        let joints = arm.follower.follow(joints, &room, guide.as_deref(), &aims);
+        let room = arm.follower.room(&self.before.joints, self.setting.world.dt_s);
+        let joints = arm.follower.follow(self.joints, &room, guide.as_deref(), &aims);
         let points = arm.places(&joints);
-        (Posed { joints, points }, led)
+        Posed { joints, points, led }
     }
 
     /// Returns the objection to a posture: of the joints, that do not take a connector to where it is led; of speeds;
     /// of the chain and all that is around it.
-    fn joints_object(
-        &mut self,
-        from: &[Point<D>],
-        posed: &Posed<D>,
-        led: &[Led<D>],
-    ) -> Option<Veto<D>> {
-        let arm = self.arm()?;
-        let k = led.first().map_or(0, |(k, _)| *k);
+    fn objection(&mut self, from: &[Point<D>], posed: &Posed<D>) -> Option<Veto<D>> {
+        let follower = &self.arm.follower;
+        let k = posed.led.first().map_or(0, |led| led.k);
         let veto = |by, reason| Veto { by, from: k, reason, obstacle: None, reached: from[k] };
-        let is_off = |(k, to): &Led<D>| distance(posed.points[*k], *to) > arm.follower.exact_m();
-        if led.iter().any(is_off) {
-            let is_at_limit = arm.follower.is_at_limit(&posed.joints);
+        let is_off = |led: &Led<D>| distance(posed.points[led.k], led.to) > follower.exact_m();
+        if posed.led.iter().any(is_off) {
+            let is_at_limit = follower.is_at_limit(&posed.joints);
             return Some(veto(k, if is_at_limit { Reason::JointLimit } else { Reason::StepLimit }));
         }
         let is_fast = |i: &usize| self.is_too_fast(*i, from[*i], posed.points[*i]);
         if let Some(by) = (0..from.len()).find(is_fast) {
             return Some(veto(by, Reason::StepLimit));
         }
-        let joints = self.body.joints.as_deref()?;
-        let (chain, obstacles) = (&self.body.chain, &self.scratch.obstacles);
-        let is_solid = self.world.rules.self_collision;
-        let space = JointSpace::new((arm, joints), chain, obstacles, is_solid, k);
+        let Setting { world, obstacles, .. } = self.setting;
+        let is_solid = world.rules.self_collision;
+        let space = JointSpace::new(self.arm, self.joints, self.chain, obstacles, is_solid, k);
         let objection = space.objection(&posed.points);
         let tunnels = |(by, id)| Veto { obstacle: Some(id), ..veto(by, Reason::WouldTunnel) };
         objection.or_else(|| self.passes(from, posed).map(tunnels))
@@ -261,34 +259,34 @@ impl<'a, const D: usize> Acting<'a, D> {
     /// Returns whether a connector goes farther than it may: at the speed of led joints from where it was before this
     /// motion, or at that of escapes from where it was before the cycle.
     fn is_too_fast(&self, i: usize, from: Point<D>, to: Point<D>) -> bool {
-        let escape_m = self.world.escape.as_ref().map(|e| e.speed_max_m_s * self.world.dt_s);
+        let world = self.setting.world;
+        let escape_m = world.escape.as_ref().map(|e| e.speed_max_m_s * world.dt_s);
         let is_beyond = |from, most_m: f64| distance(from, to) > most_m * (1.0 + ROUNDING);
-        is_beyond(from, self.world.rules.joint_step_max_m)
-            || escape_m.is_some_and(|most_m| is_beyond(self.scratch.before[i], most_m))
+        is_beyond(from, world.rules.joint_step_max_m)
+            || escape_m.is_some_and(|most_m| is_beyond(self.before.points[i], most_m))
     }
 
     /// Returns the rod's outer connector and the obstacle that it would pass through on the way to a posture, if any.
     fn passes(&mut self, from: &[Point<D>], posed: &Posed<D>) -> Option<(usize, u32)> {
-        let chain = &mut self.body.chain;
-        chain.points_mut().copy_from_slice(&posed.points);
-        let passed = passed(chain, from, &self.scratch.obstacles, 0.0);
-        chain.points_mut().copy_from_slice(from);
+        self.chain.points_mut().copy_from_slice(&posed.points);
+        let passed = passed(self.chain, from, self.setting.obstacles, 0.0);
+        self.chain.points_mut().copy_from_slice(from);
         passed.map(|passed| (passed.rod + 1, passed.obstacle))
     }
 
     /// Returns the least clearance that the chain has, or would have, at some places.
     fn clearance_m(&mut self, points: &[Point<D>]) -> f64 {
-        let was = self.body.chain.points().to_vec();
-        self.body.chain.points_mut().copy_from_slice(points);
-        let obstacles = &self.scratch.obstacles;
-        let (least_m, _) = least_clearance(&self.body.chain, obstacles, self.world.look_m, true);
-        self.body.chain.points_mut().copy_from_slice(&was);
+        let Setting { world, obstacles, .. } = self.setting;
+        let was = self.chain.points().to_vec();
+        self.chain.points_mut().copy_from_slice(points);
+        let (least_m, _) = least_clearance(self.chain, obstacles, world.look_m, true);
+        self.chain.points_mut().copy_from_slice(&was);
         least_m
     }
 
     fn take(&mut self, posed: Posed<D>) {
-        self.body.chain.points_mut().copy_from_slice(&posed.points);
-        self.body.joints = Some(posed.joints);
+        self.chain.points_mut().copy_from_slice(&posed.points);
+        *self.joints = posed.joints;
     }
 }
 

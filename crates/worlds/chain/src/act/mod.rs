@@ -1,12 +1,21 @@
 //! Phase *act*: the actions of one chain in a cycle.
 //!
+//! Its inputs are in a [`Setting`], a small context that is copied and that nothing changes: the world, the chain's
+//! share of it, the cycle and the obstacles around. Everything that it changes is in [`Acting`]: the chain's body,
+//! beside the places from which it set out, and the books of events and notes. The parts are functions over these
+//! two, or over less where they need less; joints, robots on wheels, agents and escapes have small structs of their
+//! own. Decisions go one way, as values: an escape says whether the chain is pressed, a driver has a
+//! [`Wish`](wish::Wish), which has an outcome, and the bounds, the answer and the measures go on from there. A part
+//! calls only parts to the right of it or below it.
+//!
 //! ```text
-//! broken.rs, gather.rs -> bounds.rs (out of the way) -> drive.rs -> foresee.rs -> go.rs, wheels.rs, obey.rs
-//!           -> bounds.rs (back into the claim) -> follow.rs -> measure.rs
-//! broken.rs -> drive.rs -> go.rs, later.rs         where nothing can object
-//!              drive.rs -> plan.rs                 where local rules come no nearer
-//!              go.rs -> talk.rs                    where each connector has an agent
-//!              joints.rs                           after every motion of an arm
+//! broken.rs, gather.rs -> bounds.rs (out of the way) -> drive.rs -> bounds.rs (back into the claim) -> obey.rs
+//!                      -> follow.rs -> measure.rs
+//! drive.rs -> wish.rs -> wheels.rs, plan.rs, obey.rs     what the initiator wants
+//!          -> foresee.rs                                 whether it rests instead
+//!          -> wheels.rs -> go.rs -> joints.rs, outcome.rs -> tasks.rs
+//! go.rs    -> later.rs                                   where nothing can object
+//!          -> talk.rs                                    where each connector has an agent
 //! ```
 
 mod bounds;
@@ -20,46 +29,71 @@ mod joints;
 mod later;
 mod measure;
 mod obey;
+mod outcome;
 mod plan;
+mod situation;
 mod talk;
+mod tasks;
 #[cfg(test)]
 mod tests;
+mod told;
 mod wheels;
+mod wish;
 
-use super::driver::Task;
-use super::driver::errand::Errand;
-use super::driver::external::Orders;
+use super::deploy::Deployment;
+use super::driver::{Objection, Task};
 use super::events::{Event, EventKind};
-use super::notes::Notes;
-use super::rods::geometry::{Bounds, in_dimensions};
-use super::scratch::Scratch;
+use super::rods::geometry::{Bounds, Point, distance};
+use super::rods::obstacle::Obstacles;
+use super::rods::propagate::Propagator;
+use super::rods::veto::Veto;
+use super::scratch::Places;
 use super::state::Body;
-use super::swarm::leader::Decision;
 use super::world::{ChainSpec, ChainWorld};
+use bounds::Escaping;
+use sidestep_kernel::stream::{Draws, Purpose};
 use sidestep_kernel::{Cycle, Slot, Turn};
+use talk::Talk;
+use told::Told;
+use wish::{Guide, Heard};
 
-/// One chain that acts.
-pub(crate) struct Acting<'a, const D: usize> {
+/// The setting in which a chain acts: nothing changes it during the cycle.
+#[derive(Clone, Copy)]
+struct Setting<'a, const D: usize> {
     world: &'a ChainWorld<D>,
     spec: &'a ChainSpec<D>,
     slot: Slot,
     now: Cycle,
-    /// Decision of its navigator.
-    decision: Option<Decision>,
-    /// Orders from outside,
-    orders: Orders,
-    /// and the errand on which they send it.
-    errand: Option<Errand<D>>,
-    /// The box that it stays in.
-    claim: Bounds<D>,
-    /// Whether its initiator gives way to parts that get out of something's way.
-    gives_way: bool,
+    obstacles: &'a Obstacles<D>,
+}
+
+/// The initiator of a chain in a cycle.
+#[derive(Clone, Copy)]
+struct Initiator<'a, const D: usize> {
+    setting: Setting<'a, D>,
+    task: &'a Task<D>,
+    follows: Follows,
+}
+
+/// Ways in which the rest of a chain follows its initiator.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Follows {
+    /// At once, moved by one process.
+    AtOnce,
+    /// At once, each connector moved by its agent.
+    AsTeam,
+    /// Later, because nothing can object: only the initiator moves for now.
+    Later,
+}
+
+/// A chain as it acts: what its cycle changes.
+struct Acting<'a, const D: usize> {
     body: &'a mut Body<D>,
-    scratch: &'a mut Scratch<D>,
-    /// Whether only the initiator moves for now.
-    puts_off: bool,
-    /// Whether its agents have talked in this cycle.
-    has_talked: bool,
+    /// The places where it was before the cycle.
+    before: &'a Places<D>,
+    propagator: &'a mut Propagator<D>,
+    talk: Talk<'a, D>,
+    told: Told<'a, D>,
 }
 
 /// Lets the chains of one conflict group act, one after the other.
@@ -79,79 +113,124 @@ pub(crate) fn act_one<const D: usize>(
     let &mut Turn { world, state, now, .. } = turn;
     let claim = state.claim(slot as usize);
     let meets = |s: &Slot| *s != slot && state.claim(*s as usize).meets(&claim);
-    turn.scratch.gather(world, state, now + 1, group.iter().copied().filter(meets));
-    let mut body = state.body_mut(slot as usize);
-    let mut acting = Acting {
-        world,
-        spec: &world.chains[slot as usize],
-        slot,
-        now,
-        decision: state.decision(slot as usize),
-        orders: Orders::default(),
-        errand: None,
-        claim,
-        gives_way: false,
-        body: &mut body,
-        scratch: turn.scratch,
-        puts_off: false,
-        has_talked: false,
-    };
-    acting.act();
+    turn.scratch.around.gather(world, state, now + 1, group.iter().copied().filter(meets));
+    cycle(turn, slot, claim);
 }
 
-impl<'a, const D: usize> Acting<'a, D> {
-    /// Makes one cycle of the chain, which stays in its claim.
-    fn act(&mut self) {
-        self.change();
-        self.take_orders();
-        self.puts_off = self.may_put_off();
-        if self.puts_off {
-            self.drive();
-            self.body.tally.steps += 1;
-            return;
-        }
-        self.body.catch_up();
-        self.scratch.before.clear();
-        self.scratch.before.extend_from_slice(self.body.chain.points());
-        self.scratch.escaped.clone_from(&self.scratch.before);
-        self.note_joints();
-        if self.body.scattered.is_some() {
-            self.come_together();
-        } else {
-            self.get_out_of_the_way();
-            self.drive();
-            self.rest_as_team();
-            self.keep_to_bounds();
-            self.answer();
-        }
-        self.scratch.robots_gap_m = f64::INFINITY;
-        self.follow();
-        self.measure();
+/// Makes one cycle of a chain, which stays in its claim.
+fn cycle<const D: usize>(turn: &mut Turn<'_, ChainWorld<D>>, slot: Slot, claim: Bounds<D>) {
+    let &mut Turn { world, state, now, .. } = turn;
+    let scratch = &mut *turn.scratch;
+    let spec = &world.chains[slot as usize];
+    let setting = Setting { world, spec, slot, now, obstacles: &scratch.around.all };
+    let notes = scratch.notes.as_deref_mut().filter(|notes| notes.slot == slot);
+    let mut told = Told { slot, now, events: &mut scratch.events, notes };
+    let mut body = state.body_mut(slot as usize);
+    let body = &mut *body;
+    broken::change(setting, body, &mut told);
+    let heard = Heard { decision: state.decision(slot as usize), orders: obey::taken(body) };
+    let follows = Follows::of(setting, body);
+    if follows != Follows::Later {
+        body.catch_up();
+        scratch.before.note(body);
+        scratch.escaped.note(body);
     }
+    let (escaper, escaped) = (scratch.escaper.as_mut(), &mut scratch.escaped);
+    let mut escaping = Escaping { escaper, escaped, claim };
+    let (before, propagator) = (&scratch.before, &mut scratch.propagator);
+    let talk = Talk::new(scratch.shown.as_mut());
+    let mut acting = Acting { body, before, propagator, talk, told };
+    if follows == Follows::Later {
+        let guide = Guide { heard, follows, escaping: &escaping, is_pressed: false };
+        drive::drive(setting, &mut acting, &guide);
+        acting.body.tally.steps += 1;
+        return;
+    }
+    match acting.body.scattered {
+        Some(_) => gather::come_together(setting, acting.body, &mut acting.told),
+        None => carry_on(setting, &mut acting, &mut escaping, heard, follows),
+    }
+    let (solid, seen) = (scratch.around.solid(), &mut scratch.seen);
+    let robots_gap_m = follow::follow(setting, &mut acting, solid, seen);
+    measure::measure(setting, &mut acting, &mut scratch.own, robots_gap_m);
+}
 
+/// Lets a whole chain get out of the way, carry out its task, and stay in its claim.
+fn carry_on<const D: usize>(
+    setting: Setting<'_, D>,
+    acting: &mut Acting<'_, D>,
+    escaping: &mut Escaping<'_, D>,
+    heard: Heard,
+    follows: Follows,
+) {
+    let is_pressed = escaping.get_out_of_the_way(setting, acting);
+    let guide = Guide { heard, follows, escaping, is_pressed };
+    let driven = drive::drive(setting, acting, &guide);
+    if follows == Follows::AsTeam {
+        talk::rest(setting, acting);
+    }
+    let veto = escaping.keep_to_bounds(setting, acting.body, acting.before);
+    if let Some(veto) = &veto {
+        acting.vetoed(veto);
+    }
+    let Some(errand) = driven.errand else { return };
+    if let Some(veto) = &veto {
+        obey::is_told(acting.body, veto);
+    }
+    obey::answer(acting.body, &errand, driven.gives_way);
+}
+
+impl<'a, const D: usize> Setting<'a, D> {
     /// Returns the present task; none after the last.
-    fn task(&self) -> Option<&'a Task<D>> {
-        self.spec.tasks.get(self.body.driving.task as usize)
+    fn task(self, body: &Body<D>) -> Option<&'a Task<D>> {
+        self.spec.tasks.get(body.driving.task as usize)
     }
 
-    /// Returns an event of this chain.
-    fn event(&self, kind: EventKind, connector: usize, value: f64) -> Event {
-        let (cycle, chain) = (self.now, self.slot);
-        let at_m = in_dimensions(self.body.chain.points()[connector]);
-        let (connector, reason, obstacle, missing) = (connector as u32, None, None, 0);
-        Event { cycle, chain, kind, connector, at_m, reason, obstacle, missing, value }
+    /// Returns the chain's random draws of this cycle for a purpose.
+    fn draws(self, purpose: Purpose) -> Draws {
+        self.world.streams.draws(self.slot, self.now, purpose)
+    }
+}
+
+impl<const D: usize> Initiator<'_, D> {
+    /// Returns the place of the initiator.
+    fn at(self, body: &Body<D>) -> Point<D> {
+        body.chain.points()[self.task.agent]
     }
 
-    /// Notes something for somebody who asks about this chain.
-    fn note(&mut self, note: impl FnOnce(&mut Notes<D>)) {
-        let slot = self.slot;
-        if let Some(notes) = self.scratch.notes.as_deref_mut().filter(|notes| notes.slot == slot) {
-            note(notes);
+    /// Returns the way that it goes in a cycle at its speed, meters.
+    fn step_m(self) -> f64 {
+        self.task.speed_m_s * self.setting.world.dt_s
+    }
+}
+
+impl Follows {
+    /// Returns how a chain follows its initiator in this cycle.
+    fn of<const D: usize>(setting: Setting<'_, D>, body: &Body<D>) -> Self {
+        match setting.world.deployment {
+            Deployment::Team => Self::AsTeam,
+            Deployment::Direct if later::may_put_off(setting, body) => Self::Later,
+            Deployment::Direct => Self::AtOnce,
         }
     }
+}
 
-    /// Records an event.
-    fn tell(&mut self, kind: EventKind, connector: usize, value: f64) {
-        self.scratch.events.push(self.event(kind, connector, value));
+impl<const D: usize> Acting<'_, D> {
+    /// Counts a veto; of several in a row by one connector for one reason only the first is an
+    /// event.
+    fn vetoed(&mut self, veto: &Veto<D>) {
+        let Self { body, before, told, .. } = self;
+        body.tally.add_veto(veto.reason);
+        told.note(|notes| notes.vetoes.push(*veto));
+        let objection = Some(Objection { by: veto.by as u32, reason: veto.reason });
+        let driving = &mut body.driving;
+        if driving.told.is_none() || driving.objection != objection {
+            let way_m = distance(veto.reached, before.points[veto.from]);
+            let event = told.event(&body.chain, EventKind::Veto, veto.by, way_m);
+            let (reason, obstacle) = (Some(veto.reason), veto.obstacle);
+            told.events.push(Event { reason, obstacle, ..event });
+            driving.told = driving.told.or(Some(EventKind::Veto));
+        }
+        driving.objection = objection;
     }
 }

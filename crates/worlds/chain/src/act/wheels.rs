@@ -1,13 +1,16 @@
 //! An initiator on wheels: the link between the swarm's leader and this world (slides N1 to N6).
 
-use super::Acting;
-use super::go::Went;
-use crate::driver::{Driver, Task};
+use super::go::{give_way, go};
+use super::outcome::Went;
+use super::{Acting, Initiator};
+use crate::driver::Driver;
 use crate::formation::Robot;
 use crate::navigate::{Goal, Navigator};
 use crate::rods::geometry::{Point, distance, in_dimensions, toward};
+use crate::state::Body;
 use crate::swarm::drive::{Pose, Wheels};
 use crate::swarm::follower::pace;
+use crate::swarm::leader::Decision;
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
 
 /// Time for which a leader stands and waits for a robot that is late, s.
@@ -21,41 +24,108 @@ const LEFT_TO_OTHERS: f64 = 0.25;
 /// Angle between two headings that differ by rounding at most.
 pub(super) const SAME_RAD: f64 = 1e-9;
 
-impl<const D: usize> Acting<'_, D> {
-    /// Returns whether a navigator has reached its goal.
-    pub(super) fn has_arrived(&self, task: &Task<D>, navigator: &Navigator) -> bool {
-        let at = in_dimensions(self.body.chain.points()[task.agent]);
-        let index = self.body.driving.next as usize;
-        navigator.goal.as_ref().is_some_and(|goal| goal.is_reached(at, index))
+/// A step on wheels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Steered {
+    /// The pose to which it leads.
+    pub(super) pose: Pose,
+    /// The navigator's decision on it, at full speed.
+    wheels: Wheels,
+}
+
+/// A navigator and the chain that it leads.
+pub(super) struct Wheeled<'a, const D: usize> {
+    pub(super) who: Initiator<'a, D>,
+    pub(super) navigator: &'a Navigator,
+    pub(super) body: &'a mut Body<D>,
+}
+
+/// Moves an initiator on wheels; one whose way is blocked may turn on the spot.
+pub(super) fn go_on_wheels<const D: usize>(
+    who: Initiator<'_, D>,
+    acting: &mut Acting<'_, D>,
+    steered: Steered,
+) {
+    let Driver::Navigate(navigator) = &who.task.driver else { return };
+    let Steered { pose, wheels } = steered;
+    if comes_too_near(acting.body, who.task.agent, pose.at) {
+        give_way(who, acting);
+        return Wheeled { who, navigator, body: acting.body }.turn_where_blocked(wheels);
+    }
+    let was = who.at(acting.body);
+    let went = go(who, acting, in_dimensions(pose.at));
+    let mut wheeled = Wheeled { who, navigator, body: acting.body };
+    match went {
+        Went::Ahead => wheeled.has_steered(pose.heading_rad),
+        // A robot whose connector was pulled away follows it on its wheels.
+        Went::Nowhere if wheeled.has_robots() && who.at(wheeled.body) != was => {}
+        Went::Nowhere => wheeled.turn_where_blocked(wheels),
+    }
+}
+
+/// Turns a navigator's robot on the spot.
+pub(super) fn face<const D: usize>(body: &mut Body<D>, heading_rad: f64) {
+    if let Some(leader) = &mut body.driving.leader {
+        leader.pose.heading_rad = heading_rad;
+    }
+}
+
+/// Returns whether a leader's robot would come nearer to another one of its chain than that one, which keeps a
+/// part of the gap for itself, allows for.
+fn comes_too_near<const D: usize>(body: &Body<D>, agent: usize, to: Point<2>) -> bool {
+    let robots = &body.robots;
+    let Some(robot) = robots.get(agent) else { return false };
+    let apart_m = 2.0 * body.robot_radius_m;
+    let others = robots.iter().enumerate().filter(|(k, _)| *k != agent);
+    let mut others = others.map(|(_, other)| other.pose.at);
+    others.any(|other| {
+        let was_m = distance(robot.pose.at, other) - apart_m;
+        let gap_m = distance(to, other) - apart_m;
+        gap_m < was_m && gap_m < LEFT_TO_OTHERS * was_m.max(0.0)
+    })
+}
+
+impl<const D: usize> Wheeled<'_, D> {
+    fn has_robots(&self) -> bool {
+        self.who.setting.spec.robots.is_some()
     }
 
-    /// Returns the pose that a navigator's wheels would take it to.
-    pub(super) fn steered(&mut self, task: &Task<D>, navigator: &Navigator) -> Option<Pose> {
-        let decision = self.decision?;
-        self.find_itself(task, navigator);
+    /// Returns whether a navigator has reached its goal.
+    pub(super) fn has_arrived(&self) -> bool {
+        let at = in_dimensions(self.who.at(self.body));
+        let index = self.body.driving.next as usize;
+        self.navigator.goal.as_ref().is_some_and(|goal| goal.is_reached(at, index))
+    }
+
+    /// Returns the step that a navigator's wheels would make as it has decided.
+    pub(super) fn steered(&mut self, decision: Decision) -> Steered {
+        let world = self.who.setting.world;
+        self.find_itself();
         let pace = self.pace();
-        let driving = &mut self.body.driving;
+        let body = &mut *self.body;
+        let driving = &mut body.driving;
         driving.rested = if pace == 0.0 { driving.rested.saturating_add(1) } else { 0 };
-        self.body.stood = match decision.wheels == Wheels::default() {
-            true => self.body.stood.saturating_add(1),
+        body.stood = match decision.wheels == Wheels::default() {
+            true => body.stood.saturating_add(1),
             // Whose patience has ended does not lose it again at once.
-            false if decision.is_mover_ahead => self.body.stood,
+            false if decision.is_mover_ahead => body.stood,
             false => 0,
         };
-        let mut leader = self.body.leader(task);
+        let mut leader = body.leader(self.who.task);
         leader.followed = decision.followed;
-        self.body.driving.leader = Some(leader);
-        self.body.tally.layers[decision.layer as usize - 1] += 1;
-        let waited_s = self.world.starts_s(u64::from(self.body.driving.rested));
+        body.driving.leader = Some(leader);
+        body.tally.layers[decision.layer as usize - 1] += 1;
+        let waited_s = world.starts_s(u64::from(body.driving.rested));
         let pace = if waited_s > WAITS_S { GOES_ON } else { pace };
-        let wheels = decision.wheels.slowed(pace);
-        Some(navigator.drive.step(leader.pose, wheels, self.world.dt_s))
+        let slowed = decision.wheels.slowed(pace);
+        let pose = self.navigator.drive.step(leader.pose, slowed, world.dt_s);
+        Steered { pose, wheels: decision.wheels }
     }
 
     /// Finds the place of a navigator whose task begins on the line to its goal.
-    fn find_itself(&mut self, task: &Task<D>, navigator: &Navigator) {
-        if let (None, Some(goal)) = (&self.body.driving.leader, &navigator.goal) {
-            let at = in_dimensions(self.body.chain.points()[task.agent]);
+    fn find_itself(&mut self) {
+        if let (None, Some(goal)) = (&self.body.driving.leader, &self.navigator.goal) {
+            let at = in_dimensions(self.who.at(self.body));
             self.body.driving.next = goal.begins(at) as u32;
         }
     }
@@ -63,73 +133,33 @@ impl<const D: usize> Acting<'_, D> {
     /// Returns where the connector of a navigator has to go to be at its robot again, from which escapes or
     /// a pull by the other end have taken it; none while it is there. Where an escape has just moved it, it
     /// stays.
-    pub(super) fn back_at_its_robot(&self, task: &Task<D>, step_m: f64) -> Option<Point<D>> {
-        let leader = self.body.driving.leader.filter(|_| self.spec.robots.is_some())?;
-        let k = task.agent;
-        let (at, robot) = (self.body.chain.points()[k], in_dimensions(leader.pose.at));
-        let has_fled = self.scratch.escaped.get(k) != self.scratch.before.get(k);
-        (at != robot).then(|| if has_fled { at } else { toward(at, robot, step_m) })
+    pub(super) fn back_at_its_robot(&self, has_fled: bool) -> Option<Point<D>> {
+        let leader = self.body.driving.leader.filter(|_| self.has_robots())?;
+        let (at, robot) = (self.who.at(self.body), in_dimensions(leader.pose.at));
+        (at != robot).then(|| if has_fled { at } else { toward(at, robot, self.who.step_m()) })
     }
 
     /// Returns the heading to turn to in this cycle where a navigator's robot faces elsewhere than it did when
     /// its own wheels led, because it followed its connector since.
-    pub(super) fn faces_elsewhere(&self, navigator: &Navigator) -> Option<f64> {
-        let leader = self.body.driving.leader.filter(|_| self.spec.robots.is_some())?;
+    pub(super) fn faces_elsewhere(&self) -> Option<f64> {
+        let leader = self.body.driving.leader.filter(|_| self.has_robots())?;
         let [x, y, _] = self.body.driving.ahead;
         let off_rad = wrap_angle(atan2(y, x) - leader.pose.heading_rad);
-        let most = navigator.drive.max_wheel_m_s();
-        let most_rad = navigator.drive.turn_rad_s(Wheels::new(-most, most)) * self.world.dt_s;
+        let (drive, dt_s) = (&self.navigator.drive, self.who.setting.world.dt_s);
+        let most = drive.max_wheel_m_s();
+        let most_rad = drive.turn_rad_s(Wheels::new(-most, most)) * dt_s;
         let turn_rad = off_rad.clamp(-most_rad, most_rad);
         (off_rad.abs() > SAME_RAD).then(|| wrap_angle(leader.pose.heading_rad + turn_rad))
     }
 
-    /// Turns a navigator's robot on the spot.
-    pub(super) fn face(&mut self, heading_rad: f64) {
-        if let Some(leader) = &mut self.body.driving.leader {
-            leader.pose.heading_rad = heading_rad;
-        }
-    }
-
-    /// Moves an initiator on wheels; one whose way is blocked may turn on the spot.
-    pub(super) fn go_on_wheels(&mut self, task: &Task<D>, pose: Pose) {
-        let Driver::Navigate(navigator) = &task.driver else { return };
-        if self.comes_too_near(task.agent, pose.at) {
-            self.give_way(task);
-            return self.turn_where_blocked(task, navigator);
-        }
-        let was = self.body.chain.points()[task.agent];
-        match self.go(task, in_dimensions(pose.at)) {
-            Went::Ahead => self.has_steered(task, navigator, pose.heading_rad),
-            // A robot whose connector was pulled away follows it on its wheels.
-            Went::Nowhere
-                if self.spec.robots.is_some() && self.body.chain.points()[task.agent] != was => {}
-            Went::Nowhere => self.turn_where_blocked(task, navigator),
-        }
-    }
-
-    /// Returns whether a leader's robot would come nearer to another one of its chain than that one, which keeps a
-    /// part of the gap for itself, allows for.
-    fn comes_too_near(&self, agent: usize, to: Point<2>) -> bool {
-        let robots = &self.body.robots;
-        let Some(robot) = robots.get(agent) else { return false };
-        let apart_m = 2.0 * self.body.robot_radius_m;
-        let others = robots.iter().enumerate().filter(|(k, _)| *k != agent);
-        let mut others = others.map(|(_, other)| other.pose.at);
-        others.any(|other| {
-            let was_m = distance(robot.pose.at, other) - apart_m;
-            let gap_m = distance(to, other) - apart_m;
-            gap_m < was_m && gap_m < LEFT_TO_OTHERS * was_m.max(0.0)
-        })
-    }
-
     /// Updates a navigator that has moved, by a heading that the chain did not object to.
-    fn has_steered(&mut self, task: &Task<D>, navigator: &Navigator, heading_rad: f64) {
-        let at: Point<2> = in_dimensions(self.body.chain.points()[task.agent]);
+    fn has_steered(&mut self, heading_rad: f64) {
+        let at: Point<2> = in_dimensions(self.who.at(self.body));
         let driving = &mut self.body.driving;
         let Some(leader) = &mut driving.leader else { return };
         leader.pose = Pose { at, heading_rad };
         driving.ahead = [cos(heading_rad), sin(heading_rad), 0.0];
-        if let Some(goal) = &navigator.goal {
+        if let Some(goal) = &self.navigator.goal {
             driving.next = goal.passed(at, driving.next as usize) as u32;
             if let Goal::Target { at: target, .. } = goal {
                 driving.nearest_m = driving.nearest_m.min(distance(at, *target));
@@ -138,18 +168,16 @@ impl<const D: usize> Acting<'_, D> {
     }
 
     /// Turns a navigator whose way is blocked on the spot, if it can.
-    fn turn_where_blocked(&mut self, task: &Task<D>, navigator: &Navigator) {
-        let (Some(leader), Some(decision)) = (self.body.driving.leader, self.decision) else {
-            return;
-        };
-        let wheels = navigator.leader.when_blocked(decision.wheels);
-        let turned = navigator.drive.step(leader.pose, wheels, self.world.dt_s);
-        self.has_steered(task, navigator, turned.heading_rad);
+    fn turn_where_blocked(&mut self, wheels: Wheels) {
+        let Some(leader) = self.body.driving.leader else { return };
+        let wheels = self.navigator.leader.when_blocked(wheels);
+        let turned = self.navigator.drive.step(leader.pose, wheels, self.who.setting.world.dt_s);
+        self.has_steered(turned.heading_rad);
     }
 
     /// Returns the part of its speed at which a leader may go, so that the latest robot keeps up.
     fn pace(&self) -> f64 {
-        let Some(robots) = &self.spec.robots else { return 1.0 };
+        let Some(robots) = &self.who.setting.spec.robots else { return 1.0 };
         let lag_m = |(robot, at): (&Robot, &Point<D>)| distance(robot.pose.at, in_dimensions(*at));
         let lags_m = self.body.robots.iter().zip(self.body.chain.points()).map(lag_m);
         pace(lags_m.fold(0.0, f64::max), robots.lag_limit_m)

@@ -20,15 +20,12 @@ use crate::agents::{ConnectorAgent, Handed, Sight};
 use crate::world::ChainWorld;
 pub use kind::Deployment;
 pub(crate) use outcome::settled;
+pub(crate) use sense::Sensed;
 use sidestep_kernel::{Cycle, EntityId};
 
 impl<const D: usize> ChainWorld<D> {
     /// Lets the agents of a chain talk in a cycle; returns their decisions.
-    pub(crate) fn talked(
-        &self,
-        (chain, now): (EntityId, Cycle),
-        sights: Vec<Sight<D>>,
-    ) -> Handed<D> {
+    pub(crate) fn talked(&self, chain: EntityId, now: Cycle, sights: Vec<Sight<D>>) -> Handed<D> {
         let mut agents = self.agents_of(chain);
         let controls = drive::run(drive::Talk::new(self, chain, now), &mut agents, sights);
         Handed { cycle: now, controls, gone: Vec::new() }

@@ -13,6 +13,15 @@ use sidestep_kernel::{Cycle, EntityId};
 /// Distance beyond that needed by any motion, meters: far more than tolerances and rounding.
 const SPARE_M: f64 = 1e-3;
 
+/// A chain in a cycle, and what is around it.
+#[derive(Clone, Copy)]
+pub(crate) struct Sensed<'a, const D: usize> {
+    pub(crate) chain: EntityId,
+    pub(crate) now: Cycle,
+    pub(crate) body: &'a Body<D>,
+    pub(crate) obstacles: &'a Obstacles<D>,
+}
+
 impl<const D: usize> ChainWorld<D> {
     /// Returns the id on the network of a chain's connector 0; the others follow.
     pub(crate) fn first_id(&self, chain: EntityId) -> EntityId {
@@ -20,14 +29,14 @@ impl<const D: usize> ChainWorld<D> {
         before.sum::<usize>() as EntityId
     }
 
-    /// Returns the perception of a chain's connectors; `leader` has a part of its own.
+    /// Returns what the connectors of a chain perceive; `leader` has the part `role`, the others follow.
     pub(crate) fn sights(
         &self,
-        (chain, now): (EntityId, Cycle),
-        body: &Body<D>,
-        obstacles: &Obstacles<D>,
-        (leader, role): (usize, &Role<D>),
+        sensed: Sensed<'_, D>,
+        leader: usize,
+        role: &Role<D>,
     ) -> Vec<Sight<D>> {
+        let Sensed { chain, now, body, obstacles } = sensed;
         let points = body.chain.points();
         let n = points.len() as u32;
         let (first_id, at_s) = (self.first_id(chain), self.starts_s(now));

@@ -61,7 +61,8 @@ pub(crate) fn find(
     site: &Site,
     obstacles: &Obstacles<2>,
     wanted: &Wanted,
-    (seed, number): (Seed, u32),
+    seed: Seed,
+    number: u32,
 ) -> Result<Start, InputError> {
     wanted.check()?;
     let search = Search { site, obstacles, wanted };
@@ -294,8 +295,8 @@ mod tests {
     fn check(name: &str, site: &Site, wanted: &Wanted, seeds: u64) {
         let obstacles = Obstacles::new(site.obstacles(0), 1.0).unwrap();
         for seed in 0..seeds {
-            let start = find(site, &obstacles, wanted, (Seed(seed), 0)).expect(name);
-            assert_eq!(start, find(site, &obstacles, wanted, (Seed(seed), 0)).unwrap());
+            let start = find(site, &obstacles, wanted, Seed(seed), 0).expect(name);
+            assert_eq!(start, find(site, &obstacles, wanted, Seed(seed), 0).unwrap());
             assert_eq!((start.points.len(), start.points[0]), (wanted.connectors, start.leader.at));
             let within = wanted.within.unwrap_or_else(|| site.bounds());
             assert!(within.meets(&Bounds::of(&[start.leader.at])));
@@ -326,9 +327,9 @@ mod tests {
         let site = bent();
         let obstacles = Obstacles::new(site.obstacles(0), 1.0).unwrap();
         let wanted = Wanted { connectors: 5, ..WANTED };
-        let start = |seed| find(&site, &obstacles, &wanted, (Seed(seed), 0)).unwrap();
+        let start = |seed| find(&site, &obstacles, &wanted, Seed(seed), 0).unwrap();
         assert_ne!(start(1), start(2));
-        let of_number = |number| find(&site, &obstacles, &wanted, (Seed(1), number)).unwrap();
+        let of_number = |number| find(&site, &obstacles, &wanted, Seed(1), number).unwrap();
         assert_ne!(of_number(0), of_number(1));
     }
 
@@ -337,7 +338,7 @@ mod tests {
         let site = bent();
         let obstacles = Obstacles::new(site.obstacles(0), 1.0).unwrap();
         let cause = |wanted: Wanted| {
-            find(&site, &obstacles, &wanted, (Seed(1), 0)).unwrap_err().cause().to_owned()
+            find(&site, &obstacles, &wanted, Seed(1), 0).unwrap_err().cause().to_owned()
         };
         assert!(cause(Wanted { clearance_m: 2.0, ..WANTED }).contains("no place with 2 m"));
         let too_long = cause(Wanted { connectors: 40, ..WANTED });
@@ -350,7 +351,7 @@ mod tests {
             Wanted { clearance_m: f64::NAN, ..WANTED },
             Wanted { spacing_m: f64::INFINITY, ..WANTED },
         ] {
-            assert!(find(&site, &obstacles, &wrong, (Seed(1), 0)).is_err());
+            assert!(find(&site, &obstacles, &wrong, Seed(1), 0).is_err());
         }
     }
 

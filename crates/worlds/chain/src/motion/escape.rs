@@ -189,12 +189,13 @@ impl<const D: usize> Escaper<D> {
     /// inside moving obstacles for less time. The choice is in `way_out`.
     pub(crate) fn choose(
         &self,
-        (chain, obstacles): (&Chain<D>, &Obstacles<D>),
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
         rules: &Rules,
         lead: &Lead<D>,
         way_out: &mut WayOut,
     ) {
-        way_out.set_rests(self.simultaneous.should_rest((chain, obstacles), rules, lead));
+        way_out.set_rests(self.simultaneous.should_rest(chain, obstacles, rules, lead));
     }
 
     /// Moves the parts of a chain that are too near to a moving obstacle. `start` holds the

@@ -25,7 +25,8 @@ pub(crate) fn go<const D: usize>(
     if let Motion::Connector { k, to } = request.motion
         && let Some(base) = slider(chain, k)
     {
-        return sliding(propagator, chain, obstacles, (k, to, base), request);
+        let order = Reach { k, target: to, base, tolerance_m: TOLERANCE_M };
+        return sliding(propagator, chain, obstacles, &order, request);
     }
     let outcome = propagator.propagate(chain, obstacles, request)?;
     let (Outcome::Vetoed(veto), Motion::Connector { k, to }) = (&outcome, request.motion) else {
@@ -61,23 +62,23 @@ fn sliding<const D: usize>(
     propagator: &mut Propagator<D>,
     chain: &mut Chain<D>,
     obstacles: &Obstacles<D>,
-    (k, to, base): (usize, Point<D>, usize),
+    order: &Reach<D>,
     request: &Request<D>,
 ) -> Result<Outcome<D>, InputError> {
-    let joints_m = propagator.rules.joint_step_max_m;
-    slowed(chain, (k, to), joints_m, |chain, before, to| {
+    let (k, joints_m) = (order.k, propagator.rules.joint_step_max_m);
+    slowed(chain, k, order.target, joints_m, |chain, before, to| {
         let request = Request { motion: Motion::Connector { k, to }, ..*request };
         let veto = match propagator.propagate(chain, obstacles, &request)? {
             Outcome::Vetoed(veto) if holds(veto.reason) && veto.by != k => veto,
             Outcome::Moved(_) if longest(before, chain.points()).1 > joints_m => {
                 chain.points_mut().copy_from_slice(before);
                 let (reason, reached) = (Reason::Mobility, before[k]);
-                Veto { by: base, from: k, reason, obstacle: None, reached }
+                Veto { by: order.base, from: k, reason, obstacle: None, reached }
             }
             outcome => return Ok((outcome, f64::INFINITY)),
         };
-        let order = Reach { k, target: to, base: veto.by, tolerance_m: TOLERANCE_M };
-        reached(propagator, (chain, before), obstacles, &order, &veto)
+        let order = Reach { target: to, base: veto.by, ..*order };
+        reached(propagator, chain, before, obstacles, &order, &veto)
     })
 }
 
@@ -94,9 +95,9 @@ fn held<const D: usize>(
         Reason::Fixed => propagator.rules.joint_step_max_m,
         _ => f64::INFINITY,
     };
-    slowed(chain, (order.k, order.target), joints_m, |chain, before, target| {
+    slowed(chain, order.k, order.target, joints_m, |chain, before, target| {
         let order = Reach { target, ..*order };
-        reached(propagator, (chain, before), obstacles, &order, objection)
+        reached(propagator, chain, before, obstacles, &order, objection)
     })
 }
 
@@ -105,7 +106,8 @@ fn held<const D: usize>(
 /// for which its outcome counts as a motion, meters.
 fn slowed<const D: usize>(
     chain: &mut Chain<D>,
-    (k, to): (usize, Point<D>),
+    k: usize,
+    to: Point<D>,
     joints_m: f64,
     mut attempt: impl FnMut(
         &mut Chain<D>,
@@ -153,7 +155,8 @@ fn longest<const D: usize>(before: &[Point<D>], points: &[Point<D>]) -> (usize, 
 /// the longest way of a connector for which the outcome counts as a motion, meters.
 fn reached<const D: usize>(
     propagator: &mut Propagator<D>,
-    (chain, before): (&mut Chain<D>, &[Point<D>]),
+    chain: &mut Chain<D>,
+    before: &[Point<D>],
     obstacles: &Obstacles<D>,
     order: &Reach<D>,
     objection: &Veto<D>,
@@ -168,7 +171,7 @@ fn reached<const D: usize>(
             let rules = propagator.rules;
             let longest_m = chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
             let jump_m = rules.slave_step_max_m.min(LONGEST_JUMP * longest_m);
-            (by_posture(rules, (chain, before), obstacles, order, objection)?, jump_m)
+            (by_posture(rules, chain, before, obstacles, order, objection)?, jump_m)
         }
     })
 }
@@ -185,7 +188,8 @@ const SLOWED: f64 = 0.9;
 /// is blocked.
 fn by_posture<const D: usize>(
     rules: Rules,
-    (chain, before): (&mut Chain<D>, &[Point<D>]),
+    chain: &mut Chain<D>,
+    before: &[Point<D>],
     obstacles: &Obstacles<D>,
     order: &Reach<D>,
     objection: Veto<D>,

@@ -303,7 +303,7 @@ impl<const D: usize> Scene<'_, D> {
         let reach_m = length_m + step.rod.radius_m.max(step.tip_radius_m) + 2.0 * SKIN_M;
         work.blocks.clear();
         let rod = step.master.min(step.slave);
-        self.visit_blocks(&around(step.mn, reach_m), (Some(rod), step.slave), |block| {
+        self.visit_blocks(&around(step.mn, reach_m), Some(rod), step.slave, |block| {
             if !block.core.is_clear_of_point(step.mn, reach_m + block.radius_m) {
                 work.blocks.push(*block);
             }

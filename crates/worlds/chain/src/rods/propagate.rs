@@ -503,7 +503,7 @@ impl<const D: usize> Scene<'_, D> {
         let radius_m = self.chain.connectors()[k].radius_m;
         let near = swept([from, from, to, to], radius_m);
         let mut worst: Option<(f64, Name, Reason)> = None;
-        self.visit_blocks(&near, (None, k), |block| {
+        self.visit_blocks(&near, None, k, |block| {
             let keep_m = block.radius_m + radius_m;
             if !block.stops_tip || block.core.is_clear_of_segment([from, to], needed_m(keep_m)) {
                 return;

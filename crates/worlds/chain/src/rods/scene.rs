@@ -150,11 +150,12 @@ impl<'a, const D: usize> Scene<'a, D> {
     }
 
     /// Visits every block that may be in the way of a rod and the connector at its end. If `rod` is
-    /// `None`, the connector is alone.
+    /// `None`, the connector `tip` is alone.
     pub(super) fn visit_blocks(
         &self,
         near: &Bounds<D>,
-        (rod, tip): (Option<usize>, usize),
+        rod: Option<usize>,
+        tip: usize,
         mut look: impl FnMut(&Block<D>),
     ) {
         self.obstacles.visit(near, |o| {
@@ -215,7 +216,7 @@ impl<'a, const D: usize> Scene<'a, D> {
         let mut worst: Option<(f64, Name, Reason)> = None;
         let rod = step.master.min(step.slave);
         let way_m = step.sweep(s).longest_way_m();
-        self.visit_blocks(&near, (Some(rod), step.slave), |block| {
+        self.visit_blocks(&near, Some(rod), step.slave, |block| {
             if let Some((depth_m, reason)) = objection(step, s, way_m, block) {
                 let deeper = worst
                     .is_none_or(|(w, name, _)| depth_m > w || (depth_m == w && block.name < name));

@@ -517,7 +517,7 @@ impl<const D: usize> Compiler<'_, D> {
             ahead_m: rod.max_m,
             within: s.within_m.as_ref().map(|within| within.get_ref().in_the_plane()),
         };
-        let start = find(site, obstacles, &wanted, (Seed(self.head.seed), number))
+        let start = find(site, obstacles, &wanted, Seed(self.head.seed), number)
             .map_err(|error| self.source.error_of(at, &error))?;
         Ok(start.points.iter().map(|p| std::array::from_fn(|i| p[i])).collect())
     }
@@ -560,7 +560,7 @@ impl<const D: usize> Compiler<'_, D> {
         let u = self.direction(s)?;
         Ok(match s.folded_m {
             None => (0..n).map(|k| along(start, u, length_m * k as f64)).collect(),
-            Some(folds_m) => folded(n, (start, u), length_m, folds_m.map(f64::from)),
+            Some(folds_m) => folded(n, start, u, length_m, folds_m.map(f64::from)),
         })
     }
 
@@ -617,7 +617,8 @@ impl<const D: usize> Compiler<'_, D> {
 /// legs and the spans between them have as many rods as come nearest to their lengths, one at least.
 fn folded<const D: usize>(
     n: usize,
-    (start, u): (Point<D>, Point<D>),
+    start: Point<D>,
+    u: Point<D>,
     rod_m: f64,
     [leg_m, apart_m]: [f64; 2],
 ) -> Vec<Point<D>> {
@@ -640,7 +641,7 @@ mod tests {
 
     #[test]
     fn a_folded_chain_has_rods_of_one_length_and_lies_in_its_room() {
-        let places = folded(30, ([1.0, 1.0, 1.0], [0.0, 0.0, 1.0]), 0.5, [2.1, 0.9]);
+        let places = folded(30, [1.0; 3], [0.0, 0.0, 1.0], 0.5, [2.1, 0.9]);
         assert!(places.windows(2).all(|p| (distance(p[0], p[1]) - 0.5).abs() < 1e-12));
         // Legs of 4 rods, 2 rods apart: the second leg comes back, 1 m beside the first.
         let [a, b] = [places[4], places[6]];

@@ -42,7 +42,7 @@ impl<const D: usize> ConnectorAgent<D> {
         if let Some(master) = &mut self.beside[from] {
             (master.base, master.now) = (prepare.mo, prepare.mn);
         }
-        match self.reaction((from, rod), prepare) {
+        match self.reaction(from, rod, prepare) {
             Ok(reaction) => {
                 self.follow(from, prepare, &reaction, before.is_some_and(|f| f.has_asked));
             }
@@ -91,7 +91,8 @@ impl<const D: usize> ConnectorAgent<D> {
 
     fn reaction(
         &mut self,
-        (from, rod): (Side, Rod),
+        from: Side,
+        rod: Rod,
         prepare: &Prepare<D>,
     ) -> Result<Reaction<D>, Refusal> {
         let onward = from.other();
@@ -104,7 +105,7 @@ impl<const D: usize> ConnectorAgent<D> {
             is_open: prepare.is_open,
             all_lengths: prepare.all_lengths,
         };
-        self.alone.react((self.place.base, rod), next, &self.obstacles, &pull)
+        self.alone.react(self.place.base, rod, next, &self.obstacles, &pull)
     }
 
     fn object(&mut self, to: Side, refusal: Refusal, may_go_elsewhere: bool) {

@@ -162,8 +162,15 @@ struct Search<'a> {
     /// Whether each variable has its reference value because no point determines it.
     open: Vec<bool>,
     tries: usize,
-    /// The failure of the branch that got farthest; a limit is more informative than a misfit.
-    best_failure: Option<((usize, bool), RecoverError)>,
+    /// The failure of the branch that got farthest.
+    best_failure: Option<(Progress, RecoverError)>,
+}
+
+/// The progress of a branch of a search; a limit is more informative than a misfit.
+#[derive(PartialEq, PartialOrd)]
+struct Progress {
+    connector: usize,
+    fits: bool,
 }
 
 impl Search<'_> {
@@ -211,7 +218,7 @@ impl Search<'_> {
     fn are_legal(&mut self, connector: usize, known: usize, found: &[Value]) -> bool {
         for (joint, found) in self.chain.joints[known..].iter().zip(found) {
             if let Some(limits) = joint.limits.filter(|l| !l.contain(found.value)) {
-                self.fail((connector, true), outside(joint, found.value, limits));
+                self.fail(Progress { connector, fits: true }, outside(joint, found.value, limits));
                 return false;
             }
         }
@@ -223,12 +230,12 @@ impl Search<'_> {
         let fits = distance_m <= FITS * self.skeleton.reach_m;
         if !fits {
             let failure = RecoverError::DoesNotFit { connector, distance_m };
-            self.fail((connector, false), failure);
+            self.fail(Progress { connector, fits: false }, failure);
         }
         fits
     }
 
-    fn fail(&mut self, progress: (usize, bool), failure: RecoverError) {
+    fn fail(&mut self, progress: Progress, failure: RecoverError) {
         if self.best_failure.as_ref().is_none_or(|(best, _)| progress > *best) {
             self.best_failure = Some((progress, failure));
         }

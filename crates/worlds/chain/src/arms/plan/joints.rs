@@ -34,7 +34,8 @@ impl<'a, const D: usize> JointSpace<'a, D> {
     /// Returns the postures that bring connector `k` to places. `chain` is the arm's chain at its `present` joint
     /// values.
     pub(crate) fn new(
-        (arm, present): (&'a Arm, &'a [f64]),
+        arm: &'a Arm,
+        present: &'a [f64],
         chain: &'a Chain<D>,
         obstacles: &'a Obstacles<D>,
         self_collision: bool,

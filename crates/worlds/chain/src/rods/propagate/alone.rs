@@ -98,13 +98,14 @@ impl<const D: usize> Alone<D> {
     /// The constraint because of which it objects.
     pub(crate) fn react(
         &mut self,
-        (so, rod): (Point<D>, Rod),
+        so: Point<D>,
+        rod: Rod,
         next: Option<(Point<D>, Rod)>,
         obstacles: &Obstacles<D>,
         pull: &Pull<D>,
     ) -> Result<Reaction<D>, Refusal> {
         if pull.is_open {
-            return Ok(self.pulled((so, rod), next, pull));
+            return Ok(self.pulled(so, rod, next, pull));
         }
         self.chain.points_mut()[ME] = so;
         let Self { chain, rules, work, overlay, own } = self;
@@ -142,7 +143,8 @@ impl<const D: usize> Alone<D> {
     /// Returns its reaction where nothing can object.
     fn pulled(
         &self,
-        (so, rod): (Point<D>, Rod),
+        so: Point<D>,
+        rod: Rod,
         next: Option<(Point<D>, Rod)>,
         pull: &Pull<D>,
     ) -> Reaction<D> {

@@ -182,7 +182,8 @@ impl ArmBody {
         &self,
         placed: &[Placed],
         part: usize,
-        (center_m, radius_m): (Vector, f64),
+        center_m: Vector,
+        radius_m: f64,
         within_m: f64,
     ) -> Option<Near> {
         let far_m = self.parts[part].radius_m + radius_m + within_m;

@@ -105,8 +105,9 @@ proptest! {
         let is_clear = |values: &[f64]| {
             let mut placed = Vec::new();
             body.place(&chain.forward(values), values, &mut placed);
-            let ball = (sphere.center_m, sphere.radius_m);
-            let in_ball = |part| body.near_ball(&placed, part, ball, 0.0).is_some();
+            let Sphere { center_m, radius_m } = sphere;
+            let in_ball =
+                |part| body.near_ball(&placed, part, center_m, radius_m, 0.0).is_some();
             body.overlaps(&chain, values).is_empty() && !(0..body.len()).any(in_ball)
         };
         let goal = ArmGoal {

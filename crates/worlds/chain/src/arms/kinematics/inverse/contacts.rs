@@ -124,8 +124,8 @@ impl<'a> Contacts<'a> {
     fn parts_in_spheres(&self, body: &ArmBody, parts: &[body::Placed], touched: &mut Touched) {
         for (sphere, &Sphere { center_m, radius_m }) in self.spheres.iter().enumerate() {
             for part in 0..body.len() {
-                let ball = (center_m, radius_m);
-                if let Some(near) = body.near_ball(parts, part, ball, self.margin_m) {
+                let near = body.near_ball(parts, part, center_m, radius_m, self.margin_m);
+                if let Some(near) = near {
                     let contact = self.contact(&near, body.link(part), 0);
                     let hit = || (Part::Link(body.name(part).into()), Against::Sphere(sphere));
                     touched.add(contact, -near.apart_m, hit);

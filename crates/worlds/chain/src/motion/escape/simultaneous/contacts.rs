@@ -41,7 +41,8 @@ impl<const D: usize> Contacts<D> {
         &mut self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
-        (margin, way_m): (Margin, f64),
+        margin: Margin,
+        way_m: f64,
     ) {
         let within_m = |o: &Obstacle<D>| margin.around(o) + REACH * way_m;
         collect(chain, obstacles, &mut self.body, within_m, &mut self.threats);
@@ -52,7 +53,8 @@ impl<const D: usize> Contacts<D> {
         &mut self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
-        (own, way_m): (bool, f64),
+        own: bool,
+        way_m: f64,
     ) {
         let reach_m = REACH * way_m;
         self.walls.clear();

@@ -26,6 +26,15 @@ impl<const D: usize> Given<'_, D> {
     }
 }
 
+/// A leader and its wish.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lead<const D: usize> {
+    /// The connector that leads.
+    pub(crate) k: usize,
+    /// The way that it wants to go in this tick, meters.
+    pub(crate) way_m: Point<D>,
+}
+
 /// A way through an obstacle: parts in it leave in one direction, even if another is shorter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Through<const D: usize> {

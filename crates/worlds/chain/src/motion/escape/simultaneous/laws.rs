@@ -3,7 +3,7 @@
 use super::super::threat::Part;
 use super::contacts::{Contacts, nearest};
 use super::given::Given;
-use super::posture::{Posture, ends};
+use super::posture::{Posture, Spot, ends};
 use crate::rods::chain::{Chain, LENGTH_TOLERANCE_M};
 use crate::rods::geometry::{Point, angle_rad, distance, sub, unit};
 use crate::rods::scene::{BEND_TOLERANCE_RAD, TOLERANCE_M};
@@ -32,8 +32,8 @@ impl Bend {
         let least2 = into_m * into_m + out_m * out_m + 2.0 * into_m * out_m * cos(self.most_rad);
         let short_m = least2.max(0.0).sqrt() * (1.0 + SPARE) - distance(a, c);
         let Some(away) = unit(sub(c, a)).filter(|_| short_m > 0.0) else { return 0.0 };
-        let neighbors = [self.connector - 1, self.connector + 1].map(Part::Connector);
-        posture.part((neighbors[0], 0.0), (neighbors[1], 0.0), (away, short_m));
+        let spot = |k: usize| Spot { part: Part::Connector(k), along_rod: 0.0 };
+        posture.part(spot(self.connector - 1), spot(self.connector + 1), away, short_m);
         short_m
     }
 

@@ -7,18 +7,8 @@
 //! steps among 8 discs), because leaders that turn to and fro get nowhere.
 
 use super::super::Escape;
-use super::given::Given;
+use super::given::{Given, Lead};
 use super::stage::{BETTER, Stage, Tried};
-use crate::rods::geometry::Point;
-
-/// A leader and its wish.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Lead<const D: usize> {
-    /// The connector that leads.
-    pub(crate) k: usize,
-    /// The way that it wants to go in this tick, meters.
-    pub(crate) way_m: Point<D>,
-}
 
 /// Connectors to either side of the leader that roll-outs take along.
 const AROUND: usize = 48;
@@ -35,10 +25,10 @@ pub(super) fn should_rest<const D: usize>(
 ) -> bool {
     let from = lead.k.saturating_sub(AROUND);
     let to = (lead.k + AROUND).min(given.chain.points().len() - 1);
-    let stage = Stage::cut(rules, given, (from, to)).filter(Stage::is_approached);
+    let stage = Stage::cut(rules, given, from..=to).filter(Stage::is_approached);
     let Some(stage) = stage else { return false };
     let mut left = stage.ticks_for(MOST_WORK);
-    let tried = |way_m| Tried::lead(lead.k - from, way_m);
+    let tried = |way_m| Tried::lead(Lead { k: lead.k - from, way_m });
     let as_wanted = stage.cost(&tried(lead.way_m), f64::INFINITY, &mut left);
     let enough = BETTER * as_wanted - WORTH_IT;
     enough > 0.0 && stage.cost(&tried([0.0; D]), enough, &mut left) < enough

@@ -34,8 +34,8 @@ use crate::rods::geometry::{Point, distance};
 use crate::rods::obstacle::Obstacles;
 use crate::rods::rules::Rules;
 use crate::rods::veto::{Reason, Veto};
+pub(crate) use given::Lead;
 use given::{Given, Through, Wishes};
-pub(crate) use leading::Lead;
 use leading::should_rest;
 use solve::Solver;
 pub use way_out::WayOut;
@@ -103,7 +103,8 @@ impl<const D: usize> Simultaneous<D> {
     /// Returns whether a leader should rest.
     pub(super) fn should_rest(
         &self,
-        (chain, obstacles): (&Chain<D>, &Obstacles<D>),
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
         rules: &Rules,
         lead: &Lead<D>,
     ) -> bool {

@@ -10,6 +10,14 @@ pub(super) struct Posture<'a, const D: usize> {
     pub(super) ease: &'a [f64],
 }
 
+/// A point of a part.
+#[derive(Clone, Copy)]
+pub(super) struct Spot {
+    pub(super) part: Part,
+    /// Its place on a rod, from 0 to 1.
+    pub(super) along_rod: f64,
+}
+
 /// Ease below which a part counts as held.
 const HELD: f64 = 1e-9;
 
@@ -48,16 +56,11 @@ impl<const D: usize> Posture<'_, D> {
 
     /// Moves two points of two parts apart by `gap_m` along a direction, each as easily as it
     /// gives way.
-    pub(super) fn part(
-        &mut self,
-        (one, along_one): (Part, f64),
-        (other, along_other): (Part, f64),
-        (away, gap_m): (Point<D>, f64),
-    ) {
-        let (a, b) = (self.ease(one, along_one), self.ease(other, along_other));
+    pub(super) fn part(&mut self, one: Spot, other: Spot, away: Point<D>, gap_m: f64) {
+        let [a, b] = [one, other].map(|spot| self.ease(spot.part, spot.along_rod));
         if a + b >= HELD {
-            self.shift(one, along_one, away.map(|x| -x * gap_m * a / (a + b)));
-            self.shift(other, along_other, away.map(|x| x * gap_m * b / (a + b)));
+            self.shift(one.part, one.along_rod, away.map(|x| -x * gap_m * a / (a + b)));
+            self.shift(other.part, other.along_rod, away.map(|x| x * gap_m * b / (a + b)));
         }
     }
 }

@@ -10,7 +10,7 @@ use super::contacts::{Contacts, along_rod, nearest, radius_m};
 use super::given::{Given, Through, Wishes};
 use super::laws::{Bend, Laws};
 use super::lengths::Lengths;
-use super::posture::{Posture, ends};
+use super::posture::{Posture, Spot, ends};
 use crate::rods::geometry::{
     Nearest, Point, along, between, distance, first_axis, perpendicular, scaled, sub, unit,
 };
@@ -52,11 +52,11 @@ impl<const D: usize> Solver<D> {
     /// Collects the contacts of a tick; returns whether any moving obstacle is near.
     pub(super) fn look(&mut self, given: &Given<'_, D>, margin: Margin) -> bool {
         let Given { chain, obstacles, rules, most_m, .. } = *given;
-        self.contacts.look_for_movers(chain, obstacles, (margin, most_m));
+        self.contacts.look_for_movers(chain, obstacles, margin, most_m);
         if self.contacts.threats.is_empty() {
             return false;
         }
-        self.contacts.look_around(chain, obstacles, (rules.self_collision, most_m));
+        self.contacts.look_around(chain, obstacles, rules.self_collision, most_m);
         self.ease.clear();
         self.ease.extend(chain.connectors().iter().map(|c| f64::from(u8::from(!c.is_still()))));
         self.bends.clear();
@@ -157,11 +157,11 @@ impl<const D: usize> Solver<D> {
             let short_m = pair.keep_m + slack_m(pair.keep_m) - nearest.distance_m;
             if short_m > 0.0 {
                 let [one, other] = pair.parts;
-                let along_one = along_rod(posture.ends(one), nearest.on_body);
-                let along_other = along_rod(posture.ends(other), nearest.on_core);
+                let spot = |part, at| Spot { part, along_rod: along_rod(posture.ends(part), at) };
+                let [one, other] = [spot(one, nearest.on_body), spot(other, nearest.on_core)];
                 let across = || perpendicular(first_axis());
                 let away = unit(sub(nearest.on_core, nearest.on_body)).unwrap_or_else(across);
-                posture.part((one, along_one), (other, along_other), (away, short_m));
+                posture.part(one, other, away, short_m);
                 most_m = most_m.max(short_m);
             }
         }

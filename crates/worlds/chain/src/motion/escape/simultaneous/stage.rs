@@ -1,7 +1,7 @@
 //! The chain around a place, and the moving obstacles near it: where motions are rolled out.
 
 use super::super::{Escape, Margin};
-use super::given::{Given, Through, Wishes};
+use super::given::{Given, Lead, Through, Wishes};
 use super::solve::Solver;
 use super::{PRESSED, TOUCH_M};
 use crate::rods::chain::Chain;
@@ -10,6 +10,7 @@ use crate::rods::obstacle::{Obstacle, Obstacles};
 use crate::rods::propagate::Propagator;
 use crate::rods::rules::Rules;
 use crate::rods::veto::Request;
+use std::ops::RangeInclusive;
 
 /// A part of a chain, and the obstacles that may come near it.
 pub(super) struct Stage<'a, const D: usize> {
@@ -26,8 +27,8 @@ pub(super) struct Stage<'a, const D: usize> {
 #[derive(Clone, Copy)]
 pub(super) struct Tried<const D: usize> {
     through: Option<Through<D>>,
-    /// The connector that leads, and its way in a tick, meters.
-    lead: Option<(usize, Point<D>)>,
+    /// The connector that leads.
+    lead: Option<Lead<D>>,
     /// Ticks without contact after which the roll-out ends.
     clear: usize,
 }
@@ -50,9 +51,9 @@ impl<const D: usize> Tried<D> {
         Self { through, lead: None, clear: CLEAR_TICKS }
     }
 
-    /// Returns the way of a connector that leads, meters a tick.
-    pub(super) fn lead(k: usize, way_m: Point<D>) -> Self {
-        Self { through: None, lead: Some((k, way_m)), clear: MOST_TICKS }
+    /// Returns the way of a connector that leads.
+    pub(super) fn lead(lead: Lead<D>) -> Self {
+        Self { through: None, lead: Some(lead), clear: MOST_TICKS }
     }
 }
 
@@ -61,8 +62,9 @@ impl<'a, const D: usize> Stage<'a, D> {
     pub(super) fn cut(
         rules: &Escape,
         given: &Given<'a, D>,
-        (from, to): (usize, usize),
+        between: RangeInclusive<usize>,
     ) -> Option<Self> {
+        let (from, to) = between.into_inner();
         let Given { chain, obstacles, most_m, .. } = *given;
         let cut = Chain::broken(
             chain.points()[from..=to].to_vec(),
@@ -110,7 +112,7 @@ impl<'a, const D: usize> Stage<'a, D> {
         if let Some(lead) = lead {
             // This cycle's escape is over.
             let start = chain.points().to_vec();
-            self.lead((&mut chain, &start), &obstacles, &mut propagator, lead);
+            self.lead(&mut chain, &start, &obstacles, &mut propagator, lead);
             obstacles.advance(self.dt_s);
         }
         for _ in 0..self.ticks {
@@ -136,7 +138,7 @@ impl<'a, const D: usize> Stage<'a, D> {
                 break;
             }
             if let Some(lead) = lead.filter(|_| clear > 0) {
-                self.lead((&mut chain, &start), &obstacles, &mut propagator, lead);
+                self.lead(&mut chain, &start, &obstacles, &mut propagator, lead);
             }
             obstacles.advance(self.dt_s);
         }
@@ -152,10 +154,11 @@ impl<'a, const D: usize> Stage<'a, D> {
     /// of the tick.
     fn lead(
         &self,
-        (chain, start): (&mut Chain<D>, &[Point<D>]),
+        chain: &mut Chain<D>,
+        start: &[Point<D>],
         obstacles: &Obstacles<D>,
         propagator: &mut Propagator<D>,
-        (k, way_m): (usize, Point<D>),
+        lead: Lead<D>,
     ) {
         let longest_m = |chain: &Chain<D>| {
             let ways = start.iter().zip(chain.points());
@@ -165,9 +168,9 @@ impl<'a, const D: usize> Stage<'a, D> {
             return;
         }
         let escaped = chain.points().to_vec();
-        let to = add(chain.points()[k], way_m);
+        let to = add(chain.points()[lead.k], lead.way_m);
         // Out of the range of coordinates there is no leading.
-        let went = propagator.propagate(chain, obstacles, &Request::exact(k, to));
+        let went = propagator.propagate(chain, obstacles, &Request::exact(lead.k, to));
         if went.is_err() || longest_m(chain) > self.most_m {
             chain.points_mut().copy_from_slice(&escaped);
         }

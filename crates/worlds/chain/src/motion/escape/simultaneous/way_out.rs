@@ -15,6 +15,7 @@ use crate::rods::geometry::{Point, add, along, cross, in_dimensions, perpendicul
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math::{cos, sin};
 use std::f64::consts::FRAC_PI_6;
+use std::ops::RangeInclusive;
 
 /// A chain's memory of its way out of where it was caught, and of how its leader keeps it out.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -166,8 +167,8 @@ fn directions<const D: usize>(through: Point<D>, velocity_m_s: Point<D>) -> Vec<
     all
 }
 
-/// Returns the first and the last connector of the chain around the parts in danger.
-fn in_danger<const D: usize>(given: &Given<'_, D>, solver: &Solver<D>) -> (usize, usize) {
+/// Returns the connectors of the chain around what is in danger.
+fn in_danger<const D: usize>(given: &Given<'_, D>, solver: &Solver<D>) -> RangeInclusive<usize> {
     let Given { chain, obstacles, .. } = *given;
     let near =
         |mover: usize, part: Part| gap_m(chain, part, &obstacles.moving()[mover]) < 2.0 * DANGER_M;
@@ -177,7 +178,7 @@ fn in_danger<const D: usize>(given: &Given<'_, D>, solver: &Solver<D>) -> (usize
         (from.min(k), to.max(k))
     });
     let last = chain.points().len() - 1;
-    (from.min(to).saturating_sub(AROUND), (to + 1 + AROUND).min(last))
+    from.min(to).saturating_sub(AROUND)..=(to + 1 + AROUND).min(last)
 }
 
 #[cfg(test)]
