@@ -26,10 +26,8 @@ struct Part {
 
 /// Tests beside the code. Of the programs, only those with tests: each other one would be compiled for nothing,
 /// together with its library. `.ci/soak` runs all others with checks as well.
-const BESIDE: Part = Part {
-    targets: &["--lib", "--bin", "sidestep-fuzz", "--bin", "xtask"],
-    environment: &CHECKS,
-};
+const BESIDE: Part =
+    Part { targets: &["--lib", "--bin", "sidestep-fuzz", "--bin", "xtask"], environment: &CHECKS };
 
 /// Tests from outside, some of which run examples: the promises of the library, too, so that its golden digests
 /// are those of the shipped build.
@@ -141,6 +139,10 @@ fn every_program_with_tests_is_among_those_that_are_run() {
         });
         let is_tested = own.flat_map(|source| &source.lines).any(|line| line.text == "#[test]");
         let is_run = BESIDE.targets.contains(&member.name.as_str());
-        assert_eq!(is_tested, is_run, "{}: name it in BESIDE if its program has tests", member.name);
+        assert_eq!(
+            is_tested, is_run,
+            "{}: name it in BESIDE if its program has tests",
+            member.name
+        );
     }
 }
