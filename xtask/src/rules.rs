@@ -249,14 +249,19 @@ fn headless_lines(path: &Path, lines: &[&str]) -> Vec<String> {
     for (number, line) in (1..).zip(lines) {
         let documented = documentation(line);
         let begins = documented.filter(|_| !is_inside);
-        // The page's comments may open with a line that has no words yet.
-        is_inside = documented.is_some() && line.trim() != "/**";
+        is_inside = documented.is_some() && goes_on(line.trim());
         let word = begins.and_then(|words| words.split_whitespace().next());
         if word.is_some_and(|word| HEADLESS.contains(&word)) {
             wrong.push(format!("{}:{number} begins with a clause without a head", path.display()));
         }
     }
     wrong
+}
+
+/// Returns whether the next line of documentation would go on with this one. The page's comments may open with a line
+/// that has no words yet, and end where they began, as may strings of Python.
+fn goes_on(line: &str) -> bool {
+    line != "/**" && !line.ends_with("*/") && !line.starts_with("\"\"\"")
 }
 
 /// Returns the words of a line of documentation, in any of our languages.

@@ -122,7 +122,7 @@ from: number,
  */
 until: number,
 /**
- * The number of the first events that are not wanted; none without it.
+ * The number of first events to leave out; 0 without it.
  */
 skip: number | null,
 /**
@@ -187,7 +187,7 @@ to: string | null,
  */
 base: string | null,
 /**
- * Whether a file is replaced that holds something else.
+ * Whether a file is replaced even if it holds something else.
  */
 over: boolean, } | { "do": "schema",
 /**
@@ -198,7 +198,7 @@ world: string, };
 /**
  * A change of a text. Keys are those of `--set`: `robots.1.at.0`; elements count from 0, and a section that stands
  * alone is 0 or left out. Parts that hold dots or are not bare are quoted: `kinds."a.b".observation`. Everything else
- * in the text stays as it is, byte for byte.
+ * in the text stays the same, byte for byte.
  */
 export type Edit = { "op": "set",
 /**
@@ -277,7 +277,7 @@ path: string, };
 export type Speed = { "times": number } | "fastest";
 
 /**
- * The name of a body: kind, number, and part of things that have parts.
+ * The name of a body: kind, number, and, for things that have parts, the part.
  */
 export type Who = {
 /**
@@ -320,7 +320,7 @@ entries: Array<FileEntry>, } | { "is": "opened",
  */
 session: number,
 /**
- * The scene, which stays as it is.
+ * The scene, which stays the same.
  */
 scene: Scene,
 /**
@@ -345,7 +345,7 @@ thinned: number,
  */
 cycles: Array<number>,
 /**
- * For each metric, its value in each sample.
+ * Values in each sample, metric by metric.
  */
 values: Array<Array<number | null>>, } | { "is": "events",
 /**
@@ -353,11 +353,11 @@ values: Array<Array<number | null>>, } | { "is": "events",
  */
 entries: Array<Event>,
 /**
- * Number of events of these cycles that are not here: beyond what was asked for, or never kept.
+ * Number of events of these cycles that are not here: beyond the requested number, or never kept.
  */
 left_out: number,
 /**
- * All events before this cycle are known: of a run those so far, of a recording soon all.
+ * The cycle before which all events are known: of a run those so far, of a recording soon all.
  */
 known_until: number, } | { "is": "source",
 /**
@@ -393,7 +393,7 @@ runs: Array<SweepRun>,
  */
 left_out: number, } | { "is": "problems",
 /**
- * Nothing for a valid text without surprises.
+ * The problems; none for a valid text without surprises.
  */
 problems: Array<Problem>, } | { "is": "edited",
 /**
@@ -405,7 +405,7 @@ text: string, } | { "is": "model",
  */
 value: unknown,
 /**
- * Files that a key of the text can name, as it would name them: those below its folder, and those
+ * Files that a key of the text can name, written as it would name them: those below its folder, and those
  * elsewhere that it names.
  */
 files: Array<string>, } | { "is": "saved",
@@ -423,7 +423,7 @@ text: string, } | { "is": "schema",
 schema: unknown, };
 
 /**
- * An error as people read it: where, what, remedy.
+ * An error as people read it: place, cause, remedy.
  */
 export type Problem = {
 /**
@@ -443,7 +443,7 @@ column: number | null,
  */
 end_line: number | null,
 /**
- * Column behind its end, from 1.
+ * Column after its end, from 1.
  */
 end_column: number | null,
 /**
@@ -507,7 +507,7 @@ words: string,
 unit: string, };
 
 /**
- * A message of the server that nobody asked for.
+ * A message of the server without a request.
  */
 export type Notice = { "notice": "hello",
 /**
@@ -577,7 +577,7 @@ cycles_planned: number,
  */
 time_s: number,
 /**
- * Its speed now, or when it played last.
+ * Its speed now, or when it was last playing.
  */
 speed: Speed,
 /**
@@ -585,7 +585,7 @@ speed: Speed,
  */
 cycles_per_s: number,
 /**
- * The seed, in decimal digits, as it may be larger than a number of JavaScript can be.
+ * The seed, in decimal digits, because it may be larger than any exact integer of JavaScript.
  */
 seed: string,
 /**
@@ -593,11 +593,11 @@ seed: string,
  */
 digest: string | null,
 /**
- * Of a recording: whether the digest was confirmed, or will be.
+ * The verdict on a recording: whether its digest was confirmed, or will be.
  */
 banner: string | null,
 /**
- * Of a fleet: its nodes.
+ * The nodes of a fleet.
  */
 fleet: Fleet | null, };
 
@@ -615,7 +615,7 @@ export type Fleet = {
  */
 has_begun: boolean,
 /**
- * Seconds since its server was heard.
+ * Seconds since its server was last heard.
  */
 silent_s: number,
 /**
@@ -684,12 +684,12 @@ packets_per_s: number,
  */
 bytes_per_s: number,
 /**
- * Seconds since the server has heard it; none of one that it has never heard.
+ * Seconds since the server last heard it; none if it never has.
  */
 silent_s: number | null, };
 
 /**
- * The scene, which stays as it is.
+ * The scene, which stays the same.
  */
 export type Scene = {
 /**
@@ -804,7 +804,7 @@ height_m: number, } | { "type": "sphere",
  */
 radius_m: number, } | { "type": "line",
 /**
- * Its points, in meters; of bodies that move, none, as they are in the frames.
+ * Its points, in meters; none for moving bodies, because the frames have them.
  */
 points_m: Array<[number, number, number]>,
 /**
@@ -812,7 +812,7 @@ points_m: Array<[number, number, number]>,
  */
 thickness_m: number, } | { "type": "dart",
 /**
- * From tail to tip, in meters.
+ * Length from tail to tip, in meters.
  */
 length_m: number,
 /**
@@ -829,7 +829,7 @@ export type Look = {
  */
 color: [number, number, number],
 /**
- * From 0 (fully transparent) to 1 (opaque).
+ * Opacity, from 0 (fully transparent) to 1 (opaque).
  */
 opacity: number,
 /**
@@ -883,7 +883,7 @@ looks: Array<[Look, Look, Look, Look, Look]>,
  */
 look: Array<number>,
 /**
- * Names of those that have their own: index of body, name.
+ * Names of the bodies that have one: index of the body, name.
  */
 names: Array<[number, string]>,
 /**
@@ -900,7 +900,7 @@ export type SweepRun = {
  */
 variant: string,
 /**
- * Its seed, in decimal digits, as it may be larger than a number of JavaScript can be.
+ * Its seed, in decimal digits, because it may be larger than any exact integer of JavaScript.
  */
 seed: string,
 /**
@@ -958,7 +958,7 @@ bearings_rad: Array<number>,
  */
 ranges_m: Array<number | null>,
 /**
- * The same as it is; empty where the world does not tell it.
+ * The true range of each beam in meters; empty where the world does not give it.
  */
 true_m: Array<number | null>,
 /**
@@ -979,15 +979,15 @@ cycle: number,
  */
 level: string,
 /**
- * From the fixed vocabulary of events, e.g. `contact`, `veto`, `trip`; empty where the world does not tell it.
+ * A word of the fixed vocabulary of events, e.g. `contact`, `veto`, `trip`; empty where the world gives none.
  */
 kind: string,
 /**
- * The body that it is about.
+ * The body concerned.
  */
 who: Who | null,
 /**
- * With whom, or with what.
+ * The other body or thing that took part, if any.
  */
 with: Who | null,
 /**
@@ -1101,7 +1101,7 @@ role: Role,
  */
 label: string,
 /**
- * From 0 to 1: how likely, how strong; 1 where that means nothing.
+ * Likelihood or strength, from 0 to 1; 1 where that has no meaning.
  */
 weight: number,
 /**
