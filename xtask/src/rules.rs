@@ -12,6 +12,7 @@ use crate::measures::{circles, functions};
 use crate::members::{self, Member};
 use crate::paths;
 use crate::source::{self, Role};
+use crate::test::misnamed_programs;
 
 /// Circles that are known, in the format of `cargo xtask shape --circles`.
 const KNOWN: &str = include_str!("../circles.txt");
@@ -304,6 +305,7 @@ fn the_rules_of_the_house_hold() {
         reaches_out(&members),
         headless(&members),
         headless_elsewhere(&arguments::house()),
+        misnamed_programs(&members),
         differing(&circles::listed(&members), KNOWN),
     ]
     .concat();
