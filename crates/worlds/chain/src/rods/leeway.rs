@@ -131,6 +131,7 @@ impl<const D: usize> Leeway<D> {
 
 /// Returns whether two rods are surely as far from each other as `room_m`, or less than half of the spare
 /// distance nearer: by their middles, which is much quicker than their distance.
+#[inline]
 fn is_beyond<const D: usize>([a, b]: [Point<D>; 2], [c, d]: [Point<D>; 2], room_m: f64) -> bool {
     let middles_m = 0.5 * distance(add(a, b), add(c, d));
     middles_m - 0.5 * (distance(a, b) + distance(c, d)) >= room_m - 0.5 * SPARE_M

@@ -91,6 +91,7 @@ impl<const D: usize> OwnBody<D> {
     }
 
     /// Visits the rods whose boxes meet `near`, in the order of the chain.
+    #[inline]
     pub(crate) fn visit(&self, near: &Bounds<D>, mut look: impl FnMut(usize)) {
         // The depth of the tree is at most the number of bits of a usize.
         let mut waiting = [0usize; 66];
