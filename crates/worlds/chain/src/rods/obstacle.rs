@@ -45,6 +45,7 @@ impl<const D: usize> Obstacle<D> {
     }
 
     /// Returns the box around it.
+    #[inline]
     pub fn bounds(&self) -> Bounds<D> {
         self.core.bounds().grown(self.radius_m)
     }
