@@ -1,6 +1,7 @@
 //! Things to which the pages for people refer exist: paths, links, pictures, scenarios, code, columns.
 
 mod columns;
+mod copies;
 
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
