@@ -10,7 +10,8 @@ const STUBS: Record<string, string> = {
   "renderers/shaders/ShaderLib.js": "export const ShaderLib = {};",
   "renderers/shaders/ShaderChunk.js": "export const ShaderChunk = {};",
   "renderers/shaders/DFGLUTData.js": "export function getDFGLUT() { throw new Error('left out of this build'); }",
-  "extras/PMREMGenerator.js": "export class PMREMGenerator { constructor() { throw new Error('left out of this build'); } }",
+  "extras/PMREMGenerator.js":
+    "export class PMREMGenerator { constructor() { throw new Error('left out of this build'); } }",
 };
 
 export function slimThree(): Plugin {

@@ -31,8 +31,15 @@ import pinocchio as pin
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 ARMS = [
-    "chain/iiwa7", "iiwa14_primitive_collision", "chain/panda", "chain/ur5", "z1",
-    "chain/snake16_own", "REU_snake", "RSNAKE_snake", "pendulum5",
+    "chain/iiwa7",
+    "iiwa14_primitive_collision",
+    "chain/panda",
+    "chain/ur5",
+    "z1",
+    "chain/snake16_own",
+    "REU_snake",
+    "RSNAKE_snake",
+    "pendulum5",
 ]
 TOLERANCE_M, TOLERANCE_RAD, RESTARTS = 1e-4, 1e-3, 100
 SETTINGS = list(itertools.product([1e-6, 1e-3], [1.0, 0.5], [40, 200]))
@@ -58,7 +65,7 @@ class Arm:
             if joint.nq == joint.nv:
                 q[joint.idx_q] = value
             else:
-                q[joint.idx_q:joint.idx_q + 2] = np.cos(value), np.sin(value)
+                q[joint.idx_q : joint.idx_q + 2] = np.cos(value), np.sin(value)
         return q
 
     def range(self, name):
@@ -105,10 +112,24 @@ def by_sidestep(arm, poses, sidestep, folder):
         table = csv.writer(file)
         table.writerow(["x", "y", "z", "qx", "qy", "qz", "qw"])
         table.writerows(row(pose) for pose in poses)
-    told = json.loads(run([
-        sidestep, "ik", arm.path, "--targets", path, "--json", "--restarts", RESTARTS,
-        "--tolerance-m", TOLERANCE_M, "--tolerance-rad", TOLERANCE_RAD,
-    ]))
+    told = json.loads(
+        run(
+            [
+                sidestep,
+                "ik",
+                arm.path,
+                "--targets",
+                path,
+                "--json",
+                "--restarts",
+                RESTARTS,
+                "--tolerance-m",
+                TOLERANCE_M,
+                "--tolerance-rad",
+                TOLERANCE_RAD,
+            ]
+        )
+    )
     answers = told["answers"]
     met = sum(a["reached"] and arm.is_met(pose, a["joints"]) for a, pose in zip(answers, poses))
     mean = lambda key: float(np.mean([a[key] for a in answers]))
@@ -120,12 +141,28 @@ def compiled(folder):
     if not prefix.is_dir():
         prefix = next(p for p in Path(pin.__file__).parents if (p / "cmeel.prefix").is_dir()) / "cmeel.prefix"
     program = folder / "pinocchio"
-    subprocess.run([
-        os.environ.get("CXX", "g++"), "-std=c++17", "-O2", "-DNDEBUG", "-w",
-        "-DBOOST_MPL_LIMIT_LIST_SIZE=30", "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS", HERE / "beside_pinocchio.cpp", "-o", program,
-        f"-I{prefix}/include", f"-I{prefix}/include/eigen3", f"-L{prefix}/lib", f"-Wl,-rpath,{prefix}/lib",
-        f"-Wl,-rpath-link,{prefix}/lib", "-lpinocchio_default", "-lboost_serialization",
-    ], check=True)
+    subprocess.run(
+        [
+            os.environ.get("CXX", "g++"),
+            "-std=c++17",
+            "-O2",
+            "-DNDEBUG",
+            "-w",
+            "-DBOOST_MPL_LIMIT_LIST_SIZE=30",
+            "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
+            HERE / "beside_pinocchio.cpp",
+            "-o",
+            program,
+            f"-I{prefix}/include",
+            f"-I{prefix}/include/eigen3",
+            f"-L{prefix}/lib",
+            f"-Wl,-rpath,{prefix}/lib",
+            f"-Wl,-rpath-link,{prefix}/lib",
+            "-lpinocchio_default",
+            "-lboost_serialization",
+        ],
+        check=True,
+    )
     return program
 
 
@@ -135,9 +172,22 @@ def by_cpp(program, arm, poses, setting, folder):
     damping, length, steps = setting
     model = folder / "model.txt"
     arm.model.saveToText(str(model))
-    return json.loads(run([
-        program, model, arm.tip, path, RESTARTS, steps, damping, length, TOLERANCE_M, TOLERANCE_RAD,
-    ]))
+    return json.loads(
+        run(
+            [
+                program,
+                model,
+                arm.tip,
+                path,
+                RESTARTS,
+                steps,
+                damping,
+                length,
+                TOLERANCE_M,
+                TOLERANCE_RAD,
+            ]
+        )
+    )
 
 
 def by_python(arm, poses, setting):
@@ -159,7 +209,7 @@ def by_python(arm, poses, setting):
                 q[j.idx_q] = lower + generator.random() * (upper - lower)
             else:
                 angle = (2 * generator.random() - 1) * np.pi
-                q[j.idx_q:j.idx_q + 2] = np.cos(angle), np.sin(angle)
+                q[j.idx_q : j.idx_q + 2] = np.cos(angle), np.sin(angle)
         return q
 
     def descend(target, q):

@@ -217,7 +217,9 @@ def table() -> None:
     sim = sidestep.Simulation(robots(1000, 150), record=["trajectories"])
     sim.step(10_000)
     rows = sim.tables()["trajectories"]
-    words = [name for name, ty in zip(rows.columns, pa.table(rows).schema.types, strict=True) if pa.types.is_dictionary(ty)]
+    words = [
+        name for name, ty in zip(rows.columns, pa.table(rows).schema.types, strict=True) if pa.types.is_dictionary(ty)
+    ]
     plain = [name for name in rows.columns if name not in words]
     numbers = rows.select(plain)
     ours = [column.chunk(0).buffers()[1].address for column in pa.table(rows).select(plain)]
@@ -309,8 +311,7 @@ def loading() -> None:
         "print((time.perf_counter() - started) * 1e3, resident() - before)"
     )
     runs = [
-        subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-        for _ in range(5)
+        subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True) for _ in range(5)
     ]
     took, size = min(tuple(map(float, run.stdout.split())) for run in runs)
     told("import sidestep, beside NumPy", f"{took:.0f} ms, {size:.1f} MB", "100 ms, 15 MB")

@@ -138,9 +138,7 @@ def train(steps: int, pairs: int, cycles: int, pool: ProcessPoolExecutor) -> tup
     return weights, curve
 
 
-def judge(
-    weights: NDArray[Any], seeds: range, cycles: int, pool: ProcessPoolExecutor
-) -> dict[str, stats.Paired]:
+def judge(weights: NDArray[Any], seeds: range, cycles: int, pool: ProcessPoolExecutor) -> dict[str, stats.Paired]:
     """Compares the policy with `wander` on the same seeds, none of which it was trained on."""
     wander = sidestep.sweep(scenario("wander", cycles), replicate=len(seeds), seed=seeds[0])
     tasks = [weights] * len(seeds), seeds, [cycles] * len(seeds)

@@ -50,8 +50,7 @@ class _Members:
     def __call__(self, observed: dict[str, NDArray[Any]], state: Any) -> Any:
         names, rows = tuple(observed), zip(*observed.values(), strict=True)
         answers = [
-            member.decide(dict(zip(names, row, strict=True)))
-            for member, row in zip(self._members, rows, strict=True)
+            member.decide(dict(zip(names, row, strict=True))) for member, row in zip(self._members, rows, strict=True)
         ]
         if not isinstance(answers[0], Mapping):
             return np.asarray(answers)

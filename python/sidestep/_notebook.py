@@ -27,9 +27,7 @@ WIDTH_PX, SPACE_PX = 240.0, 12.0
 def rows(heads: Iterable[str], cells: Iterable[Iterable[Any]], caption: str = "") -> str:
     """Returns a table; ``cells`` has a row for each of its lines."""
     head = "".join(f"<th>{escape(name)}</th>" for name in heads)
-    body = "".join(
-        "<tr>" + "".join(f"<td>{escape(_word(cell))}</td>" for cell in row) + "</tr>" for row in cells
-    )
+    body = "".join("<tr>" + "".join(f"<td>{escape(_word(cell))}</td>" for cell in row) + "</tr>" for row in cells)
     above = f"<caption>{escape(caption)}</caption>" if caption else ""
     return f"<table>{above}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 

@@ -176,9 +176,7 @@ def compare(
     """
     count = _count("runs", runs, MOST_RUNS) or 1
     workers = _count("workers", workers, 1024) or 0
-    return Compared(
-        compare_methods(scenario, _names("methods", methods), count, _seed(seed), workers)
-    )
+    return Compared(compare_methods(scenario, _names("methods", methods), count, _seed(seed), workers))
 
 
 def _mapping(name: str, values: Mapping[str, Any] | None) -> Mapping[str, Any]:

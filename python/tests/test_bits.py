@@ -69,16 +69,12 @@ def test_a_pickle_takes_the_files_of_its_scenario_along(tmp_path):
     assert again.digest == sim.digest
 
 
-def test_a_run_that_python_decided_is_replayed_by_the_command_from_its_orders(
-    external, command, tmp_path
-):
+def test_a_run_that_python_decided_is_replayed_by_the_command_from_its_orders(external, command, tmp_path):
     folder = tmp_path / "run"
     with sidestep.Simulation(external, out=folder) as sim:
         sim.run(decide=decide)
         digest = sim.digest
-    told = subprocess.run(
-        [command, "replay", folder], check=True, capture_output=True, text=True
-    )
+    told = subprocess.run([command, "replay", folder], check=True, capture_output=True, text=True)
     assert digest in told.stdout
     orders = sidestep.read(folder)["orders"]
     assert len(orders) == 200 * 5 * 2
@@ -100,9 +96,7 @@ def test_a_folder_of_python_is_that_of_the_command(root, command, tmp_path):
         [command, "run", scenario, "--cycles", "100", "--out", tmp_path / "a", "--quiet"],
         check=True,
     )
-    with sidestep.Simulation(
-        sidestep.Scenario(scenario).set(cycles=100), out=tmp_path / "b"
-    ) as sim:
+    with sidestep.Simulation(sidestep.Scenario(scenario).set(cycles=100), out=tmp_path / "b") as sim:
         sim.run()
     files = sorted(p.relative_to(tmp_path / "a") for p in (tmp_path / "a").rglob("*.parquet"))
     assert files

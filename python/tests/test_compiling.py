@@ -96,9 +96,7 @@ def test_ctrl_c_ends_the_compiling_of_a_scenario():
             print("stopped", sidestep.Scenario(crowd(8)).agents, flush=True)
         """
     )
-    with subprocess.Popen(
-        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True
-    ) as run:
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as run:
         try:
             assert run.stdout.readline() == "compiling\n"
             # It would take many minutes.

@@ -26,9 +26,7 @@ CHAINS = {
     "world": "chain",
     "cycles": 60,
     "obstacles": [{"at_m": [1.0, 0.2], "radius_m": 0.3}],
-    "chains": [
-        {"connectors": 6, "count": 2, "apart_m": [0.0, 0.8], "rod_m": 0.3, "tasks": [{"kind": "external"}]}
-    ],
+    "chains": [{"connectors": 6, "count": 2, "apart_m": [0.0, 0.8], "rod_m": 0.3, "tasks": [{"kind": "external"}]}],
 }
 AIRPLANES = {
     "world": "airspace",

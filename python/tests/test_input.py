@@ -70,9 +70,7 @@ def test_a_file_with_a_mistake_says_line_column_and_remedy(tmp_path):
         ("broadcast", 2**53, {}, "a whole number from 0 to"),
     ],
 )
-def test_an_order_that_cannot_be_obeyed_is_refused_and_changes_nothing(
-    external, order, values, extra, words
-):
+def test_an_order_that_cannot_be_obeyed_is_refused_and_changes_nothing(external, order, values, extra, words):
     sim = sidestep.Simulation(external)
     before = sim.digest
     with pytest.raises(sidestep.OrderError, match=words):
@@ -159,7 +157,9 @@ def test_a_number_that_is_out_of_range_is_told_with_the_range(external, number):
 
 
 def test_a_seed_that_no_scenario_file_can_have_is_told(external):
-    with pytest.raises(sidestep.InputError, match=r"seed: 9223372036854775808 is too large\n  help: give at most 2\^63 - 1"):
+    with pytest.raises(
+        sidestep.InputError, match=r"seed: 9223372036854775808 is too large\n  help: give at most 2\^63 - 1"
+    ):
         sidestep.Simulation(external, seed=2**63)
     sim = sidestep.Simulation(external, seed=2**63 - 1)
     assert pickle.loads(pickle.dumps(sim)).digest == sim.digest

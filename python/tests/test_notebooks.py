@@ -69,7 +69,12 @@ def test_every_world_shows_a_picture(world, root):
 
 
 def test_sweeps_and_comparisons_show_themselves(tmp_path):
-    floor = {"world": "robots", "cycles": 100, "map": {"ascii": "......\n......"}, "robots": {"count": 2, "effector": "nomad"}}
+    floor = {
+        "world": "robots",
+        "cycles": 100,
+        "map": {"ascii": "......\n......"},
+        "robots": {"count": 2, "effector": "nomad"},
+    }
     swept = sidestep.sweep(floor, vary={"robots.count": [2, 4]}, replicate=5, out=tmp_path / "s")
     assert "count=4" in swept._repr_html_() and "[" in swept._repr_html_()
     assert "table" in elements(swept)

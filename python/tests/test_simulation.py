@@ -154,9 +154,7 @@ def test_ctrl_c_stops_between_two_cycles_with_the_state_whole():
             print("stopped", again.digest == sim.digest, sim.step(), flush=True)
         """
     )
-    with subprocess.Popen(
-        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True
-    ) as run:
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as run:
         assert run.stdout.readline() == "running\n"
         # The run would go on for days.
         run.send_signal(signal.SIGINT)

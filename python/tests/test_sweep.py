@@ -96,9 +96,7 @@ def test_a_precision_ends_a_sweep_as_it_ends_that_of_the_command(floor, command,
 
 def test_a_sweep_file_a_dict_of_one_and_a_scenario_are_swept_alike(floor, tmp_path):
     file = tmp_path / "sweep.toml"
-    file.write_text(
-        'format = 1\nscenario = "floor.toml"\nreplicates = 2\nvary.robots.count = [2, 5]\n'
-    )
+    file.write_text('format = 1\nscenario = "floor.toml"\nreplicates = 2\nvary.robots.count = [2, 5]\n')
     of_dict = {"scenario": str(floor), "replicates": 2, "vary": {"robots.count": [2, 5]}}
     options = {"vary": {"robots.count": [2, 5]}, "replicate": 2}
     swept = [
@@ -120,9 +118,7 @@ def test_tables_are_arrow_streams_and_are_read_back_from_the_folder(floor, tmp_p
     assert table.equals(pyarrow.table(sidestep.read(tmp_path / "s")["results"]))
     assert table.column("robots.effector").to_pylist()[:3] == ["nomad"] * 2 + ["perfect"]
     assert swept.results.meanings["digest"] == "Digest of the last state."
-    np.testing.assert_array_equal(
-        swept.values("contacts", 1), swept.results["contacts"][2:4]
-    )
+    np.testing.assert_array_equal(swept.values("contacts", 1), swept.results["contacts"][2:4])
     assert list(sidestep.read(tmp_path / "s", ["timings"])) == ["timings"]
 
 
@@ -397,9 +393,7 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_table(floor, tmp_path
     distributed = needs("distributed")
     options = {"vary": VARY, "replicate": 6, "set": {"cycles": 2000}}
     sidestep.sweep(floor, **options, out=tmp_path / "local")
-    cluster = distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
-    )
+    cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1")
     with cluster, distributed.Client(cluster) as client:
         worker = next(iter(cluster.workers.values()))
         done, at_kill = threading.Event(), []

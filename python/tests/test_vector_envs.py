@@ -134,8 +134,7 @@ def test_worlds_of_many_agents_have_the_episodes_of_environments_alone(external,
                 assert (rewards[k] == 0).all()
                 continue
             actions = {
-                agent: {name: array[k, row] for name, array in acted.items()}
-                for row, agent in enumerate(env.agents)
+                agent: {name: array[k, row] for name, array in acted.items()} for row, agent in enumerate(env.agents)
             }
             expected[k], gains, _, cut, _ = env.step(actions)
             assert rewards[k].tolist() == list(gains.values())

@@ -35,7 +35,17 @@ export class Refused extends Error {
 
 /** A problem that the page itself has noticed. */
 export function problemOf(place: string, cause: string, remedy: string): Problem {
-  return { place, line: null, column: null, end_line: null, end_column: null, key: null, cause, remedy, is_warning: false };
+  return {
+    place,
+    line: null,
+    column: null,
+    end_line: null,
+    end_column: null,
+    key: null,
+    cause,
+    remedy,
+    is_warning: false,
+  };
 }
 
 /** A socket on which the server has not said hello by then is given up: a proxy in between may hold it open. */
@@ -47,7 +57,11 @@ interface Waiting {
 }
 
 /** The problem of calls whose connection was lost; the banner tells it for all of them. */
-export const LOST = problemOf("connection", "the connection to the server was lost", "the page connects again by itself");
+export const LOST = problemOf(
+  "connection",
+  "the connection to the server was lost",
+  "the page connects again by itself",
+);
 
 /** Clock and sockets, which tests replace. */
 export interface Surroundings {

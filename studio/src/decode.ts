@@ -111,8 +111,19 @@ export function decodeFrame(bytes: ArrayBuffer): Frame {
   const text = head.textBytes === 0 ? NO_TEXT : readText(new Uint8Array(bytes, at, head.textBytes));
   const { session, cast, cycle, time_s, bodies, leftOut } = head;
   return {
-    session, cast, dimensions: d, cycle, time_s, bodies, leftOut,
-    places_m, turns, lineStarts, points_m, conditions, text,
+    session,
+    cast,
+    dimensions: d,
+    cycle,
+    time_s,
+    bodies,
+    leftOut,
+    places_m,
+    turns,
+    lineStarts,
+    points_m,
+    conditions,
+    text,
   };
 }
 

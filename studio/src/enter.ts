@@ -40,7 +40,8 @@ export async function standing(): Promise<Standing> {
 /** Words for each standing: the cause, and the remedy. */
 export const STANDING_WORDS: Record<Standing, string> = {
   in: "The connection was lost, but the server answers.",
-  token: "The server does not know this page any more: it was started anew, or the browser has forgotten its token. Open the whole address that it has printed.",
+  token:
+    "The server does not know this page any more: it was started anew, or the browser has forgotten its token. Open the whole address that it has printed.",
   name: "The server does not take this address: open the one that it has printed.",
   full: "The server is full: so many pages are open. Close one of the others; this one tries again.",
   silent: "The server does not answer. It may have been ended: start `sidestep studio` again.",

@@ -6,7 +6,14 @@ import type { Place, Value, Who } from "./protocol";
 const NARROW = "\u202f";
 
 /** Units that are words, for one of them. */
-const ONE: Record<string, string> = { cycles: "cycle", boxes: "box", bodies: "body", bytes: "byte", messages: "message", connectors: "connector" };
+const ONE: Record<string, string> = {
+  cycles: "cycle",
+  boxes: "box",
+  bodies: "body",
+  bytes: "byte",
+  messages: "message",
+  connectors: "connector",
+};
 
 /** A number with at most four significant digits, and its unit. */
 export function withUnit(value: number, unit = ""): string {

@@ -1,9 +1,30 @@
 /** The actions of keys, in one table that the help shows too. */
 
 export type Action =
-  | "play" | "play-back" | "next" | "back" | "next-ten" | "back-ten" | "slower" | "faster"
-  | "next-event" | "previous-event" | "filter" | "fit" | "center" | "trails"
-  | "left" | "right" | "up" | "down" | "nearer" | "farther" | "deselect" | "edit" | "help" | "session";
+  | "play"
+  | "play-back"
+  | "next"
+  | "back"
+  | "next-ten"
+  | "back-ten"
+  | "slower"
+  | "faster"
+  | "next-event"
+  | "previous-event"
+  | "filter"
+  | "fit"
+  | "center"
+  | "trails"
+  | "left"
+  | "right"
+  | "up"
+  | "down"
+  | "nearer"
+  | "farther"
+  | "deselect"
+  | "edit"
+  | "help"
+  | "session";
 
 interface Key {
   action: Action;
@@ -42,7 +63,9 @@ export const KEYS: readonly Key[] = [
 ];
 
 /** Returns the action of a pressed key, if it has one. */
-export function actionOf(event: Pick<KeyboardEvent, "key" | "shiftKey" | "ctrlKey" | "metaKey" | "altKey">): Action | null {
+export function actionOf(
+  event: Pick<KeyboardEvent, "key" | "shiftKey" | "ctrlKey" | "metaKey" | "altKey">,
+): Action | null {
   if (event.ctrlKey || event.metaKey || event.altKey) return null;
   const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
   const isArrow = key.startsWith("Arrow");

@@ -28,24 +28,48 @@ function goTo(index: number, studio: Studio): boolean {
 function transport(action: Action, studio: Studio): boolean {
   const active = studio.active!;
   switch (action) {
-    case "play": studio.toggle(); return true;
-    case "play-back": studio.toggleBack(); return true;
-    case "next": studio.step(1); return true;
-    case "back": studio.step(-1); return true;
-    case "next-ten": studio.step(10); return true;
-    case "back-ten": studio.step(-10); return true;
-    case "slower": for (const one of studio.led) one.changeSpeed(-1); return true;
-    case "faster": for (const one of studio.led) one.changeSpeed(1); return true;
-    case "next-event": active.jump(1); return true;
-    case "previous-event": active.jump(-1); return true;
-    default: return false;
+    case "play":
+      studio.toggle();
+      return true;
+    case "play-back":
+      studio.toggleBack();
+      return true;
+    case "next":
+      studio.step(1);
+      return true;
+    case "back":
+      studio.step(-1);
+      return true;
+    case "next-ten":
+      studio.step(10);
+      return true;
+    case "back-ten":
+      studio.step(-10);
+      return true;
+    case "slower":
+      for (const one of studio.led) one.changeSpeed(-1);
+      return true;
+    case "faster":
+      for (const one of studio.led) one.changeSpeed(1);
+      return true;
+    case "next-event":
+      active.jump(1);
+      return true;
+    case "previous-event":
+      active.jump(-1);
+      return true;
+    default:
+      return false;
   }
 }
 
 function view(action: Action, session: Session): void {
   const stage = stages.get(session.key);
   const moves: Partial<Record<Action, [number, number]>> = {
-    left: [PAN_PX, 0], right: [-PAN_PX, 0], up: [0, PAN_PX], down: [0, -PAN_PX],
+    left: [PAN_PX, 0],
+    right: [-PAN_PX, 0],
+    up: [0, PAN_PX],
+    down: [0, -PAN_PX],
   };
   const move = moves[action];
   if (move) {

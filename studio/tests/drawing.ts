@@ -12,12 +12,17 @@ export class Hand {
   /** Returns the point of the screen where a place of the world is. */
   async at(x_m: number, y_m: number): Promise<[number, number]> {
     const layer = this.#page.locator("canvas.layer");
-    await this.#page.waitForFunction(() => document.querySelector<HTMLElement>("canvas.layer")?.dataset.eye !== undefined);
-    return layer.evaluate((canvas: HTMLElement, [x, y]) => {
-      const [x0, y0, m] = canvas.dataset.eye!.split(" ").map(Number) as [number, number, number];
-      const box = canvas.getBoundingClientRect();
-      return [box.left + box.width / 2 + (x! - x0) / m, box.top + box.height / 2 - (y! - y0) / m] as [number, number];
-    }, [x_m, y_m]);
+    await this.#page.waitForFunction(
+      () => document.querySelector<HTMLElement>("canvas.layer")?.dataset.eye !== undefined,
+    );
+    return layer.evaluate(
+      (canvas: HTMLElement, [x, y]) => {
+        const [x0, y0, m] = canvas.dataset.eye!.split(" ").map(Number) as [number, number, number];
+        const box = canvas.getBoundingClientRect();
+        return [box.left + box.width / 2 + (x! - x0) / m, box.top + box.height / 2 - (y! - y0) / m] as [number, number];
+      },
+      [x_m, y_m],
+    );
   }
 
   async click(x_m: number, y_m: number): Promise<void> {

@@ -22,9 +22,7 @@ try:
     import gymnasium as _gymnasium
     import pettingzoo as _pettingzoo
 except ImportError as error:
-    raise ImportError(
-        "environments need gymnasium and pettingzoo: pip install 'sidestep[rl]'"
-    ) from error
+    raise ImportError("environments need gymnasium and pettingzoo: pip install 'sidestep[rl]'") from error
 
 from ._batch import Batch, VectorEnv
 from ._parallel import Airspace, Chain, ParallelEnv, Robots, parallel_env

@@ -82,9 +82,7 @@ class Batch:
         self._orders = orders_of(its, [wanted] if isinstance(wanted, str) else wanted)
         self._reward = rewards_of(its, world, rewards)
         self.agents = [f"{NOUNS[world]}_{agent}" for agent in its.agents]
-        self.single_observation_space = spaces.Dict(
-            {space.name: space_of(space) for space in its.observed}
-        )
+        self.single_observation_space = spaces.Dict({space.name: space_of(space) for space in its.observed})
         self.single_action_space = action_space(self._orders)
         singles = (self.single_observation_space, self.single_action_space)
         self.observation_space, self.action_space = (
@@ -95,9 +93,7 @@ class Batch:
         self._reals = [space.name for space in its.observed if space.dtype == "float64"]
         # Observations before and after a step, in turns; and the same as they are returned.
         self._raw = [self.worlds.observe(self._number) for _ in range(2)]
-        self._cast = [
-            {name: np.zeros(raw[name].shape, np.float32) for name in self._reals} for raw in self._raw
-        ]
+        self._cast = [{name: np.zeros(raw[name].shape, np.float32) for name in self._reals} for raw in self._raw]
         self._now = 0
         self._rngs: list[np.random.Generator] = []
         self._ended = np.ones(worlds, bool)

@@ -32,9 +32,7 @@ def space_of(space: Space) -> spaces.Space[Any]:
     if space.dtype == "int64":
         high = min(space.high, float(MOST - 512))
         return spaces.Box(np.int64(space.low), np.int64(high), space.shape, np.int64)
-    return spaces.Box(
-        np.float32(space.low), np.float32(space.high), space.shape, np.float32
-    )
+    return spaces.Box(np.float32(space.low), np.float32(space.high), space.shape, np.float32)
 
 
 def within(space: Space) -> spaces.Space[Any]:
@@ -116,9 +114,7 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         self._orders = [orders_of(team, wanted) for _, team in self._teams]
         self._order_names = [[space.name for space in chosen] for chosen in self._orders]
         self._rewards = [rewards_of(team, world, rewards) for _, team in self._teams]
-        self._columns = [
-            [(space.name, space.dtype == "float64") for space in team.observed] for _, team in self._teams
-        ]
+        self._columns = [[(space.name, space.dtype == "float64") for space in team.observed] for _, team in self._teams]
         self._names = [[f"{NOUNS[world]}_{agent}" for agent in team.agents] for _, team in self._teams]
         self.possible_agents = [name for names in self._names for name in names]
         self.agents: list[str] = []
@@ -180,9 +176,7 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         self.sim.step()
         after = self._observed()
         gains: dict[str, float] = {}
-        for reward, names, old, new in zip(
-            self._rewards, self._names, self._before, after, strict=True
-        ):
+        for reward, names, old, new in zip(self._rewards, self._names, self._before, after, strict=True):
             gains.update(zip(names, earned(reward, old, new, len(names)).tolist(), strict=True))
         self._before = after
         is_over = self.sim.is_over
@@ -240,8 +234,7 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         agents: dict[str, Any] = {}
         for columns, names, arrays in zip(self._columns, self._names, observed, strict=True):
             cells = {
-                name: list(arrays[name].astype(np.float32) if is_real else arrays[name])
-                for name, is_real in columns
+                name: list(arrays[name].astype(np.float32) if is_real else arrays[name]) for name, is_real in columns
             }
             agents.update(rows_by_name(names, cells))
         return agents
@@ -268,9 +261,7 @@ class Airspace(ParallelEnv):
     metadata = {**ParallelEnv.metadata, "name": "airspace_v0"}
 
 
-def parallel_env(
-    scenario: Scenario | str | PathLike[str] | Mapping[str, Any], **options: Any
-) -> ParallelEnv:
+def parallel_env(scenario: Scenario | str | PathLike[str] | Mapping[str, Any], **options: Any) -> ParallelEnv:
     """Returns the environment of the scenario's world: :class:`Robots`, :class:`Chain` or :class:`Airspace`."""
     scenario = scenario if isinstance(scenario, Scenario) else Scenario(scenario)
     of_world = next(one for one in (Robots, Chain, Airspace) if one.world == scenario.world)

@@ -136,9 +136,7 @@ def rewards(terms: Mapping[str, float] | Reward, observed: set[str]) -> Reward:
     return total
 
 
-def earned(
-    reward: Reward, before: Arrays, after: Arrays, agents: int
-) -> NDArray[np.float64]:
+def earned(reward: Reward, before: Arrays, after: Arrays, agents: int) -> NDArray[np.float64]:
     """Returns the reward of each agent of a team; a function of one's own may return the wrong thing."""
     values = np.array(reward(before, after), dtype=float)
     if values.shape != (agents,):

@@ -24,9 +24,7 @@ class Env(gymnasium.Env[dict[str, Any], Any]):
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
-    def __init__(
-        self, scenario: Scenario | str | PathLike[str] | Mapping[str, Any], **options: Any
-    ) -> None:
+    def __init__(self, scenario: Scenario | str | PathLike[str] | Mapping[str, Any], **options: Any) -> None:
         self.parallel = parallel_env(scenario, **options)
         agents = self.parallel.possible_agents
         if len(agents) != 1:

@@ -46,7 +46,10 @@ export class Plot {
       ...size,
       legend: { show: false },
       scales: { x: { time: false }, y: { range: (_, lo, hi) => rangeOf(lo, hi) } },
-      axes: [{ ...axis, size: 26, gap: 5 }, { ...axis, size: 54, gap: 4 }],
+      axes: [
+        { ...axis, size: 26, gap: 5 },
+        { ...axis, size: 54, gap: 4 },
+      ],
       series: [{}, { stroke: colors.curve, width: 1.5, points: { show: false } }],
       cursor: { y: false, drag: { x: false, y: false }, points: { size: 6, fill: colors.curve } },
       hooks: {

@@ -42,16 +42,28 @@ export class Bench {
   readonly ground = $derived.by((): Ground | null => groundOf(this.board, this.session.scene.floor));
   readonly items = $derived.by((): Item[] => this.#items());
   readonly chosen = $derived.by(() => this.items.find(({ path }) => isSame(path, this.draft.chosen)) ?? null);
-  readonly tools = $derived.by((): Tool[] => toolsOf(this.session.scene).filter((tool) => this.board !== null || !tool.paints));
+  readonly tools = $derived.by((): Tool[] =>
+    toolsOf(this.session.scene).filter((tool) => this.board !== null || !tool.paints),
+  );
   readonly obstacle = $derived.by(() => {
     const model = this.draft.model ?? {};
     const has = (path: Path): boolean => valueAt(model, path) !== undefined;
-    return obstacleTo(this.session.scene, this.board, { file: has(["map", "file"]), office: has(["map", "office"]), airplanes: has(["airplanes"]) });
+    return obstacleTo(this.session.scene, this.board, {
+      file: has(["map", "file"]),
+      office: has(["map", "office"]),
+      airplanes: has(["airplanes"]),
+    });
   });
   /** Returns whether the map of the picture can become a drawn one. */
   readonly canTakeMap = $derived.by(() => {
     const { world, floor } = this.session.scene;
-    return world === "robots" && this.board === null && this.draft.model !== null && floor !== null && floor.width * floor.height <= MOST_BOXES;
+    return (
+      world === "robots" &&
+      this.board === null &&
+      this.draft.model !== null &&
+      floor !== null &&
+      floor.width * floor.height <= MOST_BOXES
+    );
   });
 
   #items(): Item[] {
@@ -76,12 +88,19 @@ export class Bench {
     if (!board || !ground) return [];
     const [from, to] = [stroke.from, stroke.to].map(([x, y]) => cellOf(ground, x, y)) as [Cell, Cell];
     switch (this.tool) {
-      case "brush": case "eraser": return brushed([...stroke.trail, to], this.side);
-      case "line": return brushed(lineCells(from, to), this.side);
-      case "rectangle": return rectangleCells(from, to, stroke.isWhole);
-      case "fill": return floodCells(to, board.width, board.height, (cell) => board.markAt(cell));
-      case "door": return rectangleCells(from, to, true);
-      default: return [];
+      case "brush":
+      case "eraser":
+        return brushed([...stroke.trail, to], this.side);
+      case "line":
+        return brushed(lineCells(from, to), this.side);
+      case "rectangle":
+        return rectangleCells(from, to, stroke.isWhole);
+      case "fill":
+        return floodCells(to, board.width, board.height, (cell) => board.markAt(cell));
+      case "door":
+        return rectangleCells(from, to, true);
+      default:
+        return [];
     }
   }
 
@@ -107,14 +126,22 @@ export class Bench {
     const { from, to } = stroke;
     if (!model) return [];
     switch (this.tool) {
-      case "ball": return putBall(from, Math.max(Math.hypot(to[0] - from[0], to[1] - from[1]), 8 * this.m_per_px), this.m_per_px);
-      case "wall": return putWall(from, to, this.m_per_px);
-      case "box": return putBox(from, to, this.m_per_px);
-      case "polygon": return putPolygon(model, from, to, chosen, this.m_per_px);
-      case "patrol": return putPatrol(model, to, chosen, this.m_per_px);
-      case "airplane": return putAirplane(from, this.#far(from, to), this.m_per_px);
-      case "way-point": return putWayPoint(model, to, chosen, this.m_per_px);
-      default: return this.ground ? this.#boxEdits(stroke, this.ground) : [];
+      case "ball":
+        return putBall(from, Math.max(Math.hypot(to[0] - from[0], to[1] - from[1]), 8 * this.m_per_px), this.m_per_px);
+      case "wall":
+        return putWall(from, to, this.m_per_px);
+      case "box":
+        return putBox(from, to, this.m_per_px);
+      case "polygon":
+        return putPolygon(model, from, to, chosen, this.m_per_px);
+      case "patrol":
+        return putPatrol(model, to, chosen, this.m_per_px);
+      case "airplane":
+        return putAirplane(from, this.#far(from, to), this.m_per_px);
+      case "way-point":
+        return putWayPoint(model, to, chosen, this.m_per_px);
+      default:
+        return this.ground ? this.#boxEdits(stroke, this.ground) : [];
     }
   }
 
@@ -127,7 +154,8 @@ export class Bench {
       return putBody(model, key, around(cell, robotSide(model, key, chosen)), chosen);
     }
     if (this.tool === "goal") return putGoal(model, cell, chosen);
-    if (this.tool === "door") return putDoor(model, this.board, rectOf(cellOf(ground, stroke.from[0], stroke.from[1]), cell));
+    if (this.tool === "door")
+      return putDoor(model, this.board, rectOf(cellOf(ground, stroke.from[0], stroke.from[1]), cell));
     const painted = this.board?.paint(this.cells(stroke), this.tool === "eraser" ? "." : this.mark);
     return painted ? [painted] : [];
   }
@@ -179,7 +207,9 @@ export class Bench {
   /** The doors of an office, each with its place: sections for each size, with the schedule that they had. */
   #officeDoors(): Edit[] {
     const doors = valueAt(this.draft.model ?? {}, ["doors"]);
-    const sections = Array.isArray(doors) ? doors.map((value, i) => ({ path: ["doors", i], value })) : [{ path: ["doors"], value: doors }];
+    const sections = Array.isArray(doors)
+      ? doors.map((value, i) => ({ path: ["doors", i], value }))
+      : [{ path: ["doors"], value: doors }];
     const host = sections.find(({ value }) => valueAt(value, ["office"]) === true);
     const table = host?.value as Record<string, unknown> | undefined;
     if (!host || !table) return [];
@@ -190,7 +220,8 @@ export class Bench {
     const edits: Edit[] = [remove([...host.path, "office"])];
     if (!keepsOwn && first) edits.push(set([...host.path, "at"], first.at), set([...host.path, "size"], first.size));
     if (!keepsOwn && !first) return [remove(host.path)];
-    for (const one of keepsOwn && first ? [first, ...others] : others) edits.push(insert(["doors"], { ...schedule, at: one.at, size: one.size }));
+    for (const one of keepsOwn && first ? [first, ...others] : others)
+      edits.push(insert(["doors"], { ...schedule, at: one.at, size: one.size }));
     return edits;
   }
 
@@ -202,7 +233,10 @@ export class Bench {
     for (let i = 0; i < bodies.count; i++) {
       const shape = bodies.cast.shapes[bodies.cast.shape[i]!]!;
       if (bodies.who(i).kind !== "door" || shape.type !== "cuboid") continue;
-      const size: [number, number] = [Math.round(shape.size_m[0] / floor.box_m), Math.round(shape.size_m[1] / floor.box_m)];
+      const size: [number, number] = [
+        Math.round(shape.size_m[0] / floor.box_m),
+        Math.round(shape.size_m[1] / floor.box_m),
+      ];
       const [x, y] = [frame.places_m[2 * i]! - shape.size_m[0] / 2, frame.places_m[2 * i + 1]! - shape.size_m[1] / 2];
       const cell = cellOf(floor, x + floor.box_m / 2, y + floor.box_m / 2);
       const group = bySize.get(size.join()) ?? { at: [], size };

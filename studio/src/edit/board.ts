@@ -25,7 +25,10 @@ export class Board {
 
   constructor(art: string, box_m: number) {
     this.#skipped = /^\r?\n/.test(art) ? 1 : 0;
-    this.#lines = art.replace(/^\r?\n/, "").replace(/[\r\n]+$/, "").split(/\r?\n/);
+    this.#lines = art
+      .replace(/^\r?\n/, "")
+      .replace(/[\r\n]+$/, "")
+      .split(/\r?\n/);
     this.width = this.#lines[0]!.length;
     this.height = this.#lines.length;
     this.box_m = box_m;
@@ -52,7 +55,11 @@ export class Board {
   paint(cells: readonly Cell[], mark: Mark): Edit | null {
     const changed = cells.filter((cell) => this.has(cell) && this.markAt(cell) !== mark);
     if (changed.length === 0) return null;
-    const marks = changed.map(([column, row]): [number, number, string] => [this.#skipped + this.height - 1 - row, column, mark]);
+    const marks = changed.map(([column, row]): [number, number, string] => [
+      this.#skipped + this.height - 1 - row,
+      column,
+      mark,
+    ]);
     return { op: "paint", key: keyOf(["map", "ascii"]), cells: marks };
   }
 }

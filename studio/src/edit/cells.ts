@@ -31,7 +31,12 @@ export interface Rect {
 }
 
 export function rectOf([c0, r0]: Cell, [c1, r1]: Cell): Rect {
-  return { column: Math.min(c0, c1), row: Math.min(r0, r1), width: Math.abs(c1 - c0) + 1, height: Math.abs(r1 - r0) + 1 };
+  return {
+    column: Math.min(c0, c1),
+    row: Math.min(r0, r1),
+    width: Math.abs(c1 - c0) + 1,
+    height: Math.abs(r1 - r0) + 1,
+  };
 }
 
 /** The boxes of a rectangle between two corners: its border, or all of it. */
@@ -61,7 +66,12 @@ export function brushed(cells: readonly Cell[], side: number): Cell[] {
 }
 
 /** The boxes that hang together with one and have the same mark, over their four sides. */
-export function floodCells(from: Cell, width: number, height: number, markAt: (cell: Cell) => string | undefined): Cell[] {
+export function floodCells(
+  from: Cell,
+  width: number,
+  height: number,
+  markAt: (cell: Cell) => string | undefined,
+): Cell[] {
   const mark = markAt(from);
   if (mark === undefined) return [];
   const seen = new Uint8Array(width * height);

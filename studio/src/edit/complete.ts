@@ -62,7 +62,9 @@ function inValue(value: string): Within {
   const inTable = ways.length > 0 && value[lastOpen(value)] === "{";
   if (!inTable) return { path, rest: rest.trimStart(), isValue: true };
   const deeper = /^\s*([\w-]+)\s*=\s*(.*)$/.exec(rest);
-  return deeper ? { path: [...path, deeper[1]!], rest: deeper[2]!, isValue: true } : { path, rest: rest.trimStart(), isValue: false };
+  return deeper
+    ? { path: [...path, deeper[1]!], rest: deeper[2]!, isValue: true }
+    : { path, rest: rest.trimStart(), isValue: false };
 }
 
 /** Returns the offset of the innermost bracket that is still open. */
@@ -123,9 +125,11 @@ function values(path: Path, typed: string, at: number, world: World, model: Tabl
   const item = shape.kind === "list" ? world.shapeOf(shape.of, undefined) : shape;
   const quoted = (value: string): string => JSON.stringify(value);
   let options: Option[] = [];
-  if (item.kind === "choice") options = item.choices.map(({ value, words }) => ({ label: quoted(value), words, kind: "value" }));
+  if (item.kind === "choice")
+    options = item.choices.map(({ value, words }) => ({ label: quoted(value), words, kind: "value" }));
   if (item.kind === "switch") options = ["true", "false"].map((label) => ({ label, words: "", kind: "value" }));
-  if (item.kind === "text") options = namesIn(item.names, model).map((name) => ({ label: quoted(name), words: "", kind: "value" }));
+  if (item.kind === "text")
+    options = namesIn(item.names, model).map((name) => ({ label: quoted(name), words: "", kind: "value" }));
   return options.length > 0 ? { from: at - begun[0].length, options } : null;
 }
 

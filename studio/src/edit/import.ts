@@ -38,7 +38,10 @@ export function importEdits(model: Table, world: string, { kind, name }: FileEnt
   }
   if (world === "chain") {
     const key = name.endsWith(".world") ? "stage" : "map";
-    return [...gone("ground", ["corridor", "map", "stage", ...(key === "stage" ? ["unknown"] : [])]), set(["ground", key], path)];
+    return [
+      ...gone("ground", ["corridor", "map", "stage", ...(key === "stage" ? ["unknown"] : [])]),
+      set(["ground", key], path),
+    ];
   }
   const isImage = /\.(png|pgm)$/i.test(name);
   const hasPixels = valueAt(model, ["map", "resolution_m"]) !== undefined;

@@ -8,7 +8,9 @@ const BARE = /^[A-Za-z0-9_-]+$/;
 
 /** A path as text. */
 export function keyOf(path: Path): string {
-  return path.map((part) => (typeof part === "number" || BARE.test(part) ? String(part) : JSON.stringify(part))).join(".");
+  return path
+    .map((part) => (typeof part === "number" || BARE.test(part) ? String(part) : JSON.stringify(part)))
+    .join(".");
 }
 
 /** The parts of a path; parts that look like numbers stay text. */

@@ -71,7 +71,12 @@ export class Sketcher {
   }
 
   #corners(ground: Ground, [column, row]: Cell): Place[] {
-    return [[0, 0], [1, 0], [1, 1], [0, 1]].map(([i, j]) => placeOf(ground, column + i!, row + j!));
+    return [
+      [0, 0],
+      [1, 0],
+      [1, 1],
+      [0, 1],
+    ].map(([i, j]) => placeOf(ground, column + i!, row + j!));
   }
 
   #colorOf(mark: Mark): Rgb {
@@ -98,7 +103,8 @@ export class Sketcher {
     pen.beginPath();
     const piece = (a: Place, b: Place): void => {
       const [[x0, y0], [x1, y1]] = [this.#px(a), this.#px(b)];
-      if (Math.max(x0, x1) < 0 || Math.min(x0, x1) > width_px || Math.max(y0, y1) < 0 || Math.min(y0, y1) > height_px) return;
+      if (Math.max(x0, x1) < 0 || Math.min(x0, x1) > width_px || Math.max(y0, y1) < 0 || Math.min(y0, y1) > height_px)
+        return;
       pen.moveTo(x0, y0);
       pen.lineTo(x1, y1);
     };
@@ -119,7 +125,13 @@ export class Sketcher {
     const [, , inFront] = this.#eye.project(...item.at_m);
     if (!inFront) return;
     const pen = this.#pen;
-    const color = isWrong ? ROLES.refused.color : item.kind === "goal" ? ROLES.target.color : item.kind === "area" ? ROLES.claim.color : ROLES.done.color;
+    const color = isWrong
+      ? ROLES.refused.color
+      : item.kind === "goal"
+        ? ROLES.target.color
+        : item.kind === "area"
+          ? ROLES.claim.color
+          : ROLES.done.color;
     const at = (p: Place): Place => [p[0] + by[0], p[1] + by[1], p[2] + by[2]];
     const ink = css(visible(color, this.#palette));
     pen.strokeStyle = ink;
@@ -141,7 +153,14 @@ export class Sketcher {
     const [x, y] = this.#px(at);
     const r = HANDLE_PX * (isChosen ? 1.2 : 0.9);
     pen.beginPath();
-    if (item.kind === "goal") for (const [i, j] of [[0, -1.3], [1.3, 0], [0, 1.3], [-1.3, 0]]) pen.lineTo(x + i! * r, y + j! * r);
+    if (item.kind === "goal")
+      for (const [i, j] of [
+        [0, -1.3],
+        [1.3, 0],
+        [0, 1.3],
+        [-1.3, 0],
+      ])
+        pen.lineTo(x + i! * r, y + j! * r);
     else if (item.kind === "point") pen.rect(x - 0.8 * r, y - 0.8 * r, 1.6 * r, 1.6 * r);
     else pen.arc(x, y, r, 0, 2 * Math.PI);
     pen.closePath();
@@ -209,9 +228,17 @@ export class Sketcher {
   #cursor(at: Place): void {
     const pen = this.#pen;
     const [x, y] = this.#px(at);
-    for (const [width, style] of [[5, css(this.#palette.free, 0.9)], [2, css(this.#palette.accent)]] as const) {
+    for (const [width, style] of [
+      [5, css(this.#palette.free, 0.9)],
+      [2, css(this.#palette.accent)],
+    ] as const) {
       pen.beginPath();
-      for (const [i, j] of [[-1, 0], [1, 0], [0, -1], [0, 1]] as const) {
+      for (const [i, j] of [
+        [-1, 0],
+        [1, 0],
+        [0, -1],
+        [0, 1],
+      ] as const) {
         pen.moveTo(x + 4 * i, y + 4 * j);
         pen.lineTo(x + 13 * i, y + 13 * j);
       }
@@ -243,13 +270,18 @@ export function itemAt(items: readonly Item[], eye: Eye, x_px: number, y_px: num
     const [x, y] = eye.project(...at);
     return [x, y];
   };
-  const near = ({ at_m }: Item, within: number): boolean => eye.project(...at_m)[2] && Math.hypot(px(at_m)[0] - x_px, px(at_m)[1] - y_px) <= within;
+  const near = ({ at_m }: Item, within: number): boolean =>
+    eye.project(...at_m)[2] && Math.hypot(px(at_m)[0] - x_px, px(at_m)[1] - y_px) <= within;
   const byHandle = items.findLast((item) => item.kind !== "area" && item.kind !== "body" && near(item, HANDLE_PX + 4));
   if (byHandle) return byHandle;
   const bodies = items.filter((item) => item.kind === "body" || item.kind === "area");
   const isOn = (item: Item): boolean => {
     const outline = item.outline_m.map(px);
-    return near(item, HANDLE_PX + 2) || (item.kind === "body" && item.isClosed && holds(outline, x_px, y_px)) || isBeside(outline, item.isClosed, x_px, y_px);
+    return (
+      near(item, HANDLE_PX + 2) ||
+      (item.kind === "body" && item.isClosed && holds(outline, x_px, y_px)) ||
+      isBeside(outline, item.isClosed, x_px, y_px)
+    );
   };
   return bodies.findLast((item) => item.kind === "body" && isOn(item)) ?? bodies.findLast(isOn) ?? null;
 }

@@ -29,7 +29,10 @@ function schemas(value: Json | undefined): Schema[] {
 }
 
 function isNothing(schema: Schema): boolean {
-  return schema["type"] === "null" || (Array.isArray(schema["enum"]) && schema["enum"].length === 1 && schema["enum"][0] === null);
+  return (
+    schema["type"] === "null" ||
+    (Array.isArray(schema["enum"]) && schema["enum"].length === 1 && schema["enum"][0] === null)
+  );
 }
 
 export class World {
@@ -43,7 +46,10 @@ export class World {
   resolved(schema: Schema, depth = 0): Schema {
     const reference = schema["$ref"];
     if (typeof reference === "string" && depth < 20) {
-      const path = reference.replace(/^#\//, "").split("/").map((part) => part.replaceAll("~1", "/").replaceAll("~0", "~"));
+      const path = reference
+        .replace(/^#\//, "")
+        .split("/")
+        .map((part) => part.replaceAll("~1", "/").replaceAll("~0", "~"));
       const target = valueAt(this.root, path);
       const { $ref: _, ...own } = schema;
       return this.resolved({ ...(isTable(target) ? target : {}), ...own }, depth + 1);
@@ -70,7 +76,9 @@ export class World {
   at(path: Path): Schema | null {
     let here: Schema[] = [this.resolved(this.root)];
     for (const part of path) {
-      here = here.flatMap((schema) => this.#alternatives(schema)).flatMap((schema) => this.#below(schema, String(part)));
+      here = here
+        .flatMap((schema) => this.#alternatives(schema))
+        .flatMap((schema) => this.#below(schema, String(part)));
       if (here.length === 0) return null;
     }
     return here[0] ?? null;
@@ -85,13 +93,17 @@ export class World {
     const properties = schema["properties"];
     if (isTable(properties) && isTable(properties[part])) return [this.resolved(properties[part])];
     if (schema["type"] === "array" || "items" in schema || "prefixItems" in schema) {
-      const item = isTable(schema["items"]) ? schema["items"] : (schemas(schema["prefixItems"])[Number(part)] ?? schemas(schema["prefixItems"])[0] ?? ANYTHING);
+      const item = isTable(schema["items"])
+        ? schema["items"]
+        : (schemas(schema["prefixItems"])[Number(part)] ?? schemas(schema["prefixItems"])[0] ?? ANYTHING);
       // A section's keys are also known without its number.
       const own = this.resolved(item);
       return /^\d+$/.test(part) ? [own] : this.#alternatives(own).flatMap((one) => this.#below(one, part));
     }
     if (isTable(schema["additionalProperties"])) return [this.resolved(schema["additionalProperties"])];
-    for (const [pattern, of] of Object.entries(isTable(schema["patternProperties"]) ? schema["patternProperties"] : {})) {
+    for (const [pattern, of] of Object.entries(
+      isTable(schema["patternProperties"]) ? schema["patternProperties"] : {},
+    )) {
       if (isTable(of) && new RegExp(pattern).test(part)) return [this.resolved(of)];
     }
     return [];
@@ -99,7 +111,9 @@ export class World {
 
   /** Keys that a table may have, over all its alternatives, in the schema's order. */
   keysOf(schema: Schema): string[] {
-    const all = this.#alternatives(schema).flatMap((one) => Object.keys(isTable(one["properties"]) ? one["properties"] : {}));
+    const all = this.#alternatives(schema).flatMap((one) =>
+      Object.keys(isTable(one["properties"]) ? one["properties"] : {}),
+    );
     return [...new Set(all)];
   }
 
@@ -129,7 +143,11 @@ export class World {
     for (const one of this.#alternatives(schema)) {
       if (one["type"] !== "array" || !isTable(one["items"])) continue;
       const item = this.resolved(one["items"]);
-      if (this.keysOf(item).length > 0 && (schema !== one || schema["x-sections"] === true || item["type"] === "object")) return item;
+      if (
+        this.keysOf(item).length > 0 &&
+        (schema !== one || schema["x-sections"] === true || item["type"] === "object")
+      )
+        return item;
     }
     return null;
   }
@@ -149,12 +167,15 @@ export class World {
   #plain(schema: Schema): Shape {
     const type = schema["type"];
     if (type === "boolean") return { kind: "switch" };
-    if (type === "number" || type === "integer") return { kind: "number", isWhole: type === "integer", ...limitsOf(schema) };
+    if (type === "number" || type === "integer")
+      return { kind: "number", isWhole: type === "integer", ...limitsOf(schema) };
     if (type === "string") return { kind: "text", names: namesOf(schema) };
-    if (type === "array" || "items" in schema) return { kind: "list", of: isTable(schema["items"]) ? this.resolved(schema["items"]) : ANYTHING };
+    if (type === "array" || "items" in schema)
+      return { kind: "list", of: isTable(schema["items"]) ? this.resolved(schema["items"]) : ANYTHING };
     const keys = this.keysOf(schema);
     if (keys.length > 0) return { kind: "table", keys };
-    if (isTable(schema["additionalProperties"])) return { kind: "named", of: this.resolved(schema["additionalProperties"]) };
+    if (isTable(schema["additionalProperties"]))
+      return { kind: "named", of: this.resolved(schema["additionalProperties"]) };
     return type === "object" ? { kind: "named", of: ANYTHING } : { kind: "any" };
   }
 }
@@ -173,7 +194,9 @@ function choicesOf(schema: Schema): Choice[] | null {
   const found = all.flatMap((one) => {
     const words = typeof one["description"] === "string" ? one["description"] : "";
     const values = "const" in one ? [one["const"]] : Array.isArray(one["enum"]) ? one["enum"] : [];
-    return values.length > 0 && values.every((value) => typeof value === "string") ? values.map((value) => ({ value: value as string, words })) : [null];
+    return values.length > 0 && values.every((value) => typeof value === "string")
+      ? values.map((value) => ({ value: value as string, words }))
+      : [null];
   });
   return found.length > 0 && found.every((one) => one !== null) ? found : null;
 }
@@ -195,7 +218,9 @@ function limitsOf(schema: Schema): { least: number | null; most: number | null }
 function namesOf(schema: Schema): string[] {
   const table = schema["x-names"];
   if (typeof table !== "string") return [];
-  const builtIn = Array.isArray(schema["examples"]) ? schema["examples"].filter((one): one is string => typeof one === "string") : [];
+  const builtIn = Array.isArray(schema["examples"])
+    ? schema["examples"].filter((one): one is string => typeof one === "string")
+    : [];
   return [...builtIn, `#${table}`];
 }
 
@@ -212,7 +237,15 @@ export function defaultOf(schema: Schema | null): string {
 }
 
 const UNITS: [RegExp, string][] = [
-  [/_m_s$/, "m/s"], [/_deg_s$/, "°/s"], [/_bit_s$/, "bit/s"], [/_per_s$/, "1/s"], [/_deg$/, "°"], [/_rad$/, "rad"], [/_gib$/, "GiB"], [/_m$/, "m"], [/_s$/, "s"],
+  [/_m_s$/, "m/s"],
+  [/_deg_s$/, "°/s"],
+  [/_bit_s$/, "bit/s"],
+  [/_per_s$/, "1/s"],
+  [/_deg$/, "°"],
+  [/_rad$/, "rad"],
+  [/_gib$/, "GiB"],
+  [/_m$/, "m"],
+  [/_s$/, "s"],
 ];
 
 /** The unit that a schema or a key's name tells. */

@@ -12,14 +12,20 @@ export function readNumber(text: string, isWhole: boolean): Read {
   const trimmed = text.trim().replace(",", ".");
   if (trimmed === "") return { value: undefined };
   const value = Number(trimmed);
-  if (!Number.isFinite(value)) return { wrong: /^[+-]?(inf|nan)$/.test(trimmed) ? `${trimmed} can be written in the text only` : "write a number" };
+  if (!Number.isFinite(value))
+    return {
+      wrong: /^[+-]?(inf|nan)$/.test(trimmed) ? `${trimmed} can be written in the text only` : "write a number",
+    };
   if (isWhole && !Number.isInteger(value)) return { wrong: "write a whole number" };
   return { value };
 }
 
 /** Reads numbers between commas or blanks. */
 export function readNumbers(text: string): Read {
-  const parts = text.replace(/[[\]]/g, " ").split(/[\s,;]+/).filter((part) => part !== "");
+  const parts = text
+    .replace(/[[\]]/g, " ")
+    .split(/[\s,;]+/)
+    .filter((part) => part !== "");
   const values = parts.map(Number);
   if (values.some((value) => !Number.isFinite(value))) return { wrong: "write numbers with commas between them" };
   return { value: values.length === 0 ? undefined : values };
@@ -33,7 +39,9 @@ export function readAny(text: string): Read {
     const value = JSON.parse(trimmed) as Json;
     return value === null ? { wrong: "there is no null in a scenario" } : { value };
   } catch {
-    return /^[\w-]+$/.test(trimmed) ? { value: trimmed } : { wrong: 'write a number, a "text", a [list] or a {"key": value}' };
+    return /^[\w-]+$/.test(trimmed)
+      ? { value: trimmed }
+      : { wrong: 'write a number, a "text", a [list] or a {"key": value}' };
   }
 }
 
@@ -41,7 +49,8 @@ export function readAny(text: string): Read {
 export function shownValue(value: Json | undefined, shape: Shape): string {
   if (value === undefined || value === null) return "";
   if (typeof value === "string" && shape.kind !== "any") return value;
-  if (Array.isArray(value) && shape.kind === "list" && value.every((one) => typeof one === "number")) return value.join(", ");
+  if (Array.isArray(value) && shape.kind === "list" && value.every((one) => typeof one === "number"))
+    return value.join(", ");
   return typeof value === "string" && /^[\w-]+$/.test(value) ? value : JSON.stringify(value);
 }
 
@@ -61,9 +70,21 @@ export interface Row {
 
 /** A table of rows of numbers, by name or by number; null for anything else. */
 export function rowsOf(value: Json | undefined, path: Path): Row[] | null {
-  const entries: [string | number, Json][] = Array.isArray(value) ? value.map((one, i) => [i, one]) : isTable(value) ? Object.entries(value) : [];
-  const rows = entries.map(([key, row]) => ({ name: typeof key === "number" ? String(key + 1) : key, path: [...path, key], values: row }));
-  const isRight = rows.length > 0 && rows.every(({ values }) => Array.isArray(values) && values.length > 1 && values.every((one) => typeof one === "number"));
+  const entries: [string | number, Json][] = Array.isArray(value)
+    ? value.map((one, i) => [i, one])
+    : isTable(value)
+      ? Object.entries(value)
+      : [];
+  const rows = entries.map(([key, row]) => ({
+    name: typeof key === "number" ? String(key + 1) : key,
+    path: [...path, key],
+    values: row,
+  }));
+  const isRight =
+    rows.length > 0 &&
+    rows.every(
+      ({ values }) => Array.isArray(values) && values.length > 1 && values.every((one) => typeof one === "number"),
+    );
   return isRight ? (rows as unknown as Row[]) : null;
 }
 
@@ -111,7 +132,12 @@ export function columnsOf(model: Table | null, path: Path, count: number): strin
   if (usual) return usual;
   const section = valueAt(model ?? {}, path.slice(0, path.indexOf("sensors") === 0 ? 2 : -1));
   const key = String(path.at(-1));
-  const word = key === "distance_confusion" ? "distance_classes" : path.some((part) => String(part).startsWith("confusion")) ? "observations" : "";
+  const word =
+    key === "distance_confusion"
+      ? "distance_classes"
+      : path.some((part) => String(part).startsWith("confusion"))
+        ? "observations"
+        : "";
   const names = word === "" ? undefined : valueAt(section, [word]);
   if (Array.isArray(names) && names.length === count) return names.map(String);
   return Array.from({ length: count }, (_, i) => String(i + 1));
@@ -135,7 +161,8 @@ export function entriesOf(model: Table, world: World): Entry[] {
   for (const [key, value] of Object.entries(model)) {
     const schema = world.at([key]);
     const shape = schema ? world.shapeOf(schema, value) : null;
-    if (Array.isArray(value) && value.some(isTable)) value.forEach((one, i) => entries.push({ path: [key, i], words: named(key, i, one) }));
+    if (Array.isArray(value) && value.some(isTable))
+      value.forEach((one, i) => entries.push({ path: [key, i], words: named(key, i, one) }));
     else if (isTable(value) && shape?.kind === "named" && Object.values(value).every(isTable)) {
       for (const name of Object.keys(value)) entries.push({ path: [key, name], words: `${key}: ${name}` });
     } else if (isTable(value)) entries.push({ path: [key], words: key });

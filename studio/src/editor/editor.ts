@@ -1,6 +1,11 @@
 /** The text of a scenario in CodeMirror, in a shadow root, because there its styles need no inline element. */
 
-import { autocompletion, completionKeymap, type CompletionContext, type CompletionResult } from "@codemirror/autocomplete";
+import {
+  autocompletion,
+  completionKeymap,
+  type CompletionContext,
+  type CompletionResult,
+} from "@codemirror/autocomplete";
 import { defaultKeymap, indentWithTab } from "@codemirror/commands";
 import { HighlightStyle, StreamLanguage, syntaxHighlighting } from "@codemirror/language";
 import { toml } from "@codemirror/legacy-modes/mode/toml";
@@ -26,7 +31,12 @@ const COLORS = EditorView.theme({
   ".cm-tooltip": { color: "var(--ink)", backgroundColor: "var(--panel)", border: "1px solid var(--strong-line)" },
   ".cm-tooltip-autocomplete > ul": { fontFamily: "var(--mono)", maxHeight: "14em" },
   ".cm-tooltip-autocomplete > ul > li[aria-selected]": { color: "var(--ink)", backgroundColor: "var(--chosen)" },
-  ".cm-completionInfo": { maxWidth: "44ch", padding: "4px 8px", fontFamily: "system-ui, sans-serif", whiteSpace: "pre-line" },
+  ".cm-completionInfo": {
+    maxWidth: "44ch",
+    padding: "4px 8px",
+    fontFamily: "system-ui, sans-serif",
+    whiteSpace: "pre-line",
+  },
   ".cm-diagnostic": { whiteSpace: "pre-line", maxWidth: "60ch" },
 });
 
@@ -56,7 +66,9 @@ function completions(hooks: EditorHooks): (context: CompletionContext) => Comple
     const found = known && completionAt(context.state.doc.toString(), context.pos, known.world, known.model);
     if (!found || (found.from === context.pos && !context.explicit)) return null;
     const options = found.options.map(({ label, words, kind }) => ({
-      label, info: words || undefined, type: kind === "key" ? "property" : kind === "section" ? "namespace" : "constant",
+      label,
+      info: words || undefined,
+      type: kind === "key" ? "property" : kind === "section" ? "namespace" : "constant",
       apply: kind === "key" ? `${label} = ` : label,
     }));
     return { from: found.from, options, validFor: /^"?[\w.-]*$/ };

@@ -46,6 +46,10 @@ export function fleetWords(fleet: Fleet): string {
   const count = (health: Health): number => fleet.nodes.filter((node) => healthOf(node) === health).length;
   const [away, late] = [count("away"), count("late")];
   const all = `${fleet.nodes.length} ${fleet.nodes.length === 1 ? "node" : "nodes"}`;
-  const parts = [all, ...(late > 0 ? [`${late} late`] : []), ...(away > 0 ? [`${away} ${fleet.has_begun ? "lost" : "awaited"}`] : [])];
+  const parts = [
+    all,
+    ...(late > 0 ? [`${late} late`] : []),
+    ...(away > 0 ? [`${away} ${fleet.has_begun ? "lost" : "awaited"}`] : []),
+  ];
   return parts.join(", ");
 }

@@ -83,10 +83,7 @@ export class PlaneEye implements Eye {
 
   /** The place at a point of the canvas. */
   at(x_px: number, y_px: number): [number, number] {
-    return [
-      this.x + (x_px - this.#width / 2) * this.mPerPx,
-      this.y - (y_px - this.#height / 2) * this.mPerPx,
-    ];
+    return [this.x + (x_px - this.#width / 2) * this.mPerPx, this.y - (y_px - this.#height / 2) * this.mPerPx];
   }
 
   get middle(): Place {
@@ -178,7 +175,9 @@ export class SpaceEye implements Eye {
 
   under(x_px: number, y_px: number, as: Place): Place {
     const from = this.camera.position;
-    const way = new Vector3((2 * x_px) / this.#width - 1, 1 - (2 * y_px) / this.#height, 0.5).unproject(this.camera).sub(from);
+    const way = new Vector3((2 * x_px) / this.#width - 1, 1 - (2 * y_px) / this.#height, 0.5)
+      .unproject(this.camera)
+      .sub(from);
     const ahead = this.camera.getWorldDirection(new Vector3());
     const far = ahead.dot(new Vector3(...as).sub(from)) / ahead.dot(way);
     return way.multiplyScalar(far).add(from).toArray();

@@ -52,7 +52,12 @@ function holdFloor({ floor }: Scene, hold: (x: number, y: number, z: number, r: 
   if (!floor) return;
   const [w, h] = [floor.width * floor.box_m, floor.height * floor.box_m];
   const [c, s] = [Math.cos(floor.yaw_rad), Math.sin(floor.yaw_rad)];
-  for (const [x, y] of [[0, 0], [w, 0], [0, h], [w, h]] as const) {
+  for (const [x, y] of [
+    [0, 0],
+    [w, 0],
+    [0, h],
+    [w, h],
+  ] as const) {
     hold(floor.origin_m[0] + c * x - s * y, floor.origin_m[1] + s * x + c * y, 0, 0);
   }
 }

@@ -97,7 +97,13 @@ export class Glyphs {
   #tint!: Uint32Array;
 
   constructor(order: number) {
-    const look = material({ vertex: VERTEX, fragment: FRAGMENT, uniforms: this.#uniforms, depth: false, transparent: true });
+    const look = material({
+      vertex: VERTEX,
+      fragment: FRAGMENT,
+      uniforms: this.#uniforms,
+      depth: false,
+      transparent: true,
+    });
     const columns = { pose: { size: 3 }, form: { size: 4 }, tint: { size: 4, bytes: true } } as const;
     this.quads = new Quads(columns, look);
     this.quads.mesh.renderOrder = order;
@@ -118,7 +124,16 @@ export class Glyphs {
     this.#tint = this.quads.words("tint");
   }
 
-  add(x: number, y: number, heading: number, halfLength: number, halfWidth: number, kind: number, leastPx: number, tint: number): void {
+  add(
+    x: number,
+    y: number,
+    heading: number,
+    halfLength: number,
+    halfWidth: number,
+    kind: number,
+    leastPx: number,
+    tint: number,
+  ): void {
     const i = this.#count++;
     const p = 3 * i;
     this.#pose[p] = x;

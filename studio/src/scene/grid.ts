@@ -20,7 +20,11 @@ export function multiples(lo: number, hi: number, step: number): number[] {
 }
 
 /** The part of the plane that is seen, with the step of its grid. */
-export function planeGrid(eye: PlaneEye, width_px: number, height_px: number): { xs: number[]; ys: number[]; step: number } {
+export function planeGrid(
+  eye: PlaneEye,
+  width_px: number,
+  height_px: number,
+): { xs: number[]; ys: number[]; step: number } {
   const step = roundUp(90 * eye.mPerPx);
   const [x0, y1] = eye.at(0, 0);
   const [x1, y0] = eye.at(width_px, height_px);
@@ -36,7 +40,13 @@ export function spaceGrid({ lo, hi }: Extent): { xs: number[]; ys: number[]; ste
 }
 
 /** Draws the grid of the visible part. */
-export function drawGrid(strokes: Strokes, eye: Eye, extent: Extent, size_px: [number, number], palette: Palette): void {
+export function drawGrid(
+  strokes: Strokes,
+  eye: Eye,
+  extent: Extent,
+  size_px: [number, number],
+  palette: Palette,
+): void {
   const tint = word(palette.faint, palette.isDark ? 0.22 : 0.25);
   strokes.begin();
   if (eye instanceof PlaneEye) {

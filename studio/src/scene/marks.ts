@@ -89,7 +89,13 @@ export function drawScans(scans: readonly Scan[], strokes: Strokes, palette: Pal
       const is_m = scan.true_m[i];
       if (is_m !== undefined) {
         roles.add("true");
-        strokes.piece(scan.at_m, beamEnd(scan, bearing, is_m ?? scan.range_m), 1.5, 0, word(truth, is_m === null ? 0.3 : 0.8));
+        strokes.piece(
+          scan.at_m,
+          beamEnd(scan, bearing, is_m ?? scan.range_m),
+          1.5,
+          0,
+          word(truth, is_m === null ? 0.3 : 0.8),
+        );
       }
       const reported_m = scan.ranges_m[i];
       roles.add("reported");

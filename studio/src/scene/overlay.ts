@@ -39,7 +39,14 @@ export class Overlay {
 
   /** Draws the changes since the last time: a canvas that stays costs the browser nothing. */
   draw(eye: Eye, extent: Extent, labels: readonly Label[], palette: Palette): void {
-    const state = JSON.stringify([eye.project(0, 0, 0), eye.project(1, 2, 3), eye.mPerPx, extent, labels, palette.isDark]);
+    const state = JSON.stringify([
+      eye.project(0, 0, 0),
+      eye.project(1, 2, 3),
+      eye.mPerPx,
+      extent,
+      labels,
+      palette.isDark,
+    ]);
     if (state === this.#drawn) return;
     this.#drawn = state;
     const pen = this.#pen;
@@ -102,7 +109,10 @@ export class Overlay {
     const length_px = length_m / eye.mPerPx;
     const [x1, y] = [this.#width - 14, this.#height - 12];
     const x0 = x1 - length_px;
-    for (const [width, color] of [[4, css(palette.free, 0.9)], [1.5, css(palette.ink)]] as const) {
+    for (const [width, color] of [
+      [4, css(palette.free, 0.9)],
+      [1.5, css(palette.ink)],
+    ] as const) {
       pen.lineWidth = width;
       pen.strokeStyle = color;
       pen.beginPath();
@@ -121,7 +131,10 @@ export class Overlay {
     const pen = this.#pen;
     const radius = Math.max(11, radius_px + 4);
     if (ring) {
-      for (const [width, color] of [[5, css(palette.free, 0.85)], [2, css(palette.accent)]] as const) {
+      for (const [width, color] of [
+        [5, css(palette.free, 0.85)],
+        [2, css(palette.accent)],
+      ] as const) {
         pen.lineWidth = width;
         pen.strokeStyle = color;
         pen.setLineDash(ring === "hovered" ? [4, 3] : []);

@@ -61,7 +61,14 @@ export class PlanePainter implements Painter {
       if (body.shape.type === "line") {
         const points = body.shape.points_m;
         for (let i = 1; i < points.length; i++) {
-          this.#still.rod(points[i - 1]![0], points[i - 1]![1], points[i]![0], points[i]![1], body.shape.thickness_m, tint);
+          this.#still.rod(
+            points[i - 1]![0],
+            points[i - 1]![1],
+            points[i]![0],
+            points[i]![1],
+            body.shape.thickness_m,
+            tint,
+          );
         }
         continue;
       }
@@ -101,7 +108,16 @@ export class PlanePainter implements Painter {
       }
       const { half, kind } = this.#forms[cast.shape[i]!]!;
       const least = !cast.is_agent[i] ? 0 : kind === DART ? LEAST_DART_PX : LEAST_AGENT_PX;
-      glyphs.add(frame.places_m[2 * i]!, frame.places_m[2 * i + 1]!, frame.turns[i]!, half[0], half[1], kind, least, tint);
+      glyphs.add(
+        frame.places_m[2 * i]!,
+        frame.places_m[2 * i + 1]!,
+        frame.turns[i]!,
+        half[0],
+        half[1],
+        kind,
+        least,
+        tint,
+      );
     }
     glyphs.end();
   }

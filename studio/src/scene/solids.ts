@@ -91,9 +91,10 @@ export class Solids {
     const fragment = this.#isBall ? BALL_FRAGMENT(!transparent) : MESH_FRAGMENT;
     const look = material({ vertex, fragment, uniforms: this.#uniforms, depth: true, transparent });
     const tint = { size: 4, bytes: true } as const;
-    this.instances = kind === "ball"
-      ? new Quads({ ball: { size: 4 }, tint }, look)
-      : new Instances(unit(kind), { place: { size: 3 }, turn: { size: 4 }, size: { size: 3 }, tint }, look);
+    this.instances =
+      kind === "ball"
+        ? new Quads({ ball: { size: 4 }, tint }, look)
+        : new Instances(unit(kind), { place: { size: 3 }, turn: { size: 4 }, size: { size: 3 }, tint }, look);
     this.instances.mesh.renderOrder = transparent ? 5 : 1;
   }
 

@@ -44,7 +44,13 @@ const MOST_NAMES = 40;
 
 /** A renderer with no more than it needs: an opaque, flat canvas is cheap to put on the screen. */
 function rendererOf(canvas: HTMLCanvasElement, isSpace: boolean): WebGLRenderer {
-  const wanted = { alpha: false, antialias: isSpace, depth: isSpace, stencil: false, powerPreference: "high-performance" } as const;
+  const wanted = {
+    alpha: false,
+    antialias: isSpace,
+    depth: isSpace,
+    stencil: false,
+    powerPreference: "high-performance",
+  } as const;
   const context = canvas.getContext("webgl2", wanted) as WebGL2RenderingContext | null;
   if (!context) throw new Error("no WebGL 2");
   return new WebGLRenderer({ canvas, context, ...wanted });
@@ -58,7 +64,8 @@ function layersOf(scene: Scene): [Painter, FloorLayer | null] {
 
 /** Returns whether two scenes can be looked at from the same place. */
 function isAlike(a: Scene, b: Scene): boolean {
-  const measure = ({ world, floor }: Scene): string => JSON.stringify([world, floor?.width, floor?.height, floor?.box_m, floor?.origin_m]);
+  const measure = ({ world, floor }: Scene): string =>
+    JSON.stringify([world, floor?.width, floor?.height, floor?.box_m, floor?.origin_m]);
   return measure(a) === measure(b);
 }
 
@@ -306,7 +313,8 @@ export class Stage {
     for (const { from, to, isMutual } of links) {
       const [a, b] = [this.placeOf(from), this.placeOf(to)];
       const color = visible(ROLES[isMutual ? "done" : "refused"].color, this.#palette);
-      if (a && b) this.#marks.piece(a, b, selected ? 2 : 1, 0, word(color, isMutual && !selected ? 0.55 : 0.9), !isMutual);
+      if (a && b)
+        this.#marks.piece(a, b, selected ? 2 : 1, 0, word(color, isMutual && !selected ? 0.55 : 0.9), !isMutual);
     }
   }
 

@@ -67,7 +67,13 @@ export class Strokes {
   #count = 0;
 
   constructor(order: number) {
-    const look = material({ vertex: VERTEX, fragment: FRAGMENT, uniforms: this.#uniforms, depth: false, transparent: true });
+    const look = material({
+      vertex: VERTEX,
+      fragment: FRAGMENT,
+      uniforms: this.#uniforms,
+      depth: false,
+      transparent: true,
+    });
     const columns = { from: { size: 3 }, to: { size: 3 }, form: { size: 4 }, tint: { size: 4, bytes: true } } as const;
     this.quads = new Quads(columns, look);
     this.quads.mesh.renderOrder = order;
@@ -83,7 +89,15 @@ export class Strokes {
   }
 
   /** One straight piece; `before_m` carries dashes on from the piece before. */
-  piece(a: ArrayLike<number>, b: ArrayLike<number>, width_px: number, width_m: number, tint: number, dashed = false, before_m = 0): void {
+  piece(
+    a: ArrayLike<number>,
+    b: ArrayLike<number>,
+    width_px: number,
+    width_m: number,
+    tint: number,
+    dashed = false,
+    before_m = 0,
+  ): void {
     const i = this.#count++;
     this.quads.reserve(this.#count);
     const from = this.quads.floats("from");

@@ -35,7 +35,11 @@ export class Comparison {
       this.words = `Comparing ${a.scene.name} and ${b.scene.name} at cycle ${cycle}…`;
       const [one, other] = await Promise.all([a.digestAt(cycle), b.digestAt(cycle)]);
       if (!one || !other) throw new GivenUp();
-      for (const [session, { digest }] of [[a, one], [b, other]] as const) if (digest === null) throw noDigest(session);
+      for (const [session, { digest }] of [
+        [a, one],
+        [b, other],
+      ] as const)
+        if (digest === null) throw noDigest(session);
       return one.digest !== other.digest || one.cycle !== other.cycle;
     };
     try {
@@ -60,10 +64,14 @@ export class Comparison {
     const [one, other] = await Promise.all([a.frameAt(a.status.cycle), b.frameAt(b.status.cycle)]);
     const where = cycle === 0 ? "They differ from the start" : `They differ from cycle ${cycle} on`;
     if (!one || !other || !a.bodies || !b.bodies) return `${where}.`;
-    const found = differing({ bodies: a.bodies, frame: one }, { bodies: b.bodies, frame: other }, (m) => withUnit(m, "m"));
+    const found = differing({ bodies: a.bodies, frame: one }, { bodies: b.bodies, frame: other }, (m) =>
+      withUnit(m, "m"),
+    );
     if (found.length === 0) return `${where}: in what is not seen, such as memory or counters.`;
     select(found, a, b);
-    const named = found.slice(0, MOST_NAMED).map(({ who, words }) => `${(a.bodies!.find(who) === undefined ? b : a).bodies!.nameOf(who)} ${words}`);
+    const named = found
+      .slice(0, MOST_NAMED)
+      .map(({ who, words }) => `${(a.bodies!.find(who) === undefined ? b : a).bodies!.nameOf(who)} ${words}`);
     const more = found.length > MOST_NAMED ? `, and ${found.length - MOST_NAMED} more` : "";
     return `${where}: ${named.join(", ")}${more}.`;
   }

@@ -8,7 +8,10 @@ import type { Bodies } from "./cast";
  * Returns the first cycle in which two runs differ, if those that have parted stay apart; `null` where the last cycle is
  * the same. Goes ahead in steps that double before it halves them, so that little is computed beyond the cycle.
  */
-export async function firstDifference(last: number, differs: (cycle: number) => Promise<boolean>): Promise<number | null> {
+export async function firstDifference(
+  last: number,
+  differs: (cycle: number) => Promise<boolean>,
+): Promise<number | null> {
   if (await differs(0)) return 0;
   let same = 0;
   let other = Math.min(1, last);

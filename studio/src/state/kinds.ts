@@ -4,7 +4,9 @@ const LIGHT = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"]
 const DARK = ["#56b4e9", "#f0803c", "#2fc79b", "#e39cc4", "#f0b849", "#8fd0f7"];
 /** Levels stand in where a world tells no kind. */
 const LEVELS: Record<string, readonly [string, string]> = {
-  info: ["#0072b2", "#56b4e9"], warning: ["#d55e00", "#f0803c"], error: ["#d01010", "#ff6b60"],
+  info: ["#0072b2", "#56b4e9"],
+  warning: ["#d55e00", "#f0803c"],
+  error: ["#d01010", "#ff6b60"],
 };
 /** Kinds that should not occur have the color of alarm. */
 const ALARMS = /contact|collision|loss|separation|fail|veto|violat/;

@@ -47,7 +47,10 @@ class Page {
 
   constructor() {
     matchMedia(NARROW).addEventListener("change", (event) => (this.isNarrow = event.matches));
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", (event) => (this.#systemIsDark = event.matches));
+    matchMedia("(prefers-color-scheme: dark)").addEventListener(
+      "change",
+      (event) => (this.#systemIsDark = event.matches),
+    );
   }
 
   get isDark(): boolean {

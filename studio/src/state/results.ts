@@ -16,7 +16,8 @@ export function reportAddress(path: string, part?: string): string {
 /** The reason why there is no result, as the server has said it: place, cause, and help on a line of its own. */
 export function failureOf(path: string, said: string): Problem {
   const [, place, cause, help] = /^(.*?): ([^]*?)(?:\nhelp: ([^]*))?$/.exec(said.trim()) ?? [];
-  if (cause === undefined || help === undefined) return problemOf(path, said.trim() || "the server gives no report", "try it again");
+  if (cause === undefined || help === undefined)
+    return problemOf(path, said.trim() || "the server gives no report", "try it again");
   return problemOf(place || path, cause, help);
 }
 

@@ -19,7 +19,7 @@ export class Rewind {
     const round = ++this.#round;
     const started_ms = performance.now();
     this.isOn = true;
-    for (let cycle = from; cycle > 0; ) {
+    for (let cycle = from; cycle > 0;) {
       const due = Math.max(0, Math.floor(from - ((performance.now() - started_ms) / 1000) * cycles_per_s));
       if (due < cycle) {
         if (!(await goTo(due))) break;

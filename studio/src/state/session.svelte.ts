@@ -243,7 +243,11 @@ export class Session {
     }
     this.frame = frame;
     this.isSought = this.#seeker.arrived();
-    this.shown = { cycle: frame.cycle, time_s: frame.time_s, leftOut: this.#missed.count(frame.leftOut, this.#isWatched) };
+    this.shown = {
+      cycle: frame.cycle,
+      time_s: frame.time_s,
+      leftOut: this.#missed.count(frame.leftOut, this.#isWatched),
+    };
     if (frame.text.events.length > 0) this.events.add(frame.text.events);
     for (const tell of this.#onFrame) tell();
     this.#waiting.changed();

@@ -229,7 +229,8 @@ export class Studio {
 
   async #look(session: Session, generation: number): Promise<void> {
     // A new connection opens all sessions again by itself.
-    const isWanted = (): boolean => generation === this.#generation && this.sessions.includes(session) && session.ended !== null;
+    const isWanted = (): boolean =>
+      generation === this.#generation && this.sessions.includes(session) && session.ended !== null;
     if (!isWanted()) return;
     if (await this.#openAt(session, null, true)) this.#deliver(session);
     else if (isWanted()) this.#findAgain(session);
@@ -287,7 +288,10 @@ export class Studio {
     for (const session of this.sessions) session.cutOff();
     const wait = wait_ms < 1000 ? "at once" : `in ${Math.round(wait_ms / 1000)} s`;
     const say = (standing: Standing): void => {
-      this.banner = { words: `${STANDING_WORDS[standing]} Attempt ${attempt} to connect again comes ${wait}.`, isBad: true };
+      this.banner = {
+        words: `${STANDING_WORDS[standing]} Attempt ${attempt} to connect again comes ${wait}.`,
+        isBad: true,
+      };
     };
     // The last known standing stays until the server has given the new one.
     say(this.#standing);
@@ -309,7 +313,10 @@ export class Studio {
       const isOpen = await this.#openAt(session, session.seed);
       if (generation !== this.#generation) return;
       if (!isOpen) {
-        this.#ended(session, problemOf(session.scene.name, "it could not be opened again", "open it anew, or close it"));
+        this.#ended(
+          session,
+          problemOf(session.scene.name, "it could not be opened again", "open it anew, or close it"),
+        );
         missing++;
         continue;
       }

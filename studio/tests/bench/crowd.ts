@@ -17,11 +17,14 @@ export async function openCrowd(page: Page, isReal: boolean): Promise<void> {
   await text.click();
   await page.keyboard.press("Control+A");
   // Pasted, as a person would: typed lines get styles of the browser's own, which the page's policy forbids.
-  await text.evaluate((editor, crowd) => {
-    const clipboardData = new DataTransfer();
-    clipboardData.setData("text/plain", crowd);
-    editor.dispatchEvent(new ClipboardEvent("paste", { clipboardData, bubbles: true, cancelable: true }));
-  }, readFileSync(new URL("crowd.toml", import.meta.url), "utf8"));
+  await text.evaluate(
+    (editor, crowd) => {
+      const clipboardData = new DataTransfer();
+      clipboardData.setData("text/plain", crowd);
+      editor.dispatchEvent(new ClipboardEvent("paste", { clipboardData, bubbles: true, cancelable: true }));
+    },
+    readFileSync(new URL("crowd.toml", import.meta.url), "utf8"),
+  );
   await page.getByTestId("check").filter({ hasText: "no problems" }).waitFor();
   await page.getByRole("button", { name: "Run", exact: true }).click();
   await page.locator("canvas.picture").waitFor();

@@ -40,7 +40,9 @@ describe.skipIf(BINARY === "")("the real program", () => {
       for (let i = 0; i < TIMES; i++) all.push(await once(`${SCENARIOS}/${name}`));
       const middle = (of: 0 | 1): number => all.map((times) => times[of]).sort((a, b) => a - b)[Math.floor(TIMES / 2)]!;
       // A time is measured here, not required: it is that of the machine, too.
-      console.log(`${name}: listening after ${middle(0).toFixed(2)} s, first picture after ${middle(1).toFixed(2)} s (median of ${TIMES}; bar ${BAR_S} s)`);
+      console.log(
+        `${name}: listening after ${middle(0).toFixed(2)} s, first picture after ${middle(1).toFixed(2)} s (median of ${TIMES}; bar ${BAR_S} s)`,
+      );
     });
   }
 });

@@ -30,10 +30,17 @@ async function findings(page: Page): Promise<string[]> {
     const { axe } = window as unknown as { axe: { run(): Promise<{ violations: Finding[] }> } };
     return (await axe.run()).violations;
   });
-  return found.map(({ id, nodes }) => `${id}: ${nodes.map((n) => `${n.target.join(" ")} ${n.failureSummary}`).join("; ")}`);
+  return found.map(
+    ({ id, nodes }) => `${id}: ${nodes.map((n) => `${n.target.join(" ")} ${n.failureSummary}`).join("; ")}`,
+  );
 }
 
-for (const [width, isDark] of [[1280, false], [1280, true], [400, false], [400, true]] as const) {
+for (const [width, isDark] of [
+  [1280, false],
+  [1280, true],
+  [400, false],
+  [400, true],
+] as const) {
   test(`at ${width} pixels, ${isDark ? "dark" : "light"}`, async () => {
     const { page } = await openPage(browser, server.url, { width, isDark });
     await page.getByText("Nothing is open.").waitFor();
@@ -49,7 +56,10 @@ for (const [width, isDark] of [[1280, false], [1280, true], [400, false], [400, 
     await page.locator("details").first().waitFor();
     expect(await findings(page)).toEqual([]);
     if (width === 400) await page.getByRole("tab", { name: "events" }).click();
-    await page.getByRole("button", { name: /^contact/ }).first().waitFor();
+    await page
+      .getByRole("button", { name: /^contact/ })
+      .first()
+      .waitFor();
     expect(await findings(page)).toEqual([]);
     await page.getByRole("tab", { name: "Text" }).click();
     await page.getByTestId("check").filter({ hasText: "no problems" }).waitFor();

@@ -65,11 +65,22 @@ describe("the canvas", () => {
     await draws("robots");
     await hand.tool("Brush");
     await hand.drag([1.25, 0.75], [3.25, 0.75]);
-    expect(await edited(1)).toEqual({ op: "paint", key: "map.ascii", cells: [2, 3, 4, 5, 6].map((column) => [4, column, "#"]) });
+    expect(await edited(1)).toEqual({
+      op: "paint",
+      key: "map.ascii",
+      cells: [2, 3, 4, 5, 6].map((column) => [4, column, "#"]),
+    });
     await expect.poll(() => server.calls.filter((call) => call.do === "restart").length, { timeout: 30_000 }).toBe(1);
     await hand.tool("Line");
     await hand.drag([3.75, 2.25], [4.25, 1.25]);
-    expect(await edited(2)).toMatchObject({ op: "paint", cells: [[1, 7, "#"], [2, 8, "#"], [3, 8, "#"]] });
+    expect(await edited(2)).toMatchObject({
+      op: "paint",
+      cells: [
+        [1, 7, "#"],
+        [2, 8, "#"],
+        [3, 8, "#"],
+      ],
+    });
     await hand.tool("Eraser");
     await hand.click(2.75, 1.25);
     expect(await edited(3)).toEqual({ op: "paint", key: "map.ascii", cells: [[3, 5, "."]] });
@@ -106,8 +117,20 @@ describe("the canvas", () => {
     await hand.drag([4.75, 0.75], [4.75, 1.25]);
     await expect.poll(() => edits().length).toBe(6);
     expect(edits().slice(4)).toEqual([
-      { op: "paint", key: "map.ascii", cells: [[4, 9, "."], [3, 9, "."]] },
-      { op: "insert", key: "doors", at: null, value: { at: [[9, 1]], size: [1, 2], periodic: { open: 60, closed: 20 } } },
+      {
+        op: "paint",
+        key: "map.ascii",
+        cells: [
+          [4, 9, "."],
+          [3, 9, "."],
+        ],
+      },
+      {
+        op: "insert",
+        key: "doors",
+        at: null,
+        value: { at: [[9, 1]], size: [1, 2], periodic: { open: 60, closed: 20 } },
+      },
     ]);
     await hand.tool("Way-point");
     await hand.click(2.25, 2.25);
@@ -289,7 +312,9 @@ describe("forms", () => {
     expect(edits()).toEqual([{ op: "set", key: "sensors.echo.confusion.wall.1", value: 0.6 }]);
     expect(await cell.getAttribute("aria-invalid")).toBe("true");
     await page.getByRole("cell", { name: /the row sums to 0.8/ }).waitFor();
-    const hidden_px = await page.getByRole("list", { name: "Problems" }).evaluate((list) => list.scrollHeight - list.clientHeight);
+    const hidden_px = await page
+      .getByRole("list", { name: "Problems" })
+      .evaluate((list) => list.scrollHeight - list.clientHeight);
     expect(hidden_px, "a problem is not cut").toBe(0);
     await page.getByRole("button", { name: "Scale the row wall to 1" }).click();
     expect(await edited(2)).toEqual({ op: "set", key: "sensors.echo.confusion.wall", value: [0.125, 0.75, 0.125] });
@@ -303,7 +328,8 @@ describe("forms", () => {
     await page.getByText("box_size_m (m)", { exact: true }).waitFor();
     await page.getByRole("tab", { name: "View" }).click();
     await page.getByRole("button", { name: "Edit", exact: true }).click();
-    const mPerPx = (): Promise<number> => page.locator("canvas.layer").evaluate((canvas: HTMLElement) => Number(canvas.dataset.eye?.split(" ")[2] ?? 0));
+    const mPerPx = (): Promise<number> =>
+      page.locator("canvas.layer").evaluate((canvas: HTMLElement) => Number(canvas.dataset.eye?.split(" ")[2] ?? 0));
     await expect.poll(mPerPx, { timeout: WAIT_MS }).toBeGreaterThan(0);
     const wide = await mPerPx();
     await page.setViewportSize({ width: 400, height: 800 });
@@ -369,7 +395,9 @@ describe("saving", () => {
     await dialog.getByRole("button", { name: "more/" }).click();
     await dialog.getByLabel("Name").fill("mine");
     await dialog.getByRole("button", { name: "Save", exact: true }).click();
-    await expect.poll(() => server.calls.findLast((call) => call.do === "save")).toMatchObject({ to: "more/mine.toml", over: false });
+    await expect
+      .poll(() => server.calls.findLast((call) => call.do === "save"))
+      .toMatchObject({ to: "more/mine.toml", over: false });
     await dialog.waitFor({ state: "detached" });
     await hand.click(2.25, 2.25);
     await edited(2);
@@ -378,11 +406,15 @@ describe("saving", () => {
     expect(server.calls.findLast((call) => call.do === "save")).toMatchObject({ to: "more/mine.toml", over: false });
     await hand.click(1.25, 2.25);
     await edited(3);
-    const asked = new Promise<string>((told) => page.once("dialog", (one) => void one.dismiss().then(() => told(one.type()))));
+    const asked = new Promise<string>((told) =>
+      page.once("dialog", (one) => void one.dismiss().then(() => told(one.type()))),
+    );
     await page.getByRole("button", { name: "Close Made-up hall" }).click();
     expect(await asked).toBe("confirm");
     expect(await page.locator("canvas.layer").count()).toBe(1);
-    const left = new Promise<string>((told) => page.once("dialog", (one) => void one.dismiss().then(() => told(one.type()))));
+    const left = new Promise<string>((told) =>
+      page.once("dialog", (one) => void one.dismiss().then(() => told(one.type()))),
+    );
     await page.close({ runBeforeUnload: true });
     expect(await left).toBe("beforeunload");
   });

@@ -36,10 +36,13 @@ async function visit(look: Look = {}): Promise<void> {
 test("a fleet is shown as it flies, and nothing steers it", async () => {
   await visit();
   await page.getByText("Watching a fleet at tcp/127.0.0.1:7600").waitFor();
-  await page.waitForFunction(() => Number(document.querySelector("[data-testid=cycle]")?.textContent?.replace(/\D/g, "")) >= 1);
+  await page.waitForFunction(
+    () => Number(document.querySelector("[data-testid=cycle]")?.textContent?.replace(/\D/g, "")) >= 1,
+  );
   expect(await page.getByTestId("state").textContent()).toBe("flying");
   expect(await page.getByTestId("fleet").textContent()).toBe("8 nodes, 1 late, 1 lost");
-  for (const name of ["Play", "Restart", "Edit", "Forms", "Export…"]) expect(await page.getByRole("button", { name, exact: true }).count()).toBe(0);
+  for (const name of ["Play", "Restart", "Edit", "Forms", "Export…"])
+    expect(await page.getByRole("button", { name, exact: true }).count()).toBe(0);
   for (const key of [" ", "ArrowRight", "ArrowLeft", "b", "j", "e"]) await page.keyboard.press(key);
   const steered = server.calls.filter((call) => !["open", "credit", "look", "events", "files"].includes(call.do));
   expect(steered).toEqual([]);
@@ -51,17 +54,26 @@ test("a node that is selected tells whom it hears and who hears it", async () =>
   await page.getByRole("button", { name: "ONE18", exact: true }).click();
   const facts = page.getByTestId("node");
   await facts.getByText("nobody").waitFor();
-  await expect.poll(() => facts.textContent(), { timeout: WAIT_MS }).toMatch(/HearsONE11, ONE12, ONE14.*Is heard bynobody/);
+  await expect
+    .poll(() => facts.textContent(), { timeout: WAIT_MS })
+    .toMatch(/HearsONE11, ONE12, ONE14.*Is heard bynobody/);
   await page.getByRole("button", { name: "ONE18", exact: true }).click();
   await page.getByText("Select one to see whom it hears.").waitFor();
 });
 
-for (const [width, isDark] of [[1280, false], [1280, true], [400, false], [400, true]] as const) {
+for (const [width, isDark] of [
+  [1280, false],
+  [1280, true],
+  [400, false],
+  [400, true],
+] as const) {
   test(`at ${width} pixels, ${isDark ? "dark" : "light"}, all of it can be seen`, async () => {
     await visit({ width, height: 800, isDark });
     if (width === 400) await page.getByRole("tab", { name: "nodes" }).click();
     await page.getByTestId("fleet").waitFor();
-    await page.waitForFunction(() => Number(document.querySelector("[data-testid=cycle]")?.textContent?.replace(/\D/g, "")) >= 2);
+    await page.waitForFunction(
+      () => Number(document.querySelector("[data-testid=cycle]")?.textContent?.replace(/\D/g, "")) >= 2,
+    );
     const cut = await page.evaluate(() => document.documentElement.scrollWidth > document.documentElement.clientWidth);
     expect(cut).toBe(false);
     await page.screenshot({ path: `screenshots/fleet-${width}-${isDark ? "dark" : "light"}.png` });

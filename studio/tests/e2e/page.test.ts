@@ -31,8 +31,7 @@ async function visit(world: string | null, look: Look = {}): Promise<void> {
   if (world) await openNew(page, world);
 }
 
-const cycle = async (): Promise<number> =>
-  Number((await page.getByTestId("cycle").textContent())!.replace(/\D/g, ""));
+const cycle = async (): Promise<number> => Number((await page.getByTestId("cycle").textContent())!.replace(/\D/g, ""));
 
 /** Waits until the shown cycle is this one, or passes a test. */
 async function cycleIs(wanted: number | ((c: number) => boolean)): Promise<void> {
@@ -67,7 +66,10 @@ describe("transport", () => {
     const slider = page.getByRole("slider", { name: "Cycle" });
     await slider.fill("5000");
     await cycleIs(5000);
-    await page.getByRole("button", { name: /^contact/ }).first().waitFor();
+    await page
+      .getByRole("button", { name: /^contact/ })
+      .first()
+      .waitFor();
     const colored = await page.locator(".timeline canvas").evaluate((canvas: HTMLCanvasElement) => {
       const { data } = canvas.getContext("2d")!.getImageData(0, 0, canvas.width, canvas.height);
       return data.some((value, i) => i % 4 === 3 && value > 0);
@@ -165,7 +167,11 @@ describe("agents", () => {
     await page.keyboard.press("Enter");
     await page.getByRole("heading", { name: "robot 9999" }).waitFor();
     await page.getByText("nearest wall").waitFor();
-    await page.getByRole("button", { name: "robot 0" }).or(page.getByRole("button", { name: "courier Anna" })).first().click();
+    await page
+      .getByRole("button", { name: "robot 0" })
+      .or(page.getByRole("button", { name: "courier Anna" }))
+      .first()
+      .click();
     await page.getByRole("heading", { name: "courier Anna" }).waitFor();
   });
 
@@ -182,7 +188,10 @@ describe("events", () => {
     await visit("robots");
     await page.getByRole("slider", { name: "Cycle" }).fill("400");
     await cycleIs(400);
-    await page.getByRole("group", { name: "Kinds of events" }).getByRole("button", { name: /contact/ }).click();
+    await page
+      .getByRole("group", { name: "Kinds of events" })
+      .getByRole("button", { name: /contact/ })
+      .click();
     await page.getByTestId("event-count").filter({ hasText: /^3$/ }).waitFor();
     await page.getByRole("listitem").getByRole("button", { name: /trip/ }).nth(1).click();
     await cycleIs(220);
@@ -263,13 +272,19 @@ describe("keyboard", () => {
       const [name, ring] = await page.evaluate(() => {
         const e = document.activeElement as HTMLElement;
         if (e === document.body) return ["", ""] as const;
-        return [e.getAttribute("aria-label") ?? e.textContent?.trim().slice(0, 20) ?? "", getComputedStyle(e).outlineStyle] as const;
+        return [
+          e.getAttribute("aria-label") ?? e.textContent?.trim().slice(0, 20) ?? "",
+          getComputedStyle(e).outlineStyle,
+        ] as const;
       });
       if (name) reached.add(name);
       if (name) expect([name, ring]).not.toEqual([name, "none"]);
     }
     for (const name of ["Open…", "Agents", "Filter agents", "Play", "Cycle", "Speed", "Restart", "Help", "Trails"]) {
-      expect([...reached].some((one) => one.startsWith(name)), name).toBe(true);
+      expect(
+        [...reached].some((one) => one.startsWith(name)),
+        name,
+      ).toBe(true);
     }
   });
 });
@@ -364,18 +379,23 @@ describe("results", () => {
     const file = await picture;
     expect(file.suggestedFilename()).toBe("Made-up-hall-50.png");
     const bytes = readFileSync((await file.path())!);
-    const colors = await page.evaluate(async (url) => {
-      const image = new Image();
-      image.src = url;
-      await image.decode();
-      const canvas = document.createElement("canvas");
-      [canvas.width, canvas.height] = [image.width, image.height];
-      const pen = canvas.getContext("2d")!;
-      pen.drawImage(image, 0, 0);
-      return new Set(new Uint32Array(pen.getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size;
-    }, `data:image/png;base64,${bytes.toString("base64")}`);
+    const colors = await page.evaluate(
+      async (url) => {
+        const image = new Image();
+        image.src = url;
+        await image.decode();
+        const canvas = document.createElement("canvas");
+        [canvas.width, canvas.height] = [image.width, image.height];
+        const pen = canvas.getContext("2d")!;
+        pen.drawImage(image, 0, 0);
+        return new Set(new Uint32Array(pen.getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size;
+      },
+      `data:image/png;base64,${bytes.toString("base64")}`,
+    );
     expect(colors).toBeGreaterThan(20);
-    expect(await dialog.getByRole("link", { name: "cycle 50 (SVG)" }).getAttribute("href")).toBe("/export?path=robots.run&as=svg&cycle=50");
+    expect(await dialog.getByRole("link", { name: "cycle 50 (SVG)" }).getAttribute("href")).toBe(
+      "/export?path=robots.run&as=svg&cycle=50",
+    );
     const table = page.waitForEvent("download");
     await dialog.getByRole("row", { name: "trajectories" }).getByRole("link", { name: "CSV" }).click();
     expect((await table).url()).toContain("/export?path=robots.run&as=csv&table=trajectories");
@@ -390,7 +410,10 @@ describe("results", () => {
     await page.getByRole("searchbox", { name: "Filter runs" }).fill("= 8");
     await page.getByTestId("run-count").filter({ hasText: "1" }).waitFor();
     await page.getByRole("searchbox", { name: "Filter runs" }).fill("");
-    await page.getByRole("listitem").getByRole("button", { name: /count = 4 seed 2/ }).click();
+    await page
+      .getByRole("listitem")
+      .getByRole("button", { name: /count = 4 seed 2/ })
+      .click();
     await page.getByRole("button", { name: /seed 2/ }).waitFor();
     await drawn(page);
     await page.getByRole("button", { name: /sweep · sweep/ }).click();
@@ -443,13 +466,20 @@ describe("sessions", () => {
     await dialog.getByRole("button", { name: "robots", exact: true }).click();
     await page.getByRole("button", { name: "In step" }).click();
     await page.getByRole("button", { name: "First difference" }).click();
-    await page.getByTestId("difference").filter({ hasText: `from cycle ${PARTING} on: robot 3 is 0.25\u202fm away.` }).waitFor();
+    await page
+      .getByTestId("difference")
+      .filter({ hasText: `from cycle ${PARTING} on: robot 3 is 0.25\u202fm away.` })
+      .waitFor();
     await cycleIs(PARTING);
     await page.getByRole("heading", { name: "robot 3" }).waitFor();
     expect(complaints).toEqual([]);
   });
 
-  for (const [status, words] of [[503, "is full"], [401, "Open the whole address"], [421, "does not take this address"]] as const) {
+  for (const [status, words] of [
+    [503, "is full"],
+    [401, "Open the whole address"],
+    [421, "does not take this address"],
+  ] as const) {
     test(`a server that answers ${status} is told as that, and found again`, async () => {
       await visit("robots");
       await page.getByRole("button", { name: "Play", exact: true }).click();

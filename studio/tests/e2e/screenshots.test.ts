@@ -19,14 +19,19 @@ afterAll(async () => {
 });
 
 for (const world of ["robots", "chain", "airspace"]) {
-  for (const [width, height] of [[1280, 800], [400, 800]] as const) {
+  for (const [width, height] of [
+    [1280, 800],
+    [400, 800],
+  ] as const) {
     for (const isDark of [false, true]) {
       test(`${world} at ${width} pixels, ${isDark ? "dark" : "light"}, is drawn without complaints`, async () => {
         const { page, complaints } = await openPage(browser, server.url, { width, height, isDark });
         await openNew(page, world);
         await page.getByLabel("Speed", { exact: true }).selectOption("fastest");
         await page.getByRole("button", { name: "Play", exact: true }).click();
-        await page.waitForFunction(() => Number(document.querySelector("[data-testid=cycle]")?.textContent?.replace(/\D/g, "")) >= 12);
+        await page.waitForFunction(
+          () => Number(document.querySelector("[data-testid=cycle]")?.textContent?.replace(/\D/g, "")) >= 12,
+        );
         await page.getByRole("button", { name: "Pause" }).click();
         await page.locator(".agents").getByRole("option").nth(3).click();
         if (width === 400) await page.getByRole("tab", { name: "inspector" }).click();

@@ -27,12 +27,16 @@ function first(): Set<string> {
     found.add(name);
     if (!name.endsWith(".js")) continue;
     const code = files.get(name)!.toString();
-    for (const [, path] of code.matchAll(/(?:^|[;}\s])(?:import|export)\s*(?:[\w*{}$,\s]+?from)?\s*["']\.\/([^"']+)["']/g)) open.push(basename(path!));
+    for (const [, path] of code.matchAll(
+      /(?:^|[;}\s])(?:import|export)\s*(?:[\w*{}$,\s]+?from)?\s*["']\.\/([^"']+)["']/g,
+    ))
+      open.push(basename(path!));
   }
   return found;
 }
 
-const weight = (names: Iterable<string>): number => [...names].reduce((bytes, name) => bytes + gzipSync(files.get(name)!, { level: 9 }).length, 0);
+const weight = (names: Iterable<string>): number =>
+  [...names].reduce((bytes, name) => bytes + gzipSync(files.get(name)!, { level: 9 }).length, 0);
 
 test("the first load is at most 300 kB, compressed, and the rest comes when it is asked for", () => {
   const needed = first();

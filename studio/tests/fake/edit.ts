@@ -67,7 +67,8 @@ export function textOf(world: string): string {
 }
 
 export const SCHEMA: Table = {
-  type: "object", description: "A made-up world.",
+  type: "object",
+  description: "A made-up world.",
   properties: {
     format: { type: "integer", description: "Version of the format.", minimum: 1, maximum: 1 },
     world: { type: "string" },
@@ -76,13 +77,35 @@ export const SCHEMA: Table = {
     map: { $ref: "#/$defs/Map" },
     sensors: { type: "object", additionalProperties: { $ref: "#/$defs/Sensor" } },
     robots: { anyOf: [{ $ref: "#/$defs/Robot" }, { type: "array", items: { $ref: "#/$defs/Robot" } }] },
-    record: { type: "object", description: "What a run keeps.", properties: { events: { type: "boolean", description: "Contacts and doors.", default: true } } },
+    record: {
+      type: "object",
+      description: "What a run keeps.",
+      properties: { events: { type: "boolean", description: "Contacts and doors.", default: true } },
+    },
   },
   $defs: {
-    Map: { type: "object", description: "The floor.", properties: { box_size_m: { type: "number", description: "Side of a box.", minimum: 0, maximum: 1000, default: 0.25 }, ascii: { type: "string", description: "A drawing." } } },
-    Sensor: { type: "object", properties: { observations: { type: "array", items: { type: "string" } }, confusion: { type: "object", description: "Rows sum to 1.", additionalProperties: { type: "array", items: { type: "number" } } } } },
+    Map: {
+      type: "object",
+      description: "The floor.",
+      properties: {
+        box_size_m: { type: "number", description: "Side of a box.", minimum: 0, maximum: 1000, default: 0.25 },
+        ascii: { type: "string", description: "A drawing." },
+      },
+    },
+    Sensor: {
+      type: "object",
+      properties: {
+        observations: { type: "array", items: { type: "string" } },
+        confusion: {
+          type: "object",
+          description: "Rows sum to 1.",
+          additionalProperties: { type: "array", items: { type: "number" } },
+        },
+      },
+    },
     Robot: {
-      type: "object", description: "Robots of one type.",
+      type: "object",
+      description: "Robots of one type.",
       properties: {
         name: { type: "string" },
         count: { anyOf: [{ type: "integer", minimum: 0 }, { type: "null" }], description: "Placed by draw." },
@@ -90,18 +113,38 @@ export const SCHEMA: Table = {
         size: { type: "integer", description: "Boxes a side.", minimum: 1, maximum: 64, default: 1 },
         period: { type: "integer", description: "Acts every so many cycles.", minimum: 1, default: 1 },
         sensors: { type: "array", items: { type: "string", "x-names": "sensors", examples: ["sonar-ring"] } },
-        regime: { description: "Whose errors are on.", oneOf: [{ const: "reliable", type: "string", description: "Nobody's." }, { const: "both", type: "string" }] },
+        regime: {
+          description: "Whose errors are on.",
+          oneOf: [
+            { const: "reliable", type: "string", description: "Nobody's." },
+            { const: "both", type: "string" },
+          ],
+        },
         region: { type: "array", items: { type: "integer" } },
       },
     },
   },
 };
 
-const KEYS = /^(robots|people|doors|obstacles|airplanes|targets_m|format|world|name|seed|count|size|cycles|box_size_m|ascii|observations|nothing|wall|robot|at|sensors|regime|region|events|callsign|at_m|heading_deg|way_points_m|radius_m|ends_m|size_m|kind|goals|repeat|open|closed|periodic|period|behaviour|effector)$/;
+const KEYS =
+  /^(robots|people|doors|obstacles|airplanes|targets_m|format|world|name|seed|count|size|cycles|box_size_m|ascii|observations|nothing|wall|robot|at|sensors|regime|region|events|callsign|at_m|heading_deg|way_points_m|radius_m|ends_m|size_m|kind|goals|repeat|open|closed|periodic|period|behaviour|effector)$/;
 
-function problem(cause: string, remedy: string, at: { line: number; column: number; end: number } | null, key: string | null): Problem {
+function problem(
+  cause: string,
+  remedy: string,
+  at: { line: number; column: number; end: number } | null,
+  key: string | null,
+): Problem {
   return {
-    place: "made-up.toml", line: at?.line ?? null, column: at?.column ?? null, end_line: at?.line ?? null, end_column: at?.end ?? null, key, cause, remedy, is_warning: false,
+    place: "made-up.toml",
+    line: at?.line ?? null,
+    column: at?.column ?? null,
+    end_line: at?.line ?? null,
+    end_column: at?.end ?? null,
+    key,
+    cause,
+    remedy,
+    is_warning: false,
   };
 }
 
@@ -111,15 +154,33 @@ export function check(text: string): Problem[] {
   const unknown = lines.flatMap((line, i) => {
     const key = /^(\w+)\s*=/.exec(line)?.[1];
     const isWrong = key !== undefined && !KEYS.test(key);
-    return isWrong ? [problem(`there is no key \`${key}\``, "did you mean `count`?", { line: i + 1, column: 1, end: 1 + key.length }, null)] : [];
+    return isWrong
+      ? [
+          problem(
+            `there is no key \`${key}\``,
+            "did you mean `count`?",
+            { line: i + 1, column: 1, end: 1 + key.length },
+            null,
+          ),
+        ]
+      : [];
   });
   const rows = Object.entries(sensorsOf(text)).flatMap(([name, sensor]) =>
-    Object.entries(isTable(sensor) && isTable(sensor["confusion"]) ? sensor["confusion"] : {}).flatMap(([row, values]) => {
-      const sum = Array.isArray(values) ? values.reduce<number>((all, one) => all + Number(one), 0) : 1;
-      if (Math.abs(sum - 1) < 1e-9) return [];
-      const line = lines.findIndex((one) => one.startsWith(`${row} =`));
-      return [problem(`the row sums to ${Number(sum.toPrecision(6))}`, "make it 1", { line: line + 1, column: row.length + 4, end: (lines[line] ?? "").length + 1 }, `sensors.${name}.confusion.${row}`)];
-    }),
+    Object.entries(isTable(sensor) && isTable(sensor["confusion"]) ? sensor["confusion"] : {}).flatMap(
+      ([row, values]) => {
+        const sum = Array.isArray(values) ? values.reduce<number>((all, one) => all + Number(one), 0) : 1;
+        if (Math.abs(sum - 1) < 1e-9) return [];
+        const line = lines.findIndex((one) => one.startsWith(`${row} =`));
+        return [
+          problem(
+            `the row sums to ${Number(sum.toPrecision(6))}`,
+            "make it 1",
+            { line: line + 1, column: row.length + 4, end: (lines[line] ?? "").length + 1 },
+            `sensors.${name}.confusion.${row}`,
+          ),
+        ];
+      },
+    ),
   );
   return [...unknown, ...rows];
 }

@@ -14,7 +14,12 @@ export interface FakeWorld {
 }
 
 const COLORS: [number, number, number][] = [
-  [0x00, 0x72, 0xb2], [0xd5, 0x5e, 0x00], [0x00, 0x9e, 0x73], [0xcc, 0x79, 0xa7], [0xe6, 0x9f, 0x00], [0x56, 0xb4, 0xe9],
+  [0x00, 0x72, 0xb2],
+  [0xd5, 0x5e, 0x00],
+  [0x00, 0x9e, 0x73],
+  [0xcc, 0x79, 0xa7],
+  [0xe6, 0x9f, 0x00],
+  [0x56, 0xb4, 0xe9],
 ];
 
 function looks(color: [number, number, number], opacity: number, layer: number): [Look, Look, Look, Look, Look] {
@@ -68,25 +73,45 @@ export function robots(count: number): FakeWorld {
     return [x + r * Math.cos(angle), y + r * Math.sin(angle), angle + Math.PI / 2];
   };
   const touches = (i: number, cycle: number): boolean => chance(i, Math.floor(cycle / 20)) > 0.985;
-  const shapes: Shape[] = [{ type: "cylinder", radius_m: 0.25, height_m: 0.5 }, { type: "cuboid", size_m: [0.7, 0.5, 0.5] }];
+  const shapes: Shape[] = [
+    { type: "cylinder", radius_m: 0.25, height_m: 0.5 },
+    { type: "cuboid", size_m: [0.7, 0.5, 0.5] },
+  ];
   return {
     cyclesPlanned: 10_000,
     scene: {
-      name: "Made-up hall", world: "robots", agent: "robot", dimensions: 2, cycle_s: 0.1, is_recording: false,
+      name: "Made-up hall",
+      world: "robots",
+      agent: "robot",
+      dimensions: 2,
+      cycle_s: 0.1,
+      is_recording: false,
       floor: { width: side, height: side, box_m: box, origin_m: [0, 0], yaw_rad: 0, runs: runsOf(side, side, wall) },
-      bodies: [{
-        who: { kind: "obstacle", number: 0, part: null }, name: null, at_m: [2, 2, 0], turn: [0, 0, 0.3, 0.95],
-        shape: { type: "cuboid", size_m: [1.2, 0.4, 1] }, look: { color: [60, 60, 60], opacity: 1, layer: 1 },
-      }],
+      bodies: [
+        {
+          who: { kind: "obstacle", number: 0, part: null },
+          name: null,
+          at_m: [2, 2, 0],
+          turn: [0, 0, 0.3, 0.95],
+          shape: { type: "cuboid", size_m: [1.2, 0.4, 1] },
+          look: { color: [60, 60, 60], opacity: 1, layer: 1 },
+        },
+      ],
     },
     cast: {
       kinds: ["robot"],
       kind: Array.from({ length: count }, () => 0),
       number: Array.from({ length: count }, (_, i) => i),
       part: Array.from({ length: count }, () => -1),
-      shapes, shape: Array.from({ length: count }, (_, i) => (i % 5 === 0 ? 1 : 0)),
-      looks: ALL_COLORS, look: Array.from({ length: count }, (_, i) => i % 6),
-      names: [[0, "courier Anna"], [1, "courier Bert"]], is_agent: Array.from({ length: count }, () => true),
+      shapes,
+      shape: Array.from({ length: count }, (_, i) => (i % 5 === 0 ? 1 : 0)),
+      looks: ALL_COLORS,
+      look: Array.from({ length: count }, (_, i) => i % 6),
+      names: [
+        [0, "courier Anna"],
+        [1, "courier Bert"],
+      ],
+      is_agent: Array.from({ length: count }, () => true),
     },
     columns(cycle) {
       const places_m: number[] = [];
@@ -105,50 +130,116 @@ export function robots(count: number): FakeWorld {
         const i = Math.floor(chance(cycle, 3) * Math.min(count, 50));
         const [x, y] = at(i, cycle);
         return {
-          cycle, level: "warning", kind: "contact", who: who(i), with: who((i + 1) % count), at_m: [x, y, 0],
-          value: 0.02, unit: "m", words: `robot ${i} touched its neighbor`,
+          cycle,
+          level: "warning",
+          kind: "contact",
+          who: who(i),
+          with: who((i + 1) % count),
+          at_m: [x, y, 0],
+          value: 0.02,
+          unit: "m",
+          words: `robot ${i} touched its neighbor`,
         };
       });
       const trip = every(110, from, until, (cycle) => ({
-        cycle, level: "info", kind: "trip", who: who(cycle % Math.min(count, 9)), with: null, at_m: null,
-        value: 31.5, unit: "s", words: "a trip from the southern corridor to the northern one has ended",
+        cycle,
+        level: "info",
+        kind: "trip",
+        who: who(cycle % Math.min(count, 9)),
+        with: null,
+        at_m: null,
+        value: 31.5,
+        unit: "s",
+        words: "a trip from the southern corridor to the northern one has ended",
       }));
       return [...bump, ...trip].sort((a, b) => a.cycle - b.cycle);
     },
     inspect(body, cycle) {
       const [x, y] = at(body.number, cycle);
       return {
-        who: body, cycle, title: `robot ${body.number} of the southern couriers`,
+        who: body,
+        cycle,
+        title: `robot ${body.number} of the southern couriers`,
         sections: [
-          { title: "Perceives", facts: [
-            { label: "place", value: { place: [x, y, 0] } },
-            { label: "nearest wall", value: { number: { value: 1.25, unit: "m" } } },
-            { label: "in contact", value: { yes: touches(body.number, cycle) } },
-          ], table: { columns: ["beam", "as it is", "as reported", "class"], rows: [0, 1, 2, 3].map((i) => [
-            { text: `${i * 90}°` }, { number: { value: 1 + chance(i, cycle), unit: "m" } },
-            i === 2 ? "none" : { number: { value: 1.1 + chance(i, cycle), unit: "m" } }, { text: i === 2 ? "nothing" : "near" },
-          ]) } },
-          { title: "Decides", facts: [
-            { label: "action", value: { text: "forward" } }, { label: "drawn with", value: { share: 0.815 } },
-            { label: "group with", value: { who: who((body.number + 1) % count) } }, { label: "message", value: "none" },
-          ], table: null },
+          {
+            title: "Perceives",
+            facts: [
+              { label: "place", value: { place: [x, y, 0] } },
+              { label: "nearest wall", value: { number: { value: 1.25, unit: "m" } } },
+              { label: "in contact", value: { yes: touches(body.number, cycle) } },
+            ],
+            table: {
+              columns: ["beam", "as it is", "as reported", "class"],
+              rows: [0, 1, 2, 3].map((i) => [
+                { text: `${i * 90}°` },
+                { number: { value: 1 + chance(i, cycle), unit: "m" } },
+                i === 2 ? "none" : { number: { value: 1.1 + chance(i, cycle), unit: "m" } },
+                { text: i === 2 ? "nothing" : "near" },
+              ]),
+            },
+          },
+          {
+            title: "Decides",
+            facts: [
+              { label: "action", value: { text: "forward" } },
+              { label: "drawn with", value: { share: 0.815 } },
+              { label: "group with", value: { who: who((body.number + 1) % count) } },
+              { label: "message", value: "none" },
+            ],
+            table: null,
+          },
         ],
         marks: [
-          { role: "claim", label: "boxes claimed", weight: 1, shape: { type: "area", corners_m: [[x - 0.5, y - 0.5, 0], [x + 0.75, y - 0.5, 0], [x + 0.75, y + 0.5, 0], [x - 0.5, y + 0.5, 0]] } },
-          { role: "group", label: "conflict group", weight: 0.6, shape: { type: "circle", at_m: [x, y, 0], radius_m: 1.6 } },
-          { role: "target", label: "way-point", weight: 1, shape: { type: "line", points_m: [[x, y, 0], [x + 3, y + 2, 0]] } },
+          {
+            role: "claim",
+            label: "boxes claimed",
+            weight: 1,
+            shape: {
+              type: "area",
+              corners_m: [
+                [x - 0.5, y - 0.5, 0],
+                [x + 0.75, y - 0.5, 0],
+                [x + 0.75, y + 0.5, 0],
+                [x - 0.5, y + 0.5, 0],
+              ],
+            },
+          },
+          {
+            role: "group",
+            label: "conflict group",
+            weight: 0.6,
+            shape: { type: "circle", at_m: [x, y, 0], radius_m: 1.6 },
+          },
+          {
+            role: "target",
+            label: "way-point",
+            weight: 1,
+            shape: {
+              type: "line",
+              points_m: [
+                [x, y, 0],
+                [x + 3, y + 2, 0],
+              ],
+            },
+          },
         ],
       };
     },
     scans(body, cycle) {
       const [x, y, heading] = at(body.number, cycle);
       const beams = Array.from({ length: 8 }, (_, i) => i);
-      return [{
-        of: body, sensor: "sonar", at_m: [x, y, 0], turn: [0, 0, Math.sin(heading / 2), Math.cos(heading / 2)],
-        bearings_rad: beams.map((i) => (i * Math.PI) / 4),
-        ranges_m: beams.map((i) => (i === 3 ? null : 1 + 2 * chance(i, cycle))),
-        true_m: beams.map((i) => (i === 3 ? null : 1.1 + 2 * chance(i, cycle))), range_m: 4,
-      }];
+      return [
+        {
+          of: body,
+          sensor: "sonar",
+          at_m: [x, y, 0],
+          turn: [0, 0, Math.sin(heading / 2), Math.cos(heading / 2)],
+          bearings_rad: beams.map((i) => (i * Math.PI) / 4),
+          ranges_m: beams.map((i) => (i === 3 ? null : 1 + 2 * chance(i, cycle))),
+          true_m: beams.map((i) => (i === 3 ? null : 1.1 + 2 * chance(i, cycle))),
+          range_m: 4,
+        },
+      ];
     },
   };
 }
@@ -162,37 +253,83 @@ export function chain(): FakeWorld {
   };
   const who = (part: number): Who => ({ kind: "connector", number: 0, part });
   const ball = (i: number): Scene["bodies"][number] => ({
-    who: { kind: "obstacle", number: i, part: null }, name: null,
-    at_m: [10 * (chance(i, 1) - 0.5), 10 * (chance(i, 2) - 0.5), 5 * (chance(i, 3) - 0.5)], turn: [0, 0, 0, 1],
-    shape: i % 4 === 0 ? { type: "cuboid", size_m: [0.8, 0.6, 1] } : { type: "sphere", radius_m: 0.2 + 0.4 * chance(i, 4) },
+    who: { kind: "obstacle", number: i, part: null },
+    name: null,
+    at_m: [10 * (chance(i, 1) - 0.5), 10 * (chance(i, 2) - 0.5), 5 * (chance(i, 3) - 0.5)],
+    turn: [0, 0, 0, 1],
+    shape:
+      i % 4 === 0 ? { type: "cuboid", size_m: [0.8, 0.6, 1] } : { type: "sphere", radius_m: 0.2 + 0.4 * chance(i, 4) },
     look: { color: [60, 60, 60], opacity: 0.22, layer: 1 },
   });
-  const fill = <T,>(value: T): T[] => Array.from({ length: n }, () => value);
+  const fill = <T>(value: T): T[] => Array.from({ length: n }, () => value);
   return {
     cyclesPlanned: 4000,
     scene: {
-      name: "Made-up snake", world: "chain", agent: "connector", dimensions: 3, cycle_s: 0.02, is_recording: false, floor: null,
+      name: "Made-up snake",
+      world: "chain",
+      agent: "connector",
+      dimensions: 3,
+      cycle_s: 0.02,
+      is_recording: false,
+      floor: null,
       bodies: Array.from({ length: 80 }, (_, i) => ball(i)),
     },
     cast: {
-      kinds: ["connector", "rods"], kind: [...fill(0), 1], number: [...fill(0), 0], part: [...fill(0).map((_, i) => i), -1],
-      shapes: [{ type: "sphere", radius_m: 0.09 }, { type: "line", points_m: [], thickness_m: 0.06 }], shape: [...fill(0), 1],
-      looks: ALL_COLORS, look: [...fill(1), 0], names: [], is_agent: [...fill(true), false],
+      kinds: ["connector", "rods"],
+      kind: [...fill(0), 1],
+      number: [...fill(0), 0],
+      part: [...fill(0).map((_, i) => i), -1],
+      shapes: [
+        { type: "sphere", radius_m: 0.09 },
+        { type: "line", points_m: [], thickness_m: 0.06 },
+      ],
+      shape: [...fill(0), 1],
+      looks: ALL_COLORS,
+      look: [...fill(1), 0],
+      names: [],
+      is_agent: [...fill(true), false],
     },
     columns(cycle) {
       const points = Array.from({ length: n }, (_, i) => at(i, cycle)).flat();
-      const conditions = Array.from({ length: n + 1 }, (_, i) => (i < n && cycle % 200 > 150 && i === 20 ? 3 : i === 0 ? 1 : 0));
-      return { places_m: [...points, 0, 0, 0], turns: Array.from({ length: 4 * (n + 1) }, (_, i) => (i % 4 === 3 ? 1 : 0)), lines: [points], conditions };
+      const conditions = Array.from({ length: n + 1 }, (_, i) =>
+        i < n && cycle % 200 > 150 && i === 20 ? 3 : i === 0 ? 1 : 0,
+      );
+      return {
+        places_m: [...points, 0, 0, 0],
+        turns: Array.from({ length: 4 * (n + 1) }, (_, i) => (i % 4 === 3 ? 1 : 0)),
+        lines: [points],
+        conditions,
+      };
     },
-    events: (from, until) => every(50, from, until, (cycle) => ({
-      cycle, level: "info", kind: cycle % 100 === 0 ? "veto" : "layer", who: who((cycle / 50) % n), with: null, at_m: at((cycle / 50) % n, cycle),
-      value: 0.1, unit: "m", words: "could have gone 0.1 m before obstacle 3",
-    })),
+    events: (from, until) =>
+      every(50, from, until, (cycle) => ({
+        cycle,
+        level: "info",
+        kind: cycle % 100 === 0 ? "veto" : "layer",
+        who: who((cycle / 50) % n),
+        with: null,
+        at_m: at((cycle / 50) % n, cycle),
+        value: 0.1,
+        unit: "m",
+        words: "could have gone 0.1 m before obstacle 3",
+      })),
     inspect(body, cycle) {
       const p = at(body.part ?? 0, cycle);
       return {
-        who: body, cycle, title: `connector ${body.part} of the snake`,
-        sections: [{ title: "Wish", facts: [{ label: "turn", value: { number: { value: -12.5, unit: "°" } } }, { label: "place", value: { place: p } }, { label: "vetoed by", value: { who: who(7) } }], table: null }],
+        who: body,
+        cycle,
+        title: `connector ${body.part} of the snake`,
+        sections: [
+          {
+            title: "Wish",
+            facts: [
+              { label: "turn", value: { number: { value: -12.5, unit: "°" } } },
+              { label: "place", value: { place: p } },
+              { label: "vetoed by", value: { who: who(7) } },
+            ],
+            table: null,
+          },
+        ],
         marks: [
           { role: "wish", label: "wished", weight: 1, shape: { type: "line", points_m: [p, [p[0], p[1], p[2] + 1]] } },
           { role: "refused", label: "veto", weight: 1, shape: { type: "point", at_m: [p[0], p[1], p[2] + 1] } },
@@ -212,7 +349,7 @@ export function airplanes(): FakeWorld {
     const bend = 900 * Math.exp(-((way / 2500) ** 2));
     return [way * Math.cos(angle) - bend * Math.sin(angle), way * Math.sin(angle) + bend * Math.cos(angle), angle];
   };
-  const two = <T,>(airplane: (i: number) => T, zone: (i: number) => T): T[] => [
+  const two = <T>(airplane: (i: number) => T, zone: (i: number) => T): T[] => [
     ...Array.from({ length: n }, (_, i) => airplane(i)),
     ...Array.from({ length: n }, (_, i) => zone(i)),
   ];
@@ -220,35 +357,109 @@ export function airplanes(): FakeWorld {
   return {
     cyclesPlanned: 75,
     scene: {
-      name: "Made-up super-conflict", world: "airspace", agent: "airplane", dimensions: 2, cycle_s: 5, is_recording: false, floor: null,
+      name: "Made-up super-conflict",
+      world: "airspace",
+      agent: "airplane",
+      dimensions: 2,
+      cycle_s: 5,
+      is_recording: false,
+      floor: null,
       bodies: Array.from({ length: n }, (_, i) => {
         const [x, y] = at((i + n / 2) % n, 0);
-        return { who: { kind: "goal", number: i, part: null }, name: null, at_m: [x, y, 0], turn: [0, 0, 0, 1], shape: { type: "cylinder", radius_m: 100, height_m: 1 }, look: { color: COLORS[i % 6]!, opacity: 0.45, layer: 2 } };
+        return {
+          who: { kind: "goal", number: i, part: null },
+          name: null,
+          at_m: [x, y, 0],
+          turn: [0, 0, 0, 1],
+          shape: { type: "cylinder", radius_m: 100, height_m: 1 },
+          look: { color: COLORS[i % 6]!, opacity: 0.45, layer: 2 },
+        };
       }),
     },
     cast: {
-      kinds: ["airplane", "zone"], kind: two(() => 0, () => 1), number: two((i) => i, (i) => i), part: two(() => -1, () => -1),
-      shapes: [{ type: "dart", length_m: 300, width_m: 200 }, { type: "cylinder", radius_m: 250, height_m: 300 }], shape: two(() => 0, () => 1),
-      looks: [...ALL_COLORS, ...COLORS.map((color) => looks(color, 0.15, 3))], look: two((i) => i % 6, (i) => 6 + (i % 6)),
-      names: Array.from({ length: n }, (_, i) => [i, `ONE${11 + i}`]), is_agent: two(() => true, () => false),
+      kinds: ["airplane", "zone"],
+      kind: two(
+        () => 0,
+        () => 1,
+      ),
+      number: two(
+        (i) => i,
+        (i) => i,
+      ),
+      part: two(
+        () => -1,
+        () => -1,
+      ),
+      shapes: [
+        { type: "dart", length_m: 300, width_m: 200 },
+        { type: "cylinder", radius_m: 250, height_m: 300 },
+      ],
+      shape: two(
+        () => 0,
+        () => 1,
+      ),
+      looks: [...ALL_COLORS, ...COLORS.map((color) => looks(color, 0.15, 3))],
+      look: two(
+        (i) => i % 6,
+        (i) => 6 + (i % 6),
+      ),
+      names: Array.from({ length: n }, (_, i) => [i, `ONE${11 + i}`]),
+      is_agent: two(
+        () => true,
+        () => false,
+      ),
     },
     columns(cycle) {
       const all = Array.from({ length: 2 * n }, (_, i) => at(i % n, cycle));
-      return { places_m: all.flatMap(([x, y]) => [x, y]), turns: all.map(([, , h]) => h), lines: [], conditions: all.map((_, i) => (i === 8 && cycle > 30 && cycle < 34 ? 3 : 0)) };
-    },
-    events: (from, until) => every(15, from, until, (cycle) => ({
-      cycle, level: "info", kind: cycle === 30 ? "separation" : "agreement", who: who((cycle / 15) % n), with: who((cycle / 15 + 1) % n), at_m: null,
-      value: 480, unit: "m", words: cycle === 30 ? "separation lost: 480 m of 500 m" : "agreed after 4 rounds",
-    })),
-    inspect(body, cycle) {
-      const way = (shift: number): [number, number, number][] => Array.from({ length: 18 }, (_, k) => {
-        const [x, y] = at(body.number, cycle + k * 0.9);
-        return [x + shift * k, y - shift * k, 0];
-      });
       return {
-        who: body, cycle, title: `ONE${11 + body.number}`,
-        sections: [{ title: "Options", facts: [{ label: "group of", value: { number: { value: 4, unit: "airplanes" } } }], table: { columns: ["turn", "probability", "expectation"], rows: [-4, 0, 4].map((t, i) => [{ number: { value: t, unit: "°/s" } }, { share: [0.08, 0.72, 0.2][i]! }, { number: { value: 12345.678 * (i + 1), unit: "" } }]) } }],
-        marks: [-40, 0, 40].map((shift, i) => ({ role: i === 1 ? "chosen" : "predicted", label: "way", weight: [0.08, 0.72, 0.2][i]!, shape: { type: "line", points_m: way(shift) } })),
+        places_m: all.flatMap(([x, y]) => [x, y]),
+        turns: all.map(([, , h]) => h),
+        lines: [],
+        conditions: all.map((_, i) => (i === 8 && cycle > 30 && cycle < 34 ? 3 : 0)),
+      };
+    },
+    events: (from, until) =>
+      every(15, from, until, (cycle) => ({
+        cycle,
+        level: "info",
+        kind: cycle === 30 ? "separation" : "agreement",
+        who: who((cycle / 15) % n),
+        with: who((cycle / 15 + 1) % n),
+        at_m: null,
+        value: 480,
+        unit: "m",
+        words: cycle === 30 ? "separation lost: 480 m of 500 m" : "agreed after 4 rounds",
+      })),
+    inspect(body, cycle) {
+      const way = (shift: number): [number, number, number][] =>
+        Array.from({ length: 18 }, (_, k) => {
+          const [x, y] = at(body.number, cycle + k * 0.9);
+          return [x + shift * k, y - shift * k, 0];
+        });
+      return {
+        who: body,
+        cycle,
+        title: `ONE${11 + body.number}`,
+        sections: [
+          {
+            title: "Options",
+            facts: [{ label: "group of", value: { number: { value: 4, unit: "airplanes" } } }],
+            table: {
+              columns: ["turn", "probability", "expectation"],
+              rows: [-4, 0, 4].map((t, i) => [
+                { number: { value: t, unit: "°/s" } },
+                { share: [0.08, 0.72, 0.2][i]! },
+                { number: { value: 12345.678 * (i + 1), unit: "" } },
+              ]),
+            },
+          },
+        ],
+        marks: [-40, 0, 40].map((shift, i) => ({
+          role: i === 1 ? "chosen" : "predicted",
+          label: "way",
+          weight: [0.08, 0.72, 0.2][i]!,
+          shape: { type: "line", points_m: way(shift) },
+        })),
       };
     },
     scans: () => [],

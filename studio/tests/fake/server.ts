@@ -12,15 +12,31 @@ import { airplanes, chain, robots, type FakeWorld } from "./scenes";
 
 export const POLICY = "default-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'";
 const TYPES: Record<string, string> = {
-  ".html": "text/html; charset=utf-8", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml",
+  ".html": "text/html; charset=utf-8",
+  ".js": "text/javascript",
+  ".css": "text/css",
+  ".svg": "image/svg+xml",
 };
 
 const WORLDS: Record<string, () => FakeWorld> = {
-  robots: () => robots(24), crowd: () => robots(10_000), chain, airspace: airplanes,
+  robots: () => robots(24),
+  crowd: () => robots(10_000),
+  chain,
+  airspace: airplanes,
 };
 
 function problemOf(cause: string, remedy: string, line: number | null = null, column: number | null = null): Problem {
-  return { place: "made-up.toml", line, column, end_line: null, end_column: null, key: null, cause, remedy, is_warning: false };
+  return {
+    place: "made-up.toml",
+    line,
+    column,
+    end_line: null,
+    end_column: null,
+    key: null,
+    cause,
+    remedy,
+    is_warning: false,
+  };
 }
 
 /** The cycle from which on runs of the seed 2 are others. */
@@ -31,12 +47,28 @@ function fleetAt(cycle: number): Fleet {
   const node = (agent: number): Fleet["nodes"][number] => {
     const isLost = agent === 2;
     return {
-      agent, who: { kind: "airplane", number: agent, part: null }, state: isLost ? "gone" : "decide", epoch: 1, round: 3, flown: cycle, late: agent === 7 ? 4 : 0, lives: 1,
+      agent,
+      who: { kind: "airplane", number: agent, part: null },
+      state: isLost ? "gone" : "decide",
+      epoch: 1,
+      round: 3,
+      flown: cycle,
+      late: agent === 7 ? 4 : 0,
+      lives: 1,
       heard: isLost ? [] : [0, 1, 3, 4, 5, 6].filter((other) => other !== agent),
-      packets_per_s: 12, bytes_per_s: 3456, silent_s: isLost ? 12 : agent === 7 ? 3 : 0.2,
+      packets_per_s: 12,
+      bytes_per_s: 3456,
+      silent_s: isLost ? 12 : agent === 7 ? 3 : 0.2,
     };
   };
-  return { has_begun: true, silent_s: 0, late_cycles: 1, talk_p50_ms: 12.5, talk_p99_ms: 40, nodes: Array.from({ length: 8 }, (_, i) => node(i)) };
+  return {
+    has_begun: true,
+    silent_s: 0,
+    late_cycles: 1,
+    talk_p50_ms: 12.5,
+    talk_p99_ms: 40,
+    nodes: Array.from({ length: 8 }, (_, i) => node(i)),
+  };
 }
 
 class Run {
@@ -68,14 +100,31 @@ class Run {
     const isOver = this.cycle >= planned;
     if (this.isFleet) {
       return {
-        session: this.id, state: isOver ? "over" : "watched", cycle: this.cycle, cycles_planned: planned, time_s: this.cycle * scene.cycle_s,
-        speed: { times: 1 }, cycles_per_s: 0, seed: this.seed, digest: null, banner: null, fleet: fleetAt(this.cycle),
+        session: this.id,
+        state: isOver ? "over" : "watched",
+        cycle: this.cycle,
+        cycles_planned: planned,
+        time_s: this.cycle * scene.cycle_s,
+        speed: { times: 1 },
+        cycles_per_s: 0,
+        seed: this.seed,
+        digest: null,
+        banner: null,
+        fleet: fleetAt(this.cycle),
       };
     }
     return {
-      session: this.id, state: isOver ? "over" : this.playing ? "playing" : "paused", cycle: this.cycle, cycles_planned: planned,
-      time_s: this.cycle * scene.cycle_s, speed: this.speed, cycles_per_s: this.playing ? 10 : 0, seed: this.seed,
-      digest: this.playing && !isOver ? null : this.digest(), banner: null, fleet: null,
+      session: this.id,
+      state: isOver ? "over" : this.playing ? "playing" : "paused",
+      cycle: this.cycle,
+      cycles_planned: planned,
+      time_s: this.cycle * scene.cycle_s,
+      speed: this.speed,
+      cycles_per_s: this.playing ? 10 : 0,
+      seed: this.seed,
+      digest: this.playing && !isOver ? null : this.digest(),
+      banner: null,
+      fleet: null,
     };
   }
 
@@ -117,11 +166,23 @@ class Run {
     const columns = this.world.columns(this.cycle);
     // The fourth body stands elsewhere.
     if (this.hasParted) columns.places_m[3 * scene.dimensions]! += 0.25;
-    const text = { scans: this.scansOf.flatMap((who) => this.world.scans(who, this.cycle)), events: [], events_left_out: 0 };
-    this.#socket.send(encodeFrame({
-      session: this.id, cast: 1, dimensions: scene.dimensions as 2 | 3, cycle: this.cycle, time_s: this.cycle * scene.cycle_s,
-      leftOut: this.leftOut, text, ...columns,
-    }));
+    const text = {
+      scans: this.scansOf.flatMap((who) => this.world.scans(who, this.cycle)),
+      events: [],
+      events_left_out: 0,
+    };
+    this.#socket.send(
+      encodeFrame({
+        session: this.id,
+        cast: 1,
+        dimensions: scene.dimensions as 2 | 3,
+        cycle: this.cycle,
+        time_s: this.cycle * scene.cycle_s,
+        leftOut: this.leftOut,
+        text,
+        ...columns,
+      }),
+    );
   }
 }
 
@@ -157,7 +218,10 @@ export class FakeServer {
       const file = path === "/" ? "/index.html" : path;
       try {
         const body = readFileSync(join(this.#dist, file));
-        response.writeHead(200, { "content-type": TYPES[extname(file)] ?? "application/octet-stream", "content-security-policy": POLICY });
+        response.writeHead(200, {
+          "content-type": TYPES[extname(file)] ?? "application/octet-stream",
+          "content-security-policy": POLICY,
+        });
         response.end(body);
       } catch {
         response.writeHead(404).end();
@@ -185,7 +249,11 @@ export class FakeServer {
   /** Ends all sessions by themselves, and says why. */
   endAll(): void {
     for (const session of this.#runs.keys()) {
-      const notice: Notice = { notice: "ended", session, problem: problemOf("the disk is full", "make room and start again") };
+      const notice: Notice = {
+        notice: "ended",
+        session,
+        problem: problemOf("the disk is full", "make room and start again"),
+      };
       for (const socket of this.#sockets?.clients ?? []) socket.send(JSON.stringify(notice));
     }
     this.#runs.clear();
@@ -199,7 +267,14 @@ export class FakeServer {
   #greet(socket: WebSocket): void {
     if (this.entrance !== 204) return socket.terminate();
     const say = (words: unknown): void => socket.send(JSON.stringify(words));
-    say({ notice: "hello", version: 1, program: "sidestep 0.0.0 (made up)", worlds: Object.keys(WORLDS), read_only: false, open: this.open });
+    say({
+      notice: "hello",
+      version: 1,
+      program: "sidestep 0.0.0 (made up)",
+      worlds: Object.keys(WORLDS),
+      read_only: false,
+      open: this.open,
+    });
     const mine = new Set<number>();
     socket.on("message", (data) => {
       const { id, call } = JSON.parse(String(data)) as Request;
@@ -240,11 +315,17 @@ export class FakeServer {
     if (call.do === "runs") return runs();
     if (call.do === "open") {
       const { what } = call;
-      const key = what.kind === "fleet" ? "airspace" : what.kind === "new" ? what.world : what.path.replace("broken", "robots").replace(/\.\w+$/, "");
+      const key =
+        what.kind === "fleet"
+          ? "airspace"
+          : what.kind === "new"
+            ? what.world
+            : what.path.replace("broken", "robots").replace(/\.\w+$/, "");
       const world = WORLDS[key]?.();
       if (!world) throw { ...problemOf("there is no such scenario", "choose another one"), place: key };
       if (what.kind === "recording") world.scene.is_recording = true;
-      if (what.kind === "recording" && call.seed !== null) throw problemOf("a recording has a seed of its own", "open its scenario");
+      if (what.kind === "recording" && call.seed !== null)
+        throw problemOf("a recording has a seed of its own", "open its scenario");
       const run = new Run(this.#next++, world, call.seed, socket);
       run.isFleet = run.playing = what.kind === "fleet";
       this.#runs.set(run.id, run);
@@ -270,12 +351,21 @@ function result(url: string, response: ServerResponse): void {
   const part = fields.get("as");
   // A refusal may be shown in no frame.
   if (fields.get("path") === "broken.run") {
-    return void response.writeHead(422, { "content-type": "text/plain", "x-frame-options": "DENY" }).end("broken.run/run.json: it is cut off\nhelp: record it again\n");
+    return void response
+      .writeHead(422, { "content-type": "text/plain", "x-frame-options": "DENY" })
+      .end("broken.run/run.json: it is cut off\nhelp: record it again\n");
   }
-  if (part === "figures") return void response.writeHead(200, { "content-type": "application/json" }).end('["01-speed"]');
-  const policy = "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; frame-ancestors 'self'";
+  if (part === "figures")
+    return void response.writeHead(200, { "content-type": "application/json" }).end('["01-speed"]');
+  const policy =
+    "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; frame-ancestors 'self'";
   const kept = part === null ? {} : { "content-disposition": `attachment; filename="made-up.${part}"` };
-  response.writeHead(200, { "content-type": "text/html", "content-security-policy": policy, "x-frame-options": "SAMEORIGIN", ...kept });
+  response.writeHead(200, {
+    "content-type": "text/html",
+    "content-security-policy": policy,
+    "x-frame-options": "SAMEORIGIN",
+    ...kept,
+  });
   response.end(`<!doctype html><title>r</title><h1>Report of ${fields.get("path")}</h1><p id="p">no script</p>
   ${fields.get("path") === "sweep" ? VARIANTS : ""}<script>
     document.getElementById("p").textContent = "origin " + origin;
@@ -291,48 +381,97 @@ const VARIANTS = `<div class="wide"><div class="scrolled"><table class="sortable
   <tbody><tr><th scope="row">count = 4</th><td>1</td></tr><tr><th scope="row">0001</th><td>2</td></tr></tbody></table></div></div>`;
 
 function files(folder: string | null): Answer {
-  if (folder !== null) return { is: "files", entries: [{ path: "crowd.toml", name: "crowd.toml", kind: "scenario", about: "Ten thousand robots" }] };
-  return { is: "files", entries: [
-    { path: "more", name: "more", kind: "folder", about: "" },
-    ...["robots", "chain", "airspace"].map((name) => ({ path: `${name}.toml`, name: `${name}.toml`, kind: "scenario" as const, about: "made up" })),
-    { path: "nowhere.toml", name: "nowhere.toml", kind: "scenario", about: "cannot be opened" },
-    { path: "robots.run", name: "robots.run", kind: "run", about: "made up" },
-    { path: "broken.run", name: "broken.run", kind: "run", about: "cut off" },
-    { path: "chain.mcap", name: "chain.mcap", kind: "recording", about: "made up" },
-    { path: "sweep", name: "sweep", kind: "sweep", about: "40 runs" },
-  ] };
+  if (folder !== null)
+    return {
+      is: "files",
+      entries: [{ path: "crowd.toml", name: "crowd.toml", kind: "scenario", about: "Ten thousand robots" }],
+    };
+  return {
+    is: "files",
+    entries: [
+      { path: "more", name: "more", kind: "folder", about: "" },
+      ...["robots", "chain", "airspace"].map((name) => ({
+        path: `${name}.toml`,
+        name: `${name}.toml`,
+        kind: "scenario" as const,
+        about: "made up",
+      })),
+      { path: "nowhere.toml", name: "nowhere.toml", kind: "scenario", about: "cannot be opened" },
+      { path: "robots.run", name: "robots.run", kind: "run", about: "made up" },
+      { path: "broken.run", name: "broken.run", kind: "run", about: "cut off" },
+      { path: "chain.mcap", name: "chain.mcap", kind: "recording", about: "made up" },
+      { path: "sweep", name: "sweep", kind: "sweep", about: "40 runs" },
+    ],
+  };
 }
 
 function runs(): Answer {
-  const run = (variant: string, seed: number, failure = ""): SweepRun =>
-    ({ variant, seed: String(seed), failure, replay: { kind: "scenario", path: "robots.toml" } });
+  const run = (variant: string, seed: number, failure = ""): SweepRun => ({
+    variant,
+    seed: String(seed),
+    failure,
+    replay: { kind: "scenario", path: "robots.toml" },
+  });
   return {
-    is: "runs", name: "Made-up sweep", is_complete: false, left_out: 0,
+    is: "runs",
+    name: "Made-up sweep",
+    is_complete: false,
+    left_out: 0,
     runs: [run("count = 4", 1), run("count = 4", 2), run("count = 8", 1, "the disk is full")],
   };
 }
 
 function act(call: Exclude<Call, { do: "files" | "open" | "runs" | "schema" | "save" }>, run: Run): Answer {
   switch (call.do) {
-    case "play": run.playing = true; run.speed = call.speed; return { is: "done" };
-    case "pause": run.playing = false; return { is: "done" };
-    case "step": run.playing = false; run.goTo(run.cycle + call.cycles); return { is: "done" };
-    case "seek": run.goTo(call.cycle); return { is: "done" };
-    case "look": run.scansOf = call.scans_of; run.goTo(run.cycle); return { is: "done" };
-    case "credit": run.credit += call.frames; run.tick(0); return { is: "done" };
-    case "close": return { is: "done" };
-    case "restart": return restart(run, call.seed, call.text);
-    case "inspect": return { is: "inspection", ...run.world.inspect(call.who, run.cycle) };
-    case "metrics": return metrics(run, call.from);
+    case "play":
+      run.playing = true;
+      run.speed = call.speed;
+      return { is: "done" };
+    case "pause":
+      run.playing = false;
+      return { is: "done" };
+    case "step":
+      run.playing = false;
+      run.goTo(run.cycle + call.cycles);
+      return { is: "done" };
+    case "seek":
+      run.goTo(call.cycle);
+      return { is: "done" };
+    case "look":
+      run.scansOf = call.scans_of;
+      run.goTo(run.cycle);
+      return { is: "done" };
+    case "credit":
+      run.credit += call.frames;
+      run.tick(0);
+      return { is: "done" };
+    case "close":
+      return { is: "done" };
+    case "restart":
+      return restart(run, call.seed, call.text);
+    case "inspect":
+      return { is: "inspection", ...run.world.inspect(call.who, run.cycle) };
+    case "metrics":
+      return metrics(run, call.from);
     case "events": {
       const all = run.world.events(call.from, call.until).slice(call.skip ?? 0);
-      return { is: "events", entries: all.slice(0, call.most), left_out: Math.max(0, all.length - call.most), known_until: call.until };
+      return {
+        is: "events",
+        entries: all.slice(0, call.most),
+        left_out: Math.max(0, all.length - call.most),
+        known_until: call.until,
+      };
     }
-    case "tables": return { is: "tables", names: run.world.scene.is_recording ? ["events", "trajectories"] : [] };
-    case "source": return { is: "source", place: "made-up.toml", text: run.text, read_only: false };
-    case "check": return { is: "problems", problems: check(call.text) };
-    case "edit": return { is: "edited", text: edited(call.text, call.edits) };
-    case "model": return model(call.text);
+    case "tables":
+      return { is: "tables", names: run.world.scene.is_recording ? ["events", "trajectories"] : [] };
+    case "source":
+      return { is: "source", place: "made-up.toml", text: run.text, read_only: false };
+    case "check":
+      return { is: "problems", problems: check(call.text) };
+    case "edit":
+      return { is: "edited", text: edited(call.text, call.edits) };
+    case "model":
+      return model(call.text);
   }
 }
 
@@ -356,9 +495,20 @@ function model(text: string): Answer {
 
 function metrics(run: Run, from: number): Answer {
   const samples = Array.from({ length: Math.floor(run.cycle / 10) + 1 }, (_, i) => 10 * i).slice(from);
-  const names = [["contacts", "contacts per cycle", ""], ["speed", "mean speed", "m/s"], ["group", "largest group", "robots"], ["messages", "messages", "kB"]];
+  const names = [
+    ["contacts", "contacts per cycle", ""],
+    ["speed", "mean speed", "m/s"],
+    ["group", "largest group", "robots"],
+    ["messages", "messages", "kB"],
+  ];
   return {
-    is: "metrics", names: names.map(([key, words, unit]) => ({ key: key!, words: words!, unit: unit! })), first: from, thinned: 0, cycles: samples,
-    values: names.map((_, k) => samples.map((c) => (k === 3 && c < 50 ? null : (k + 1) * (2 + Math.sin(c / (20 + 9 * k)))))),
+    is: "metrics",
+    names: names.map(([key, words, unit]) => ({ key: key!, words: words!, unit: unit! })),
+    first: from,
+    thinned: 0,
+    cycles: samples,
+    values: names.map((_, k) =>
+      samples.map((c) => (k === 3 && c < 50 ? null : (k + 1) * (2 + Math.sin(c / (20 + 9 * k))))),
+    ),
   };
 }

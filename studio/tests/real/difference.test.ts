@@ -43,7 +43,10 @@ describe.skipIf(BINARY === "")("the real program", () => {
     const cycle = Number(/from cycle (\d+) on/.exec(studio.comparison.words)?.[1]);
     expect(cycle).toBeGreaterThan(0);
     expect([a.shown.cycle, b.shown.cycle]).toEqual([cycle, cycle]);
-    const digests = async (at: number): Promise<(string | null | undefined)[]> => [(await a.digestAt(at))?.digest, (await b.digestAt(at))?.digest];
+    const digests = async (at: number): Promise<(string | null | undefined)[]> => [
+      (await a.digestAt(at))?.digest,
+      (await b.digestAt(at))?.digest,
+    ];
     const [one, two] = await digests(cycle);
     expect(one).not.toBe(two);
     const [same, alike] = await digests(cycle - 1);

@@ -101,7 +101,10 @@ describe.skipIf(BINARY === "")("the real program", () => {
     const list = page.locator(".events .list");
     await list.hover();
     await list.evaluate((list) => (list.scrollTop = 0));
-    const rows = page.getByRole("listitem").filter({ hasText: /touches a wall/ }).locator(".cycle");
+    const rows = page
+      .getByRole("listitem")
+      .filter({ hasText: /touches a wall/ })
+      .locator(".cycle");
     const cycles = (await rows.allTextContents()).map((words) => Number(words.replace(/\D/g, "")));
     return Math.min(...cycles);
   }
@@ -150,7 +153,12 @@ describe.skipIf(BINARY === "")("the real program", () => {
     expect(await page.getByRole("textbox", { name: "robot, wall" }).getAttribute("aria-invalid")).toBe("false");
     await page.getByRole("tab", { name: "Text" }).click();
     await page.locator(".cm-lintRange-error").first().waitFor();
-    expect(await page.locator(".cm-line", { has: page.locator(".cm-lintRange-error") }).first().textContent()).toContain("wall = [0.05, 0.4, 0.05]");
+    expect(
+      await page
+        .locator(".cm-line", { has: page.locator(".cm-lintRange-error") })
+        .first()
+        .textContent(),
+    ).toContain("wall = [0.05, 0.4, 0.05]");
     await page.getByRole("tab", { name: "Forms" }).click();
     await page.getByRole("button", { name: "Scale the row wall to 1" }).click();
     await checked();
@@ -171,7 +179,11 @@ describe.skipIf(BINARY === "")("the real program", () => {
       await checked();
     }
     await page.getByRole("button", { name: "sensors: echo" }).click();
-    for (const [row, column, value] of [["nothing", "nothing", "0.96"], ["nothing", "wall", "0.02"], ["nothing", "robot", "0.02"]] as const) {
+    for (const [row, column, value] of [
+      ["nothing", "nothing", "0.96"],
+      ["nothing", "wall", "0.02"],
+      ["nothing", "robot", "0.02"],
+    ] as const) {
       await page.getByRole("textbox", { name: `${row}, ${column}` }).fill(value);
       await page.keyboard.press("Enter");
     }
@@ -184,7 +196,13 @@ describe.skipIf(BINARY === "")("the real program", () => {
     for (const x of [2.25, 3.25]) await hand.click(x, 1.75);
     await checked();
     const text = await saved();
-    for (const comment of ["# A hall with one robot that goes east.", "# nothing errs", "# looks east", "# short", "# What is there is reported nearly always."]) {
+    for (const comment of [
+      "# A hall with one robot that goes east.",
+      "# nothing errs",
+      "# looks east",
+      "# short",
+      "# What is there is reported nearly always.",
+    ]) {
       expect(text).toContain(comment);
     }
     expect(text).toContain("nothing = [0.96, 0.02, 0.02]");
@@ -219,7 +237,10 @@ describe.skipIf(BINARY === "")("the real program", () => {
     ({ page, complaints } = await openPage(browser, program.url));
     hand = new Hand(page);
     await page.getByRole("button", { name: "New…" }).click();
-    await page.getByRole("dialog", { name: /^Draw a new/ }).getByRole("button", { name: "Draw" }).click();
+    await page
+      .getByRole("dialog", { name: /^Draw a new/ })
+      .getByRole("button", { name: "Draw" })
+      .click();
     await page.locator("canvas.layer").waitFor();
     await checked();
     await page.waitForFunction(() => document.querySelector(".agents")?.textContent?.includes("robot"));
@@ -232,7 +253,9 @@ describe.skipIf(BINARY === "")("the real program", () => {
     for (const x of [1.1, 2.6, 7.1, 8.6]) await hand.click(x, 3.1);
     await checked();
     await page.getByRole("button", { name: "Run", exact: true }).click();
-    await page.waitForFunction(() => Number(document.querySelector("[data-testid=cycle]")?.textContent?.replace(/\D/g, "")) >= 5);
+    await page.waitForFunction(
+      () => Number(document.querySelector("[data-testid=cycle]")?.textContent?.replace(/\D/g, "")) >= 5,
+    );
     expect(await page.getByTestId("agent-count").textContent()).toContain("5");
     expect((performance.now() - begun) / 1000).toBeLessThan(120);
     expect(complaints).toEqual([]);
@@ -258,7 +281,10 @@ describe.skipIf(BINARY === "")("the real program", () => {
     await checked();
     expect(await page.getByTestId("agent-count").textContent()).toBe(free);
     await page.getByRole("tab", { name: "Text" }).click();
-    await page.locator(".cm-line", { hasText: /^#{40,}$/ }).first().waitFor();
+    await page
+      .locator(".cm-line", { hasText: /^#{40,}$/ })
+      .first()
+      .waitFor();
   });
 
   test("a polygon and a patrol are put with the mouse, and the program takes them", async () => {
@@ -291,22 +317,25 @@ describe.skipIf(BINARY === "")("the real program", () => {
     return (await page.locator(".banner .digest").textContent())!;
   }
 
-  test.each(["building.toml", "office.toml"])("the walls of %s, taken into the text, give the run that they gave before", async (name) => {
-    const examples = join(SCENARIOS, "..", "examples");
-    for (const one of ["building.yaml", "building.png"]) copyFileSync(join(examples, one), join(folder, one));
-    const from = name === "building.toml" ? join(examples, name) : join(SCENARIOS, "robots", name);
-    writeFileSync(join(folder, name), readFileSync(from, "utf8").replace(/^cycles = .*$/m, "cycles = 300"));
-    await open(name);
-    const before = await digest();
-    expect(before).toMatch(/^[0-9a-f]{32}$/);
-    await page.getByRole("button", { name: "Edit", exact: true }).click();
-    await page.getByRole("button", { name: "Take the walls into the text" }).click();
-    await page.getByRole("button", { name: "Brush", exact: true }).waitFor();
-    await checked();
-    await page.getByRole("button", { name: "Run", exact: true }).click();
-    // It goes as fast as before, to its end.
-    await page.locator("canvas.layer").waitFor({ state: "detached" });
-    expect(await page.locator(".banner .digest").textContent()).toBe(before);
-    expect(complaints).toEqual([]);
-  });
+  test.each(["building.toml", "office.toml"])(
+    "the walls of %s, taken into the text, give the run that they gave before",
+    async (name) => {
+      const examples = join(SCENARIOS, "..", "examples");
+      for (const one of ["building.yaml", "building.png"]) copyFileSync(join(examples, one), join(folder, one));
+      const from = name === "building.toml" ? join(examples, name) : join(SCENARIOS, "robots", name);
+      writeFileSync(join(folder, name), readFileSync(from, "utf8").replace(/^cycles = .*$/m, "cycles = 300"));
+      await open(name);
+      const before = await digest();
+      expect(before).toMatch(/^[0-9a-f]{32}$/);
+      await page.getByRole("button", { name: "Edit", exact: true }).click();
+      await page.getByRole("button", { name: "Take the walls into the text" }).click();
+      await page.getByRole("button", { name: "Brush", exact: true }).waitFor();
+      await checked();
+      await page.getByRole("button", { name: "Run", exact: true }).click();
+      // It goes as fast as before, to its end.
+      await page.locator("canvas.layer").waitFor({ state: "detached" });
+      expect(await page.locator(".banner .digest").textContent()).toBe(before);
+      expect(complaints).toEqual([]);
+    },
+  );
 });

@@ -50,7 +50,10 @@ interface Fleet {
 async function fly(scenario: string, ...more: string[]): Promise<Fleet> {
   const folder = mkdtempSync(join(tmpdir(), "sidestep-fleet-"));
   writeFileSync(join(folder, "s.toml"), scenario);
-  const process = spawn(BINARY, ["fleet", "s.toml", "--clock", "realtime", ...more], { cwd: folder, stdio: ["ignore", "ignore", "pipe"] });
+  const process = spawn(BINARY, ["fleet", "s.toml", "--clock", "realtime", ...more], {
+    cwd: folder,
+    stdio: ["ignore", "ignore", "pipe"],
+  });
   const lines = createInterface({ input: process.stderr! });
   const endpoint = await new Promise<string>((told, failed) => {
     lines.on("line", (line) => {
@@ -86,7 +89,10 @@ describe.skipIf(BINARY === "" || !existsSync(join(dirname(BINARY), "sidestep-lin
     for (const fleet of fleets) await land(fleet);
   });
 
-  async function watch(scenario: string, ...more: string[]): Promise<{ fleet: Fleet } & Awaited<ReturnType<typeof openPage>>> {
+  async function watch(
+    scenario: string,
+    ...more: string[]
+  ): Promise<{ fleet: Fleet } & Awaited<ReturnType<typeof openPage>>> {
     const fleet = await fly(scenario, ...more);
     fleets.push(fleet);
     const program = await Program.start(fleet.endpoint);
@@ -110,9 +116,15 @@ describe.skipIf(BINARY === "" || !existsSync(join(dirname(BINARY), "sidestep-lin
     const { page, complaints } = await watch(RING, "--speed", "4");
     await expect.poll(() => cycle(page), { timeout: WAIT_MS }).toBeGreaterThanOrEqual(2);
     await goesOn(page);
-    await page.getByTestId("fleet").filter({ hasText: /^6 nodes$/ }).waitFor();
+    await page
+      .getByTestId("fleet")
+      .filter({ hasText: /^6 nodes$/ })
+      .waitFor();
     await page.locator(".fleet tbody button").nth(2).click();
-    await page.getByTestId("node").filter({ hasText: /Hears.*airplane/ }).waitFor();
+    await page
+      .getByTestId("node")
+      .filter({ hasText: /Hears.*airplane/ })
+      .waitFor();
     await page.screenshot({ path: "screenshots/real-fleet-1280.png" });
     expect(complaints).toEqual([]);
     await page.context().close();
@@ -123,10 +135,15 @@ describe.skipIf(BINARY === "" || !existsSync(join(dirname(BINARY), "sidestep-lin
     await goesOn(page);
     await page.locator(".fleet tbody button").nth(4).click();
     const facts = page.getByTestId("node");
-    await expect.poll(() => facts.textContent(), { timeout: WAIT_MS }).toMatch(/Hearsconnector 1\/0, connector 1\/2 Is heard byconnector 1\/0, connector 1\/2/);
+    await expect
+      .poll(() => facts.textContent(), { timeout: WAIT_MS })
+      .toMatch(/Hearsconnector 1\/0, connector 1\/2 Is heard byconnector 1\/0, connector 1\/2/);
     await page.screenshot({ path: "screenshots/real-fleet-chains-1280.png" });
     await land(fleet);
-    await page.getByTestId("state").filter({ hasText: /over|ended|failed/ }).waitFor();
+    await page
+      .getByTestId("state")
+      .filter({ hasText: /over|ended|failed/ })
+      .waitFor();
     fleets.push(await fly(CHAINS, "--speed", "0.2", "--cycles", "1000000", "--listen", fleet.endpoint));
     await page.getByTestId("state").filter({ hasText: "flying" }).waitFor();
     await goesOn(page);

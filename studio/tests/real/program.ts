@@ -22,7 +22,9 @@ export class Program {
 
   /** Starts it over a folder; the page comes from `dist` and hands its socket on. */
   static async start(folder: string): Promise<Program> {
-    const child = spawn(BINARY, ["studio", "--no-open", "--port", "0", "--quiet", folder], { stdio: ["ignore", "pipe", "inherit"] });
+    const child = spawn(BINARY, ["studio", "--no-open", "--port", "0", "--quiet", folder], {
+      stdio: ["ignore", "pipe", "inherit"],
+    });
     const lines = createInterface({ input: child.stdout! });
     const server = await new Promise<string>((told, failed) => {
       lines.once("line", (line) => told(line.trim().replace(/\/$/, "")));
@@ -32,7 +34,12 @@ export class Program {
       "/socket": { target: server, ws: true, changeOrigin: true, rewriteWsOrigin: true },
       "/enter": { target: server, changeOrigin: true },
     };
-    const page = await preview({ configFile: false, logLevel: "silent", build: { outDir: "dist" }, preview: { port: 0, host: "127.0.0.1", proxy } });
+    const page = await preview({
+      configFile: false,
+      logLevel: "silent",
+      build: { outDir: "dist" },
+      preview: { port: 0, host: "127.0.0.1", proxy },
+    });
     const address = page.httpServer.address();
     if (typeof address !== "object" || address === null) throw new Error("the page is not served");
     return new Program(`http://127.0.0.1:${address.port}/`, child, page);

@@ -8,12 +8,22 @@ import { BINARY, Program, SCENARIOS as FOLDER } from "./program";
 
 /** Pictures for people to look at; MANY=1 for all widths and themes. */
 const LOOKS = process.env.MANY
-  ? [[1280, false], [1280, true], [400, false], [400, true]] as const
-  : [[1280, false]] as const;
+  ? ([
+      [1280, false],
+      [1280, true],
+      [400, false],
+      [400, true],
+    ] as const)
+  : ([[1280, false]] as const);
 
 const SCENARIOS = [
-  ["robots", "office.toml"], ["robots", "crossing.toml"], ["robots", "radio.toml"],
-  ["chain", "arm.toml"], ["chain", "snake3d.toml"], ["chain", "movers.toml"], ["chain", "serpentine.toml"],
+  ["robots", "office.toml"],
+  ["robots", "crossing.toml"],
+  ["robots", "radio.toml"],
+  ["chain", "arm.toml"],
+  ["chain", "snake3d.toml"],
+  ["chain", "movers.toml"],
+  ["chain", "serpentine.toml"],
   ["airspace", "superconflict.toml"],
 ] as const;
 
@@ -39,13 +49,17 @@ describe.skipIf(BINARY === "")("the real program", () => {
         await page.getByRole("button", { name }).first().click();
         await drawn(page);
         await page.getByRole("button", { name: "Play", exact: true }).click();
-        await page.waitForFunction(() => Number(document.querySelector("[data-testid=cycle]")?.textContent?.replace(/\D/g, "")) >= 20);
+        await page.waitForFunction(
+          () => Number(document.querySelector("[data-testid=cycle]")?.textContent?.replace(/\D/g, "")) >= 20,
+        );
         await page.getByRole("button", { name: "Pause" }).click();
         await page.locator(".agents").getByRole("option").nth(2).click();
         if (width === 400) await page.getByRole("tab", { name: "inspector" }).click();
         await page.locator(".inspector details, .inspector .problem").first().waitFor();
         if (width === 1280) await page.locator(".chart .value").filter({ hasText: /\d/ }).first().waitFor();
-        await page.screenshot({ path: `screenshots/real-${folder}-${name.replace(".toml", "")}-${width}${isDark ? "-dark" : ""}.png` });
+        await page.screenshot({
+          path: `screenshots/real-${folder}-${name.replace(".toml", "")}-${width}${isDark ? "-dark" : ""}.png`,
+        });
         expect(complaints).toEqual([]);
         await page.context().close();
       });

@@ -7,10 +7,24 @@ const sorted = (cells: Cell[]): string[] => cells.map((cell) => cell.join()).sor
 
 describe("boxes", () => {
   test("a line touches every column of a flat one, ends included, whichever way it is drawn", () => {
-    expect(lineCells([0, 0], [6, 2])).toEqual([[0, 0], [1, 0], [2, 1], [3, 1], [4, 1], [5, 2], [6, 2]]);
+    expect(lineCells([0, 0], [6, 2])).toEqual([
+      [0, 0],
+      [1, 0],
+      [2, 1],
+      [3, 1],
+      [4, 1],
+      [5, 2],
+      [6, 2],
+    ]);
     expect(lineCells([3, 3], [3, 3])).toEqual([[3, 3]]);
     expect(lineCells([2, 5], [2, 2]).length).toBe(4);
-    expect(lineCells([4, 4], [0, 0])).toEqual([[4, 4], [3, 3], [2, 2], [1, 1], [0, 0]]);
+    expect(lineCells([4, 4], [0, 0])).toEqual([
+      [4, 4],
+      [3, 3],
+      [2, 2],
+      [1, 1],
+      [0, 0],
+    ]);
   });
 
   test("a rectangle is its border, from any corner, or all of it", () => {
@@ -22,13 +36,22 @@ describe("boxes", () => {
 
   test("a wide brush names each box once", () => {
     expect(sorted(brushed([[5, 5]], 2))).toEqual(["5,5", "5,6", "6,5", "6,6"]);
-    expect(brushed([[5, 5], [6, 5]], 3).length).toBe(12);
+    expect(
+      brushed(
+        [
+          [5, 5],
+          [6, 5],
+        ],
+        3,
+      ).length,
+    ).toBe(12);
     expect(brushed([[5, 5]], 1)).toEqual([[5, 5]]);
   });
 
   test("filling stays within walls, and does not slip through corners", () => {
     const board = new Board("#####\n#.#.#\n##.##\n#...#\n#####\n", 1);
-    const fill = (from: Cell): string[] => sorted(floodCells(from, board.width, board.height, (cell) => board.markAt(cell)));
+    const fill = (from: Cell): string[] =>
+      sorted(floodCells(from, board.width, board.height, (cell) => board.markAt(cell)));
     expect(fill([1, 3])).toEqual(["1,3"]);
     expect(fill([2, 1])).toEqual(["1,1", "2,1", "2,2", "3,1"]);
     expect(floodCells([9, 9], 5, 5, (cell) => board.markAt(cell))).toEqual([]);
@@ -46,20 +69,43 @@ describe("a drawn map", () => {
 
   test("an edit names lines from the top, and only what changes", () => {
     const board = new Board("...\n.#.\n...\n", 1);
-    expect(board.paint([[0, 0], [1, 1], [2, 2], [7, 7]], "#")).toEqual({
-      op: "paint", key: "map.ascii", cells: [[2, 0, "#"], [0, 2, "#"]],
+    expect(
+      board.paint(
+        [
+          [0, 0],
+          [1, 1],
+          [2, 2],
+          [7, 7],
+        ],
+        "#",
+      ),
+    ).toEqual({
+      op: "paint",
+      key: "map.ascii",
+      cells: [
+        [2, 0, "#"],
+        [0, 2, "#"],
+      ],
     });
     expect(board.paint([[1, 1]], "#")).toBe(null);
   });
 
   test("an empty first line, which the program skips, is counted in an edit", () => {
-    expect(new Board("\n..\n..", 1).paint([[0, 0]], "#")).toEqual({ op: "paint", key: "map.ascii", cells: [[2, 0, "#"]] });
+    expect(new Board("\n..\n..", 1).paint([[0, 0]], "#")).toEqual({
+      op: "paint",
+      key: "map.ascii",
+      cells: [[2, 0, "#"]],
+    });
   });
 
   test("boxes and meters agree, on a turned ground too", () => {
     const turned: Ground = { box_m: 0.25, width: 10, height: 10, origin_m: [3, -2], yaw_rad: 0.7 };
     for (const ground of [turned, { ...turned, yaw_rad: 0, origin_m: [0, 0] as const }]) {
-      for (const cell of [[0, 0], [3, 7], [9, 9]] as const) {
+      for (const cell of [
+        [0, 0],
+        [3, 7],
+        [9, 9],
+      ] as const) {
         const [x, y] = placeOf(ground, cell[0] + 0.5, cell[1] + 0.5);
         expect(cellOf(ground, x, y)).toEqual([...cell]);
       }
@@ -70,7 +116,10 @@ describe("a drawn map", () => {
   test("boxes that the picture does not show yet are told, and all where it has another floor", () => {
     const board = new Board("#.?\n..#\n", 1);
     expect(changedCells(board, Uint8Array.from([0, 0, 1, 1, 0, 1]))).toEqual([]);
-    expect(changedCells(board, Uint8Array.from([1, 0, 1, 0, 0, 0]))).toEqual([[0, 0], [0, 1]]);
+    expect(changedCells(board, Uint8Array.from([1, 0, 1, 0, 0, 0]))).toEqual([
+      [0, 0],
+      [0, 1],
+    ]);
     expect(changedCells(board, null).length).toBe(6);
   });
 

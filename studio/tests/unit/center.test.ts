@@ -3,7 +3,11 @@
 import { expect, test } from "vitest";
 import { centerOf, centersOf } from "../../src/state/center";
 
-const [recorded, scenario, fleet] = [{ isFleet: false, folder: "runs/a" }, { isFleet: false, folder: null }, { isFleet: true, folder: null }];
+const [recorded, scenario, fleet] = [
+  { isFleet: false, folder: "runs/a" },
+  { isFleet: false, folder: null },
+  { isFleet: true, folder: null },
+];
 
 test("where a session has no report, or nothing but a picture, the picture is shown and its tab is chosen", () => {
   expect([recorded, scenario, fleet].map((one) => centerOf(one, "report"))).toEqual(["report", "view", "view"]);

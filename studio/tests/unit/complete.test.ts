@@ -22,7 +22,7 @@ describe("what can be written", () => {
 
   test("keys and values of a table in one line", () => {
     expect(labels("robots = [{ size = 1, re|")).toContain("regime");
-    expect(labels('map = { |')).toEqual(["box_size_m", "ascii"]);
+    expect(labels("map = { |")).toEqual(["box_size_m", "ascii"]);
     expect(labels('robots = { regime = "|')).toEqual(['"reliable"', '"both"']);
   });
 

@@ -33,7 +33,12 @@ beforeEach(() => {
   greetings = [];
   heard = [];
   connection = new Connection(
-    { notice: (notice) => heard.push(notice), frame: (bytes) => heard.push(`frame ${bytes.byteLength}`), lost: (n) => heard.push(`lost ${n}`), problem: ({ cause }) => heard.push(`problem ${cause}`) },
+    {
+      notice: (notice) => heard.push(notice),
+      frame: (bytes) => heard.push(`frame ${bytes.byteLength}`),
+      lost: (n) => heard.push(`lost ${n}`),
+      problem: ({ cause }) => heard.push(`problem ${cause}`),
+    },
     {
       open: () => {
         sockets.push(new FakeSocket());
@@ -79,7 +84,9 @@ test("replies find their calls, also out of order", async () => {
   const first = connection.ask({ do: "pause", session: 1 });
   const second = connection.ask({ do: "source", session: 1 });
   expect(JSON.parse(socket.sent[1]!)).toEqual({ id: 2, call: { do: "source", session: 1 } });
-  socket.onmessage!({ data: JSON.stringify({ id: 2, answer: { is: "source", place: "p", text: "t", read_only: false } }) });
+  socket.onmessage!({
+    data: JSON.stringify({ id: 2, answer: { is: "source", place: "p", text: "t", read_only: false } }),
+  });
   socket.onmessage!({ data: JSON.stringify({ id: 1, answer: { is: "done" } }) });
   expect((await first).is).toBe("done");
   expect((await second).is).toBe("source");
@@ -88,7 +95,17 @@ test("replies find their calls, also out of order", async () => {
 test("a refusal carries place, cause and remedy", async () => {
   sockets[0]!.onopen!();
   const call = connection.ask({ do: "pause", session: 9 });
-  const problem = { place: "session 9", line: null, column: null, end_line: null, end_column: null, key: null, cause: "none such", remedy: "open it", is_warning: false };
+  const problem = {
+    place: "session 9",
+    line: null,
+    column: null,
+    end_line: null,
+    end_column: null,
+    key: null,
+    cause: "none such",
+    remedy: "open it",
+    is_warning: false,
+  };
   sockets[0]!.onmessage!({ data: JSON.stringify({ id: 1, problem }) });
   await expect(call).rejects.toMatchObject({ problem });
 });

@@ -7,14 +7,31 @@ import { encodeFrame, type Columns } from "../fake/encode";
 /** A frame of two bodies of the plane and one line of two points, written out by hand. */
 const HEX = [
   "53535446", // "SSTF"
-  "0100", "02", "00", // version 1, two dimensions
-  "07000000", "03000000", // session 7, cast 3
-  "0000000000001440", "000000000000e03f", // cycle 5, 0.5 s
-  "02000000", "01000000", "02000000", "02000000", "04000000", "00000000",
-  "0000803f", "00000040", "00004040", "00008040", // places (1, 2), (3, 4)
-  "0000003f", "000000bf", // headings 0.5, -0.5
-  "00000000", "02000000", // the line has points 0 to 2
-  "0000a040", "0000c040", "0000e040", "00000041", // (5, 6), (7, 8)
+  "0100",
+  "02",
+  "00", // version 1, two dimensions
+  "07000000",
+  "03000000", // session 7, cast 3
+  "0000000000001440",
+  "000000000000e03f", // cycle 5, 0.5 s
+  "02000000",
+  "01000000",
+  "02000000",
+  "02000000",
+  "04000000",
+  "00000000",
+  "0000803f",
+  "00000040",
+  "00004040",
+  "00008040", // places (1, 2), (3, 4)
+  "0000003f",
+  "000000bf", // headings 0.5, -0.5
+  "00000000",
+  "02000000", // the line has points 0 to 2
+  "0000a040",
+  "0000c040",
+  "0000e040",
+  "00000041", // (5, 6), (7, 8)
   "03000000", // touching, plain, padded
   "7b7d", // {}
 ].join("");
@@ -24,7 +41,16 @@ function bytesOf(hex: string): ArrayBuffer {
 }
 
 const SPACE: Columns = {
-  session: 1, cast: 2, dimensions: 3, cycle: 1e15, time_s: 0.02, places_m: [1, 2, 3], turns: [0, 0, 0, 1], lines: [], conditions: [4], leftOut: 9,
+  session: 1,
+  cast: 2,
+  dimensions: 3,
+  cycle: 1e15,
+  time_s: 0.02,
+  places_m: [1, 2, 3],
+  turns: [0, 0, 0, 1],
+  lines: [],
+  conditions: [4],
+  leftOut: 9,
 };
 
 describe("a frame of the plane", () => {
@@ -67,7 +93,11 @@ describe("bytes that are no frame are refused", () => {
     ["cut off at the end", HEX.slice(0, -2), /promises/],
     ["with bytes too many", `${HEX}00`, /promises/],
     ["whose text is not JSON", HEX.slice(0, -4) + "ffff", /not JSON/],
-    ["whose lines do not hold its points", HEX.replace("0000000002000000" + "0000a040", "0000000001000000" + "0000a040"), /points/],
+    [
+      "whose lines do not hold its points",
+      HEX.replace("0000000002000000" + "0000a040", "0000000001000000" + "0000a040"),
+      /points/,
+    ],
   ])("%s", (_, hex, words) => {
     const read = (): unknown => decodeFrame(bytesOf(hex));
     expect(read).toThrow(FrameError);

@@ -16,7 +16,8 @@ async function searched(last: number, parting: number): Promise<{ found: number 
 
 test("every cycle of a run can be the first, and none", async () => {
   for (const last of [0, 1, 2, 3, 100]) {
-    for (let parting = 0; parting <= last; parting++) expect((await searched(last, parting)).found, `${parting} of ${last}`).toBe(parting);
+    for (let parting = 0; parting <= last; parting++)
+      expect((await searched(last, parting)).found, `${parting} of ${last}`).toBe(parting);
     expect((await searched(last, last + 1)).found).toBeNull();
   }
 });
@@ -31,13 +32,25 @@ test("a difference early in a long run is found early", async () => {
 function bodies(numbers: number[]): Bodies {
   const zeros = numbers.map(() => 0);
   return new Bodies({
-    session: 1, cast: 1, kinds: ["robot"], kind: zeros, number: numbers, part: numbers.map(() => -1), is_agent: numbers.map(() => true),
-    names: [], shapes: [{ type: "sphere", radius_m: 1 }], shape: zeros, looks: [], look: zeros,
+    session: 1,
+    cast: 1,
+    kinds: ["robot"],
+    kind: zeros,
+    number: numbers,
+    part: numbers.map(() => -1),
+    is_agent: numbers.map(() => true),
+    names: [],
+    shapes: [{ type: "sphere", radius_m: 1 }],
+    shape: zeros,
+    looks: [],
+    look: zeros,
   } as unknown as Cast);
 }
 
 function frame(places_m: number[], turns: number[], conditions: number[]): Frame {
-  return decodeFrame(encodeFrame({ session: 1, cast: 1, dimensions: 2, cycle: 1, time_s: 0, places_m, turns, lines: [], conditions }));
+  return decodeFrame(
+    encodeFrame({ session: 1, cast: 1, dimensions: 2, cycle: 1, time_s: 0, places_m, turns, lines: [], conditions }),
+  );
 }
 
 test("bodies that differ are found by who they are, whatever their order", () => {
@@ -45,7 +58,11 @@ test("bodies that differ are found by who they are, whatever their order", () =>
   const b = { bodies: bodies([3, 2, 1, 5]), frame: frame([2, 2, 1, 1, 0, 3, 9, 9], [1, 0, 0, 0], [0, 2, 0, 0]) };
   const told = differing(a, b, (m) => `${m} m`).map(({ who, words }) => `${who.number} ${words}`);
   expect(told).toEqual([
-    "1 is 3 m away", "2 is in another condition", "3 heads elsewhere", "4 is in one of them only", "5 is in one of them only",
+    "1 is 3 m away",
+    "2 is in another condition",
+    "3 heads elsewhere",
+    "4 is in one of them only",
+    "5 is in one of them only",
   ]);
 });
 

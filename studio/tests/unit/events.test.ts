@@ -5,7 +5,16 @@ import type { Answer, Event } from "../../src/protocol";
 import { Events } from "../../src/state/events.svelte";
 
 function event(cycle: number, number: number): Event {
-  return { cycle, level: "info", kind: "contact", who: { kind: "robot", number, part: null }, with: null, at_m: null, value: null, words: "" } as Event;
+  return {
+    cycle,
+    level: "info",
+    kind: "contact",
+    who: { kind: "robot", number, part: null },
+    with: null,
+    at_m: null,
+    value: null,
+    words: "",
+  } as Event;
 }
 
 /** The server's answers: of not more than 5000 events, however many are asked for. */
@@ -13,7 +22,12 @@ function server(all: Event[], lost = 0): (from: number, until: number, skip: num
   return (from, until, skip, most) => {
     const there = all.filter(({ cycle }) => cycle >= from && cycle < until).slice(skip);
     const entries = there.slice(0, Math.min(most, 5000));
-    return Promise.resolve({ is: "events", entries, left_out: there.length - entries.length + lost, known_until: until });
+    return Promise.resolve({
+      is: "events",
+      entries,
+      left_out: there.length - entries.length + lost,
+      known_until: until,
+    });
   };
 }
 
@@ -31,7 +45,11 @@ test("a cycle of more events than an answer holds is fetched as a whole", async 
 
 test("a cycle of more events than any answer holds is fetched as a whole, and what comes after it, too", async () => {
   const events = new Events();
-  const all = [event(2, 1), ...Array.from({ length: 6000 }, (_, i) => event(3, i % 100)), ...Array.from({ length: 5000 }, (_, i) => event(4 + i, 1))];
+  const all = [
+    event(2, 1),
+    ...Array.from({ length: 6000 }, (_, i) => event(3, i % 100)),
+    ...Array.from({ length: 5000 }, (_, i) => event(4 + i, 1)),
+  ];
   await events.fetch(9000, server(all));
   expect([events.list.length, events.leftOut]).toEqual([all.length, 0]);
 });

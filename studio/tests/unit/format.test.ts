@@ -6,9 +6,23 @@ import { number, place, share, short, time, valueWords, whoWords, withUnit } fro
 const S = "\u202f";
 
 test.each([
-  [0, "0"], [-0, "0"], [7, "7"], [1234, "1234"], [12_345, `12${S}345`], [1_234_567, `1${S}234${S}567`], [-42, "−42"],
-  [0.5, "0.5"], [1 / 3, "0.3333"], [1234.56, "1235"], [99_999.7, `100${S}000`], [-2.50001, "−2.5"],
-  [0.00012345, "1.23e−4"], [1.5e7 + 0.5, "1.5e7"], [NaN, "–"], [Infinity, "∞"], [-Infinity, "−∞"],
+  [0, "0"],
+  [-0, "0"],
+  [7, "7"],
+  [1234, "1234"],
+  [12_345, `12${S}345`],
+  [1_234_567, `1${S}234${S}567`],
+  [-42, "−42"],
+  [0.5, "0.5"],
+  [1 / 3, "0.3333"],
+  [1234.56, "1235"],
+  [99_999.7, `100${S}000`],
+  [-2.50001, "−2.5"],
+  [0.00012345, "1.23e−4"],
+  [1.5e7 + 0.5, "1.5e7"],
+  [NaN, "–"],
+  [Infinity, "∞"],
+  [-Infinity, "−∞"],
 ])("%s is %s", (value, words) => {
   expect(number(value)).toBe(words);
 });
@@ -19,11 +33,21 @@ test("units stand behind a narrow space", () => {
   expect([1, 2].map((value) => withUnit(value, "cycles"))).toEqual([`1${S}cycle`, `2${S}cycles`]);
 });
 
-test.each([[0.815, `82${S}%`], [0.0123, `1.2${S}%`], [0, `0${S}%`], [1, `100${S}%`]])("the share %s is %s", (value, words) => {
+test.each([
+  [0.815, `82${S}%`],
+  [0.0123, `1.2${S}%`],
+  [0, `0${S}%`],
+  [1, `100${S}%`],
+])("the share %s is %s", (value, words) => {
   expect(share(value)).toBe(words);
 });
 
-test.each([[0.04, `0.04${S}s`], [119.5, `119.5${S}s`], [150, `02:30${S}min`], [3723, `1:02:03${S}h`]])("%s s are %s", (value, words) => {
+test.each([
+  [0.04, `0.04${S}s`],
+  [119.5, `119.5${S}s`],
+  [150, `02:30${S}min`],
+  [3723, `1:02:03${S}h`],
+])("%s s are %s", (value, words) => {
   expect(time(value)).toBe(words);
 });
 

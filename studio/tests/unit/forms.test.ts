@@ -2,7 +2,20 @@ import { describe, expect, test } from "vitest";
 import { differences, condensed } from "../../src/edit/diff";
 import { keyOf, partsOf, sectionsOf, settled, type Table } from "../../src/edit/keypath";
 import { World, unitOf } from "../../src/edit/schema";
-import { chancesOf, columnsOf, entriesOf, freeName, parted, readAny, readNumber, readNumbers, rowsOf, scaled, sumOf, valueEdits } from "../../src/edit/values";
+import {
+  chancesOf,
+  columnsOf,
+  entriesOf,
+  freeName,
+  parted,
+  readAny,
+  readNumber,
+  readNumbers,
+  rowsOf,
+  scaled,
+  sumOf,
+  valueEdits,
+} from "../../src/edit/values";
 import { modelOf, SCHEMA, TEXT } from "../fake/edit";
 
 const world = new World(SCHEMA);
@@ -10,7 +23,12 @@ const model = modelOf(TEXT);
 
 describe("paths of keys", () => {
   test("what is not bare stands in quotes, to and fro", () => {
-    for (const parts of [["robots", "1", "at", "0"], ["kinds", "a.b", "observation"], ["x", 'say "so"'], ["ä", "b c"]]) {
+    for (const parts of [
+      ["robots", "1", "at", "0"],
+      ["kinds", "a.b", "observation"],
+      ["x", 'say "so"'],
+      ["ä", "b c"],
+    ]) {
       expect(partsOf(keyOf(parts))).toEqual(parts);
     }
     expect(keyOf(["kinds", "a.b", "observation"])).toBe('kinds."a.b".observation');
@@ -35,7 +53,13 @@ describe("fields", () => {
     const shape = (path: string[], value?: never): unknown => world.shapeOf(world.at(path)!, value);
     expect(shape(["seed"])).toEqual({ kind: "number", isWhole: true, least: 0, most: null });
     expect(shape(["robots", "0", "count"])).toEqual({ kind: "number", isWhole: true, least: 0, most: null });
-    expect(shape(["robots", "regime"])).toEqual({ kind: "choice", choices: [{ value: "reliable", words: "Nobody's." }, { value: "both", words: "" }] });
+    expect(shape(["robots", "regime"])).toEqual({
+      kind: "choice",
+      choices: [
+        { value: "reliable", words: "Nobody's." },
+        { value: "both", words: "" },
+      ],
+    });
     expect(shape(["record", "events"])).toEqual({ kind: "switch" });
     expect(world.shapeOf(world.at(["robots"])!, undefined).kind).toBe("sections");
     expect(world.shapeOf(world.at(["sensors"])!, undefined).kind).toBe("named");
@@ -45,7 +69,9 @@ describe("fields", () => {
   });
 
   test("units come from the names of keys", () => {
-    expect(["box_size_m", "v_m_s", "heading_deg", "dt_s", "omega_max_deg_s", "seed"].map((key) => unitOf(key))).toEqual(["m", "m/s", "°", "s", "°/s", ""]);
+    expect(["box_size_m", "v_m_s", "heading_deg", "dt_s", "omega_max_deg_s", "seed"].map((key) => unitOf(key))).toEqual(
+      ["m", "m/s", "°", "s", "°/s", ""],
+    );
   });
 
   test("an empty field takes the key away, an equal one changes nothing", () => {
@@ -69,9 +95,17 @@ describe("fields", () => {
   });
 
   test("sections are listed, plain keys told from tables", () => {
-    expect(entriesOf(model, world).map(({ words }) => words)).toEqual(["Scenario", "map", "sensors: echo", "robots 1: couriers"]);
+    expect(entriesOf(model, world).map(({ words }) => words)).toEqual([
+      "Scenario",
+      "map",
+      "sensors: echo",
+      "robots 1: couriers",
+    ]);
     const sensor = (model["sensors"] as Table)["echo"] as Table;
-    expect(parted(world, world.at(["sensors", "echo"]), sensor)).toEqual({ plain: ["observations"], tables: ["confusion"] });
+    expect(parted(world, world.at(["sensors", "echo"]), sensor)).toEqual({
+      plain: ["observations"],
+      tables: ["confusion"],
+    });
     const robots = world.at(["robots", "0"]);
     expect(parted(world, robots, {}).tables).toEqual([]);
   });
@@ -85,10 +119,21 @@ describe("fields", () => {
 describe("rows of numbers", () => {
   test("are known by name or by number, with the names of their columns", () => {
     expect(rowsOf({ wall: [0.1, 0.9] }, ["c"])).toEqual([{ name: "wall", path: ["c", "wall"], values: [0.1, 0.9] }]);
-    expect(rowsOf([[1, 2], [3, 4]], ["at"])?.map(({ name }) => name)).toEqual(["1", "2"]);
+    expect(
+      rowsOf(
+        [
+          [1, 2],
+          [3, 4],
+        ],
+        ["at"],
+      )?.map(({ name }) => name),
+    ).toEqual(["1", "2"]);
     expect(rowsOf([1, 2], ["at"])).toBe(null);
     expect(rowsOf({ a: "b" }, [])).toBe(null);
-    expect(chancesOf([{ p: 0.9, path: "F" }, { p: 0.1 }])).toEqual([{ p: 0.9, rest: { path: "F" } }, { p: 0.1, rest: {} }]);
+    expect(chancesOf([{ p: 0.9, path: "F" }, { p: 0.1 }])).toEqual([
+      { p: 0.9, rest: { path: "F" } },
+      { p: 0.1, rest: {} },
+    ]);
     expect(chancesOf([{ path: "F" }])).toBe(null);
     expect(columnsOf(model, ["sensors", "echo", "confusion"], 3)).toEqual(["nothing", "wall", "robot"]);
     expect(columnsOf(model, ["sensors", "echo", "confusion"], 2)).toEqual(["1", "2"]);

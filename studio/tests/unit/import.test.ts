@@ -17,8 +17,15 @@ test("paths are relative to the folder of the scenario", () => {
 
 test("worlds name what they read", () => {
   const names = (world: string): string[] =>
-    [entry("map", "a.yaml"), entry("map", "b.png"), entry("map", "c.world"), entry("profile", "d.toml"), entry("scenario", "e.toml")]
-      .filter((one) => isNameable(world, one)).map(({ name }) => name);
+    [
+      entry("map", "a.yaml"),
+      entry("map", "b.png"),
+      entry("map", "c.world"),
+      entry("profile", "d.toml"),
+      entry("scenario", "e.toml"),
+    ]
+      .filter((one) => isNameable(world, one))
+      .map(({ name }) => name);
   expect(names("robots")).toEqual(["a.yaml", "b.png", "d.toml"]);
   expect(names("chain")).toEqual(["a.yaml", "c.world"]);
   expect(names("airspace")).toEqual([]);
@@ -27,12 +34,28 @@ test("worlds name what they read", () => {
 test("a map takes the place of another, and a profile stands beside others", () => {
   const keys = (edits: ReturnType<typeof importEdits>): string[] => edits.map(({ op, key }) => `${op} ${key}`);
   const drawn = { map: { ascii: "##", box_size_m: 0.5, resolution_m: 0.1 } };
-  expect(keys(importEdits(drawn, "robots", entry("map", "a.yaml"), "a.yaml"))).toEqual(["remove map.ascii", "remove map.resolution_m", "set map.file"]);
-  expect(keys(importEdits(drawn, "robots", entry("map", "a.png"), "a.png"))).toEqual(["remove map.ascii", "set map.file"]);
-  expect(importEdits({}, "robots", entry("map", "a.png"), "a.png").at(-1)).toEqual({ op: "set", key: "map.resolution_m", value: 0.05 });
-  expect(keys(importEdits({ ground: { corridor: {}, unknown: "solid" } }, "chain", entry("map", "a.world"), "a.world")))
-    .toEqual(["remove ground.corridor", "remove ground.unknown", "set ground.stage"]);
-  expect(importEdits({}, "robots", entry("profile", "p.toml"), "p.toml")).toEqual([{ op: "set", key: "profiles", value: ["p.toml"] }]);
-  expect(importEdits({ profiles: ["q.toml"] }, "robots", entry("profile", "p.toml"), "p.toml")).toEqual([{ op: "insert", key: "profiles", at: null, value: "p.toml" }]);
+  expect(keys(importEdits(drawn, "robots", entry("map", "a.yaml"), "a.yaml"))).toEqual([
+    "remove map.ascii",
+    "remove map.resolution_m",
+    "set map.file",
+  ]);
+  expect(keys(importEdits(drawn, "robots", entry("map", "a.png"), "a.png"))).toEqual([
+    "remove map.ascii",
+    "set map.file",
+  ]);
+  expect(importEdits({}, "robots", entry("map", "a.png"), "a.png").at(-1)).toEqual({
+    op: "set",
+    key: "map.resolution_m",
+    value: 0.05,
+  });
+  expect(
+    keys(importEdits({ ground: { corridor: {}, unknown: "solid" } }, "chain", entry("map", "a.world"), "a.world")),
+  ).toEqual(["remove ground.corridor", "remove ground.unknown", "set ground.stage"]);
+  expect(importEdits({}, "robots", entry("profile", "p.toml"), "p.toml")).toEqual([
+    { op: "set", key: "profiles", value: ["p.toml"] },
+  ]);
+  expect(importEdits({ profiles: ["q.toml"] }, "robots", entry("profile", "p.toml"), "p.toml")).toEqual([
+    { op: "insert", key: "profiles", at: null, value: "p.toml" },
+  ]);
   expect(importEdits({ profiles: ["p.toml"] }, "robots", entry("profile", "p.toml"), "p.toml")).toEqual([]);
 });

@@ -6,7 +6,18 @@ import type { Fleet, Node } from "../../src/protocol";
 
 function node(agent: number, heard: number[], more: Partial<Node> = {}): Node {
   return {
-    agent, who: { kind: "airplane", number: agent, part: null }, heard, state: "done", epoch: 1, round: 2, flown: 3, late: 0, lives: 1, packets_per_s: 4, bytes_per_s: 5, silent_s: 0.1,
+    agent,
+    who: { kind: "airplane", number: agent, part: null },
+    heard,
+    state: "done",
+    epoch: 1,
+    round: 2,
+    flown: 3,
+    late: 0,
+    lives: 1,
+    packets_per_s: 4,
+    bytes_per_s: 5,
+    silent_s: 0.1,
     ...more,
   };
 }
@@ -18,7 +29,10 @@ function fleet(nodes: Node[], has_begun = true): Fleet {
 describe("links", () => {
   test("two that hear each other have one link, and one that is not heard back has a one-sided one", () => {
     const all = fleet([node(0, [1]), node(1, [0]), node(2, [0])]);
-    expect(linksOf(all, null)).toEqual([{ from: 0, to: 1, isMutual: true }, { from: 0, to: 2, isMutual: false }]);
+    expect(linksOf(all, null)).toEqual([
+      { from: 0, to: 1, isMutual: true },
+      { from: 0, to: 2, isMutual: false },
+    ]);
     expect(linksOf(all, 1)).toEqual([{ from: 0, to: 1, isMutual: true }]);
     expect(linksOf(all, 3)).toEqual([]);
   });
@@ -26,7 +40,8 @@ describe("links", () => {
 
 describe("nodes", () => {
   test("are found by the bodies of their agents, also where these are parts", () => {
-    const connector = (agent: number, number: number, part: number): Node => node(agent, [], { who: { kind: "connector", number, part } });
+    const connector = (agent: number, number: number, part: number): Node =>
+      node(agent, [], { who: { kind: "connector", number, part } });
     const all = fleet([connector(0, 0, 0), connector(1, 0, 1), connector(2, 1, 0)]);
     expect(nodeOf(all, { kind: "connector", number: 1, part: 0 })?.agent).toBe(2);
     expect(nodeOf(all, { kind: "connector", number: 0, part: 1 })?.agent).toBe(1);
@@ -34,13 +49,21 @@ describe("nodes", () => {
   });
 
   test("are well, late or away", () => {
-    expect([node(0, []), node(0, [], { silent_s: 3 }), node(0, [], { state: "gone" }), node(0, [], { silent_s: null, state: "awaited" })].map(healthOf))
-      .toEqual(["well", "late", "away", "away"]);
+    expect(
+      [
+        node(0, []),
+        node(0, [], { silent_s: 3 }),
+        node(0, [], { state: "gone" }),
+        node(0, [], { silent_s: null, state: "awaited" }),
+      ].map(healthOf),
+    ).toEqual(["well", "late", "away", "away"]);
   });
 
   test("are told in a few words", () => {
     expect(fleetWords(fleet([node(0, [])]))).toBe("1 node");
-    expect(fleetWords(fleet([node(0, []), node(1, [], { state: "gone" }), node(2, [], { silent_s: 9 })]))).toBe("3 nodes, 1 late, 1 lost");
+    expect(fleetWords(fleet([node(0, []), node(1, [], { state: "gone" }), node(2, [], { silent_s: 9 })]))).toBe(
+      "3 nodes, 1 late, 1 lost",
+    );
     expect(fleetWords(fleet([node(0, [], { state: "awaited" })], false))).toBe("1 node, 1 awaited");
   });
 });

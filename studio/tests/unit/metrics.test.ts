@@ -13,14 +13,20 @@ test("a metric that appears later has no value before", async () => {
   const metrics = new Metrics();
   await metrics.fetch(answered(["a"], 0, [0, 10], [[1, 2]]));
   await metrics.fetch(answered(["a", "b"], 2, [20], [[3], [9]]));
-  expect(metrics.columns).toEqual([[1, 2, 3], [null, null, 9]]);
+  expect(metrics.columns).toEqual([
+    [1, 2, 3],
+    [null, null, 9],
+  ]);
 });
 
 test("a metric that appears before others takes no column of theirs", async () => {
   const metrics = new Metrics();
   await metrics.fetch(answered(["b"], 0, [0, 10], [[1, 2]]));
   await metrics.fetch(answered(["a", "b"], 2, [20], [[9], [3]]));
-  expect(metrics.columns).toEqual([[null, null, 9], [1, 2, 3]]);
+  expect(metrics.columns).toEqual([
+    [null, null, 9],
+    [1, 2, 3],
+  ]);
 });
 
 test("a new name without a new sample has a column all the same", async () => {

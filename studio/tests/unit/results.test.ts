@@ -11,11 +11,21 @@ test("paths are written so that the server reads them as they are", () => {
 });
 
 test("names of files are plain", () => {
-  expect(["Made-up hall", "../a/b", "…", "v1.2 (é)"].map(plainName)).toEqual(["Made-up-hall", "a-b", "sidestep", "v1.2"]);
+  expect(["Made-up hall", "../a/b", "…", "v1.2 (é)"].map(plainName)).toEqual([
+    "Made-up-hall",
+    "a-b",
+    "sidestep",
+    "v1.2",
+  ]);
 });
 
 test("what a report's page asks for is read with care, and found by name or number", () => {
-  const run = (variant: string, seed: string) => ({ variant, seed, failure: "", replay: { kind: "scenario", path: "x" } });
+  const run = (variant: string, seed: string) => ({
+    variant,
+    seed,
+    failure: "",
+    replay: { kind: "scenario", path: "x" },
+  });
   const runs = [run("n=1", "7"), run("n=1", "8"), run("n=2", "7")];
   const found = (data: unknown) => {
     const wanted = wantedRun(data);
@@ -29,6 +39,13 @@ test("what a report's page asks for is read with care, and found by name or numb
 });
 
 test("why there is no result is read from what the server has said", () => {
-  expect(failureOf("r", "r/run.json: it is cut off: 3 bytes\nhelp: record it again\n")).toMatchObject({ place: "r/run.json", cause: "it is cut off: 3 bytes", remedy: "record it again" });
-  expect(failureOf("r", "Only the studio's own page may ask.\n")).toMatchObject({ place: "r", cause: "Only the studio's own page may ask." });
+  expect(failureOf("r", "r/run.json: it is cut off: 3 bytes\nhelp: record it again\n")).toMatchObject({
+    place: "r/run.json",
+    cause: "it is cut off: 3 bytes",
+    remedy: "record it again",
+  });
+  expect(failureOf("r", "Only the studio's own page may ask.\n")).toMatchObject({
+    place: "r",
+    cause: "Only the studio's own page may ask.",
+  });
 });

@@ -16,7 +16,10 @@ test("frames that cannot be read are granted again, at most once a second", () =
   vi.advanceTimersByTime(900);
   expect(calls.length).toBe(1);
   vi.advanceTimersByTime(5000);
-  expect(calls).toEqual([{ do: "credit", frames: 2, session: 1 }, { do: "credit", frames: 2, session: 1 }]);
+  expect(calls).toEqual([
+    { do: "credit", frames: 2, session: 1 },
+    { do: "credit", frames: 2, session: 1 },
+  ]);
   vi.useRealTimers();
 });
 
@@ -26,8 +29,34 @@ test("a session that nobody sees is granted frames slowly, and tells none of the
   const session = new Session({ kind: "new", world: "robots" }, { ask, problem: () => undefined });
   session.id = 1;
   const frame = (cycle: number, leftOut: number): void =>
-    session.takeFrame(encodeFrame({ session: 1, cast: 1, dimensions: 2, cycle, time_s: 0, places_m: [], turns: [], lines: [], conditions: [], leftOut }));
-  session.takeCast({ session: 1, cast: 1, kinds: [], kind: [], number: [], part: [], is_agent: [], names: [], shapes: [], shape: [], looks: [], look: [] } as unknown as Cast);
+    session.takeFrame(
+      encodeFrame({
+        session: 1,
+        cast: 1,
+        dimensions: 2,
+        cycle,
+        time_s: 0,
+        places_m: [],
+        turns: [],
+        lines: [],
+        conditions: [],
+        leftOut,
+      }),
+    );
+  session.takeCast({
+    session: 1,
+    cast: 1,
+    kinds: [],
+    kind: [],
+    number: [],
+    part: [],
+    is_agent: [],
+    names: [],
+    shapes: [],
+    shape: [],
+    looks: [],
+    look: [],
+  } as unknown as Cast);
   session.grantUnseen();
   frame(1, 0);
   frame(2, 20);

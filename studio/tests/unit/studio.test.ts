@@ -8,12 +8,30 @@ import { encodeFrame } from "../fake/encode";
 import { draftOf } from "../../src/edit/draft.svelte";
 import { Studio } from "../../src/state/studio.svelte";
 
-const SCENE = { world: "robots", name: "Hall", dimensions: 2, cycle_s: 0.1, is_recording: false, floor: null, bodies: [] } as unknown as Scene;
+const SCENE = {
+  world: "robots",
+  name: "Hall",
+  dimensions: 2,
+  cycle_s: 0.1,
+  is_recording: false,
+  floor: null,
+  bodies: [],
+} as unknown as Scene;
 
 function status(more: Partial<Status> = {}): Status {
   return {
-    session: 1, state: "paused", cycle: 0, cycles_planned: 1000, time_s: 0, speed: { times: 1 }, cycles_per_s: 0, seed: "7",
-    digest: null, banner: null, fleet: null, ...more,
+    session: 1,
+    state: "paused",
+    cycle: 0,
+    cycles_planned: 1000,
+    time_s: 0,
+    speed: { times: 1 },
+    cycles_per_s: 0,
+    seed: "7",
+    digest: null,
+    banner: null,
+    fleet: null,
+    ...more,
   };
 }
 
@@ -42,16 +60,23 @@ class Line implements Socket {
   /** Answers all questions of a kind that are open. */
   async answer(what: string, answer: unknown): Promise<void> {
     const found = this.asked.filter(({ call }) => call.do === what);
-    for (const { id } of found) this.asked.splice(this.asked.findIndex((one) => one.id === id), 1);
+    for (const { id } of found)
+      this.asked.splice(
+        this.asked.findIndex((one) => one.id === id),
+        1,
+      );
     for (const { id } of found) this.say({ id, answer });
     expect(found.length, `open questions: ${what}`).toBeGreaterThan(0);
     await settled();
   }
 }
 
-const settled = (): Promise<void> => vi.waitFor(() => Promise.resolve()).then(async () => {
-  for (let i = 0; i < 20; i++) await Promise.resolve();
-});
+const settled = (): Promise<void> =>
+  vi
+    .waitFor(() => Promise.resolve())
+    .then(async () => {
+      for (let i = 0; i < 20; i++) await Promise.resolve();
+    });
 const OPENED = { is: "opened", session: 1, scene: SCENE, status: status() };
 
 let lines: Line[];
@@ -81,8 +106,32 @@ const session = () => studio.sessions[0]!;
 const tell = (more: Partial<Status>): void => line().say({ notice: "status", ...status(more) } satisfies Notice);
 
 function show(cycle: number): void {
-  line().say({ notice: "cast", session: 1, cast: 1, kinds: ["robot"], kind: [0], number: [0], part: [-1], is_agent: [true], names: [], shapes: [{ type: "sphere", radius_m: 1 }], shape: [0], looks: [], look: [0] });
-  const frame = encodeFrame({ session: 1, cast: 1, dimensions: 2, cycle, time_s: 0, places_m: [0, 0], turns: [0], lines: [], conditions: [0] });
+  line().say({
+    notice: "cast",
+    session: 1,
+    cast: 1,
+    kinds: ["robot"],
+    kind: [0],
+    number: [0],
+    part: [-1],
+    is_agent: [true],
+    names: [],
+    shapes: [{ type: "sphere", radius_m: 1 }],
+    shape: [0],
+    looks: [],
+    look: [0],
+  });
+  const frame = encodeFrame({
+    session: 1,
+    cast: 1,
+    dimensions: 2,
+    cycle,
+    time_s: 0,
+    places_m: [0, 0],
+    turns: [0],
+    lines: [],
+    conditions: [0],
+  });
   line().onmessage!({ data: frame });
 }
 
@@ -98,7 +147,11 @@ async function back(): Promise<void> {
 }
 
 for (const [how, words] of [
-  ["silent", /does not answer/], ["token", /Open the whole address/], ["full", /is full.*Close one/], ["name", /does not take this address/], ["in", /connection was lost/],
+  ["silent", /does not answer/],
+  ["token", /Open the whole address/],
+  ["full", /is full.*Close one/],
+  ["name", /does not take this address/],
+  ["in", /connection was lost/],
 ] as const) {
   test(`a loss where the server is "${how}" is told as that`, async () => {
     standing = how;
@@ -125,13 +178,26 @@ test("a fleet that was lost is looked for until one flies there again, or its se
   await settled();
   await line().answer("open", { ...OPENED, session: 2 });
   const fleet = studio.sessions[1]!;
-  const problem = { place: "tcp/127.0.0.1:7600", line: null, column: null, end_line: null, end_column: null, key: null, cause: "it was not heard", remedy: "wait", is_warning: false };
+  const problem = {
+    place: "tcp/127.0.0.1:7600",
+    line: null,
+    column: null,
+    end_line: null,
+    end_column: null,
+    key: null,
+    cause: "it was not heard",
+    remedy: "wait",
+    is_warning: false,
+  };
   line().say({ notice: "ended", session: 2, problem });
   expect(fleet.ended?.cause).toBe("it was not heard");
   const looked = retries.length;
   retries.at(-1)!();
   await settled();
-  const { id } = line().asked.splice(line().asked.findIndex(({ call }) => call.do === "open"), 1)[0]!;
+  const { id } = line().asked.splice(
+    line().asked.findIndex(({ call }) => call.do === "open"),
+    1,
+  )[0]!;
   line().say({ id, problem });
   await settled();
   expect([studio.problems, retries.length]).toEqual([[], looked + 1]);
@@ -207,14 +273,20 @@ test("a session that is closed on its way back complains of nothing, and asks fo
 test("a run whose states have no digests is not compared, and the reason is told", async () => {
   void studio.open({ kind: "recording", path: "r" });
   await settled();
-  await line().answer("open", { ...OPENED, session: 2, status: status({ session: 2, banner: "Recorded by another build." }) });
+  await line().answer("open", {
+    ...OPENED,
+    session: 2,
+    status: status({ session: 2, banner: "Recorded by another build." }),
+  });
   tell({ digest: "aa" });
   studio.inStep = true;
   studio.toggleComparison();
   await settled();
   await line().answer("seek", { is: "done" });
   expect(studio.comparison.isRunning).toBe(false);
-  expect(studio.comparison.words).toBe("Hall cannot be compared, as its states have no digests. Recorded by another build.");
+  expect(studio.comparison.words).toBe(
+    "Hall cannot be compared, as its states have no digests. Recorded by another build.",
+  );
 });
 
 test("what is saved after a loss names the text that the page knows, not that of the file by now", async () => {
@@ -226,7 +298,9 @@ test("what is saved after a loss names the text that the page knows, not that of
   await line().answer("open", OPENED);
   void draft.save(null, false);
   await settled();
-  expect(line().calls("save")).toEqual([{ do: "save", session: 1, text: "a = 1", to: null, base: "a = 1", over: false }]);
+  expect(line().calls("save")).toEqual([
+    { do: "save", session: 1, text: "a = 1", to: null, base: "a = 1", over: false },
+  ]);
 });
 
 test("what cannot be opened again is told, and opened the next time", async () => {

@@ -7,7 +7,10 @@ import type { Value } from "../../src/protocol";
 const text = (words: string): Value => ({ text: words });
 
 test("what is the same in all rows becomes a fact", () => {
-  const rows = [[text("sonar"), text("0°")], [text("sonar"), text("90°")]];
+  const rows = [
+    [text("sonar"), text("0°")],
+    [text("sonar"), text("90°")],
+  ];
   expect(lifted({ columns: ["sensor", "beam"], rows })).toEqual({
     same: [{ label: "sensor", value: text("sonar") }],
     columns: ["beam"],

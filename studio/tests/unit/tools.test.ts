@@ -12,7 +12,17 @@ const ground = groundOf(board, null)!;
 
 describe("robots", () => {
   const model: Table = {
-    robots: [{ at: [[1, 1], [3, 1, 2]], size: 2, behaviour: { kind: "goto", goals: [[4, 2]] } }, { count: 3, region: [1, 1, 4, 2] }],
+    robots: [
+      {
+        at: [
+          [1, 1],
+          [3, 1, 2],
+        ],
+        size: 2,
+        behaviour: { kind: "goto", goals: [[4, 2]] },
+      },
+      { count: 3, region: [1, 1, 4, 2] },
+    ],
     people: { at: [[1, 2]], size: [1, 2] },
   };
   const items = robotItems(model, ground);
@@ -20,7 +30,12 @@ describe("robots", () => {
 
   test("stand where the program puts them: around the middle of their boxes", () => {
     expect(item("robots.0.at.0").at_m).toEqual([1, 1, 0]);
-    expect(item("robots.0.at.0").outline_m).toEqual([[0.5, 0.5, 0], [1.5, 0.5, 0], [1.5, 1.5, 0], [0.5, 1.5, 0]]);
+    expect(item("robots.0.at.0").outline_m).toEqual([
+      [0.5, 0.5, 0],
+      [1.5, 0.5, 0],
+      [1.5, 1.5, 0],
+      [0.5, 1.5, 0],
+    ]);
     expect(item("people.at.0").at_m).toEqual([0.75, 1.5, 0]);
     expect(item("robots.0.behaviour.goals.0").at_m).toEqual([2.25, 1.25, 0]);
     expect(items.length).toBe(5);
@@ -30,7 +45,9 @@ describe("robots", () => {
     expect(item("robots.0.at.0").move([1.3, 1.2, 0])).toEqual([{ op: "set", key: "robots.0.at.0", value: [2, 1] }]);
     expect(item("robots.0.at.0").move([1, 1, 0])).toEqual([{ op: "set", key: "robots.0.at.0", value: [1, 1] }]);
     expect(item("robots.0.at.1").move([1, 1, 0])).toEqual([{ op: "set", key: "robots.0.at.1", value: [1, 1, 2] }]);
-    expect(item("robots.1.region").move([2, 1, 0])).toEqual([{ op: "set", key: "robots.1.region", value: [2, 1, 4, 2] }]);
+    expect(item("robots.1.region").move([2, 1, 0])).toEqual([
+      { op: "set", key: "robots.1.region", value: [2, 1, 4, 2] },
+    ]);
   });
 
   test("are turned by quarters, from east", () => {
@@ -44,7 +61,9 @@ describe("robots", () => {
   });
 
   test("are put beside those that are chosen, never beside counted ones", () => {
-    expect(putBody(model, "robots", [2, 2], null)).toEqual([{ op: "insert", key: "robots.0.at", at: null, value: [2, 2] }]);
+    expect(putBody(model, "robots", [2, 2], null)).toEqual([
+      { op: "insert", key: "robots.0.at", at: null, value: [2, 2] },
+    ]);
     const [first] = putBody({ robots: { count: 4 } }, "robots", [2, 2], null);
     expect(first).toMatchObject({ op: "insert", key: "robots", value: { at: [[2, 2]], size: 2 } });
     expect(around([5, 5], 2)).toEqual([5, 5]);
@@ -54,21 +73,49 @@ describe("robots", () => {
   test("a door takes the wall away that it stands in, and joins those of its size", () => {
     const rect = { column: 5, row: 1, width: 1, height: 2 };
     const [way, door] = putDoor(model, board, rect);
-    expect(way).toEqual({ op: "paint", key: "map.ascii", cells: [[2, 5, "."], [1, 5, "."]] });
+    expect(way).toEqual({
+      op: "paint",
+      key: "map.ascii",
+      cells: [
+        [2, 5, "."],
+        [1, 5, "."],
+      ],
+    });
     expect(door).toMatchObject({ op: "insert", key: "doors", value: { at: [[5, 1]], size: [1, 2] } });
     const more = putDoor({ doors: { at: [[0, 1]], size: [1, 2] } }, board, rect);
     expect(more[1]).toEqual({ op: "insert", key: "doors.at", at: null, value: [5, 1] });
   });
 
   test("a way-point is added to the goals, or makes robots go somewhere", () => {
-    expect(putGoal(model, [2, 1], null)).toEqual([{ op: "insert", key: "robots.0.behaviour.goals", at: null, value: [2, 1] }]);
-    expect(putGoal(model, [2, 1], ["robots", 1])).toEqual([{ op: "set", key: "robots.1.behaviour", value: { kind: "goto", goals: [[2, 1]], repeat: true } }]);
+    expect(putGoal(model, [2, 1], null)).toEqual([
+      { op: "insert", key: "robots.0.behaviour.goals", at: null, value: [2, 1] },
+    ]);
+    expect(putGoal(model, [2, 1], ["robots", 1])).toEqual([
+      { op: "set", key: "robots.1.behaviour", value: { kind: "goto", goals: [[2, 1]], repeat: true } },
+    ]);
   });
 });
 
 describe("chains", () => {
   const model: Table = {
-    obstacles: [{ at_m: [4, 1.5], radius_m: 0.5 }, { ends_m: [[2, -2], [5, -1]], radius_m: 0.2 }, { at_m: [7, 1], size_m: [2, 1], turn_deg: 90 }, { corners_m: [[0, 0], [1, 0], [0, 1]] }],
+    obstacles: [
+      { at_m: [4, 1.5], radius_m: 0.5 },
+      {
+        ends_m: [
+          [2, -2],
+          [5, -1],
+        ],
+        radius_m: 0.2,
+      },
+      { at_m: [7, 1], size_m: [2, 1], turn_deg: 90 },
+      {
+        corners_m: [
+          [0, 0],
+          [1, 0],
+          [0, 1],
+        ],
+      },
+    ],
     chains: { at_m: [0, 0], tasks: [{ kind: "targets", targets_m: [[12, 0]] }] },
   };
   const items = chainItems(model, 0.01);
@@ -85,8 +132,19 @@ describe("chains", () => {
   });
 
   test("a wall moves as a whole, an end alone", () => {
-    expect(item("obstacles.1").move([4.5, -1.5, 0])).toEqual([{ op: "set", key: "obstacles.1.ends_m", value: [[3, -2], [6, -1]] }]);
-    expect(item("obstacles.1.ends_m.0").move([2.004, -2.5, 0])).toEqual([{ op: "set", key: "obstacles.1.ends_m.0", value: [2, -2.5] }]);
+    expect(item("obstacles.1").move([4.5, -1.5, 0])).toEqual([
+      {
+        op: "set",
+        key: "obstacles.1.ends_m",
+        value: [
+          [3, -2],
+          [6, -1],
+        ],
+      },
+    ]);
+    expect(item("obstacles.1.ends_m.0").move([2.004, -2.5, 0])).toEqual([
+      { op: "set", key: "obstacles.1.ends_m.0", value: [2, -2.5] },
+    ]);
     expect(item("obstacles.0").move([1, 1, 0])).toEqual([{ op: "set", key: "obstacles.0.at_m", value: [1, 1] }]);
   });
 
@@ -96,8 +154,17 @@ describe("chains", () => {
   });
 
   test("new ones are written as people write them", () => {
-    expect(putBall([1.23456, 2, 0], 0.5, 0.01)).toEqual([{ op: "insert", key: "obstacles", at: null, value: { at_m: [1.23, 2], radius_m: 0.5 } }]);
-    expect(putWall([0, 0, 0], [1, 1, 0], 0.01)[0]).toMatchObject({ value: { ends_m: [[0, 0], [1, 1]] } });
+    expect(putBall([1.23456, 2, 0], 0.5, 0.01)).toEqual([
+      { op: "insert", key: "obstacles", at: null, value: { at_m: [1.23, 2], radius_m: 0.5 } },
+    ]);
+    expect(putWall([0, 0, 0], [1, 1, 0], 0.01)[0]).toMatchObject({
+      value: {
+        ends_m: [
+          [0, 0],
+          [1, 1],
+        ],
+      },
+    });
     expect(putBox([0, 2, 0], [1, 0, 0], 0.01)[0]).toMatchObject({ value: { at_m: [0.5, 1], size_m: [1, 2] } });
     expect(putBox([0, 0, 0], [1, 0, 0], 0.01)).toEqual([]);
     expect(putWall([0, 0, 0], [0, 0, 0], 0.01)).toEqual([]);
@@ -105,9 +172,21 @@ describe("chains", () => {
 
   test("a polygon begins as a triangle, and gets its corners in the edge that is nearest", () => {
     const [triangle] = putPolygon(model, [0, 0, 0], [2, 0, 0], null, 0.01);
-    expect(triangle).toEqual({ op: "insert", key: "obstacles", at: null, value: { corners_m: [[0, 0], [2, 0], [1, 1.6]] } });
+    expect(triangle).toEqual({
+      op: "insert",
+      key: "obstacles",
+      at: null,
+      value: {
+        corners_m: [
+          [0, 0],
+          [2, 0],
+          [1, 1.6],
+        ],
+      },
+    });
     expect(putPolygon(model, [0, 0, 0], [0, 0, 0], null, 0.01)).toEqual([]);
-    const corner = (x: number, y: number) => putPolygon(model, [x, y, 0], [x, y, 0], ["obstacles", 3, "corners_m", 1], 0.01);
+    const corner = (x: number, y: number) =>
+      putPolygon(model, [x, y, 0], [x, y, 0], ["obstacles", 3, "corners_m", 1], 0.01);
     expect(corner(0.5, -0.2)).toEqual([{ op: "insert", key: "obstacles.3.corners_m", at: 1, value: [0.5, -0.2] }]);
     expect(corner(0.7, 0.7)).toMatchObject([{ at: 2 }]);
     expect(corner(-0.3, 0.5)).toMatchObject([{ at: 3 }]);
@@ -115,37 +194,117 @@ describe("chains", () => {
 
   test("a patrol begins where the obstacle is, goes on with each click, and takes the place of a straight way", () => {
     expect(putPatrol(model, [5, 2, 0], ["obstacles", 0], 0.01)).toEqual([
-      { op: "set", key: "obstacles.0.patrol_m", value: [[4, 1.5], [5, 2]] },
+      {
+        op: "set",
+        key: "obstacles.0.patrol_m",
+        value: [
+          [4, 1.5],
+          [5, 2],
+        ],
+      },
       { op: "set", key: "obstacles.0.speed_m_s", value: 0.5 },
     ]);
-    const moving: Table = { obstacles: { at_m: [1, 1], radius_m: 1, patrol_m: [[1, 1], [2, 2]] } };
-    expect(putPatrol(moving, [3, 3, 0], null, 0.01)).toEqual([{ op: "insert", key: "obstacles.patrol_m", at: null, value: [3, 3] }]);
-    const straight: Table = { obstacles: [{ at_m: [1, 1], velocity_m_s: [1, 0] }, { ends_m: [[0, 0], [1, 1]] }] };
-    expect(putPatrol(straight, [3, 3, 0], ["obstacles", 1], 0.01).map((edit) => edit.op)).toEqual(["remove", "set", "set"]);
-    expect(putPatrol({ obstacles: { ends_m: [[0, 0], [1, 1]] } }, [3, 3, 0], null, 0.01)).toEqual([]);
+    const moving: Table = {
+      obstacles: {
+        at_m: [1, 1],
+        radius_m: 1,
+        patrol_m: [
+          [1, 1],
+          [2, 2],
+        ],
+      },
+    };
+    expect(putPatrol(moving, [3, 3, 0], null, 0.01)).toEqual([
+      { op: "insert", key: "obstacles.patrol_m", at: null, value: [3, 3] },
+    ]);
+    const straight: Table = {
+      obstacles: [
+        { at_m: [1, 1], velocity_m_s: [1, 0] },
+        {
+          ends_m: [
+            [0, 0],
+            [1, 1],
+          ],
+        },
+      ],
+    };
+    expect(putPatrol(straight, [3, 3, 0], ["obstacles", 1], 0.01).map((edit) => edit.op)).toEqual([
+      "remove",
+      "set",
+      "set",
+    ]);
+    expect(
+      putPatrol(
+        {
+          obstacles: {
+            ends_m: [
+              [0, 0],
+              [1, 1],
+            ],
+          },
+        },
+        [3, 3, 0],
+        null,
+        0.01,
+      ),
+    ).toEqual([]);
   });
 });
 
 describe("chains in space", () => {
   const model: Table = {
-    obstacles: [{ at_m: [1, 2, 3], radius_m: 0.5 }, { at_m: [0, 0, 1], size_m: [2, 4, 6], turn_deg: 90 }, { ends_m: [[0, 0, 0], [2, 0, 4]], radius_m: 0.1 }],
+    obstacles: [
+      { at_m: [1, 2, 3], radius_m: 0.5 },
+      { at_m: [0, 0, 1], size_m: [2, 4, 6], turn_deg: 90 },
+      {
+        ends_m: [
+          [0, 0, 0],
+          [2, 0, 4],
+        ],
+        radius_m: 0.1,
+      },
+    ],
     chains: { at_m: [0, 0, 1], tasks: [{ kind: "reach", targets_m: [[5, 6, 7]] }] },
   };
   const items = chainItems(model, 0.01, 3);
   const item = (key: string): (typeof items)[number] => items.find(({ path }) => path.join(".") === key)!;
 
   test("all that has a place keeps its three numbers when it is moved", () => {
-    expect(item("obstacles.0").move([1.504, 2, 3.25])).toEqual([{ op: "set", key: "obstacles.0.at_m", value: [1.5, 2, 3.25] }]);
-    expect(item("obstacles.2").move([2, 0, 3])).toEqual([{ op: "set", key: "obstacles.2.ends_m", value: [[1, 0, 1], [3, 0, 5]] }]);
-    expect(item("obstacles.2.ends_m.1").move([2, 1, 4])).toEqual([{ op: "set", key: "obstacles.2.ends_m.1", value: [2, 1, 4] }]);
+    expect(item("obstacles.0").move([1.504, 2, 3.25])).toEqual([
+      { op: "set", key: "obstacles.0.at_m", value: [1.5, 2, 3.25] },
+    ]);
+    expect(item("obstacles.2").move([2, 0, 3])).toEqual([
+      {
+        op: "set",
+        key: "obstacles.2.ends_m",
+        value: [
+          [1, 0, 1],
+          [3, 0, 5],
+        ],
+      },
+    ]);
+    expect(item("obstacles.2.ends_m.1").move([2, 1, 4])).toEqual([
+      { op: "set", key: "obstacles.2.ends_m.1", value: [2, 1, 4] },
+    ]);
     expect(item("chains.at_m").move([0, 0, 2])).toEqual([{ op: "set", key: "chains.at_m", value: [0, 0, 2] }]);
-    expect(item("chains.tasks.0.targets_m.0").move([5, 6, 8])).toEqual([{ op: "set", key: "chains.tasks.0.targets_m.0", value: [5, 6, 8] }]);
+    expect(item("chains.tasks.0.targets_m.0").move([5, 6, 8])).toEqual([
+      { op: "set", key: "chains.tasks.0.targets_m.0", value: [5, 6, 8] },
+    ]);
   });
 
   test("outlines hold the whole body, and places of the plane have none here", () => {
-    const reach = (key: string, k: number): number[] => [Math.min, Math.max].map((most) => Number(most(...item(key).outline_m.map((p) => p[k]!)).toFixed(9)));
-    expect([0, 1, 2].map((k) => reach("obstacles.0", k))).toEqual([[0.5, 1.5], [1.5, 2.5], [2.5, 3.5]]);
-    expect([0, 1, 2].map((k) => reach("obstacles.1", k))).toEqual([[-2, 2], [-1, 1], [-2, 4]]);
+    const reach = (key: string, k: number): number[] =>
+      [Math.min, Math.max].map((most) => Number(most(...item(key).outline_m.map((p) => p[k]!)).toFixed(9)));
+    expect([0, 1, 2].map((k) => reach("obstacles.0", k))).toEqual([
+      [0.5, 1.5],
+      [1.5, 2.5],
+      [2.5, 3.5],
+    ]);
+    expect([0, 1, 2].map((k) => reach("obstacles.1", k))).toEqual([
+      [-2, 2],
+      [-1, 1],
+      [-2, 4],
+    ]);
     expect(chainItems({ obstacles: [{ at_m: [1, 2], radius_m: 1 }] }, 0.01, 3)).toEqual([]);
   });
 
@@ -170,23 +329,46 @@ describe("chains in space", () => {
 });
 
 describe("airplanes", () => {
-  const model: Table = { airplanes: [{ callsign: "ONE1", at_m: [-5000, 0], heading_deg: 0, way_points_m: [[0, 500], [5000, 0]] }, { track: [[0, 0, 0, 0]] }] };
+  const model: Table = {
+    airplanes: [
+      {
+        callsign: "ONE1",
+        at_m: [-5000, 0],
+        heading_deg: 0,
+        way_points_m: [
+          [0, 500],
+          [5000, 0],
+        ],
+      },
+      { track: [[0, 0, 0, 0]] },
+    ],
+  };
 
   test("have starts and way-points; recorded ones have none", () => {
     const items = airplaneItems(model, 20);
-    expect(items.map(({ path }) => path.join("."))).toEqual(["airplanes.0", "airplanes.0.way_points_m.0", "airplanes.0.way_points_m.1"]);
-    expect(items[1]!.move([100.4, 400, 0])).toEqual([{ op: "set", key: "airplanes.0.way_points_m.0", value: [100, 400] }]);
+    expect(items.map(({ path }) => path.join("."))).toEqual([
+      "airplanes.0",
+      "airplanes.0.way_points_m.0",
+      "airplanes.0.way_points_m.1",
+    ]);
+    expect(items[1]!.move([100.4, 400, 0])).toEqual([
+      { op: "set", key: "airplanes.0.way_points_m.0", value: [100, 400] },
+    ]);
     expect(items[0]!.turn!()).toEqual([{ op: "set", key: "airplanes.0.heading_deg", value: 90 }]);
   });
 
   test("fly from where the drag began to where it ended, counterclockwise from east", () => {
     expect(headingTo([0, 0, 0], [0, 10, 0])).toBe(90);
     expect(headingTo([0, 0, 0], [-10, 0, 0])).toBe(180);
-    expect(putAirplane([0, 0, 0], [0, 3000.4, 0], 20)).toEqual([{ op: "insert", key: "airplanes", at: null, value: { at_m: [0, 0], heading_deg: 90, way_points_m: [[0, 3000]] } }]);
+    expect(putAirplane([0, 0, 0], [0, 3000.4, 0], 20)).toEqual([
+      { op: "insert", key: "airplanes", at: null, value: { at_m: [0, 0], heading_deg: 90, way_points_m: [[0, 3000]] } },
+    ]);
   });
 
   test("a way-point goes to the chosen one, else to the last that is not recorded", () => {
-    expect(putWayPoint(model, [1, 2, 0], null, 1)).toEqual([{ op: "insert", key: "airplanes.0.way_points_m", at: null, value: [1, 2] }]);
+    expect(putWayPoint(model, [1, 2, 0], null, 1)).toEqual([
+      { op: "insert", key: "airplanes.0.way_points_m", at: null, value: [1, 2] },
+    ]);
     expect(putWayPoint({}, [1, 2, 0], null, 1)).toEqual([]);
   });
 });

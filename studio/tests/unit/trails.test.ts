@@ -10,7 +10,11 @@ test("places follow each other, and standing still adds none", () => {
   trails.push(0, at(0, 0, 9, 9));
   trails.push(1, at(1, 0, 9, 9));
   trails.push(2, at(2, 0, 9, 9));
-  expect(trails.of(0)).toEqual([[0, 0], [1, 0], [2, 0]]);
+  expect(trails.of(0)).toEqual([
+    [0, 0],
+    [1, 0],
+    [2, 0],
+  ]);
   expect(trails.of(1)).toEqual([[9, 9]]);
 });
 
@@ -26,7 +30,11 @@ test("going back takes away what is later, also where the ring has turned", () =
   const trails = new Trails(1, 2);
   for (let c = 0; c < trails.length + 5; c++) trails.push(c, at(c, 0));
   trails.push(7, at(7, 0));
-  expect(trails.of(0)).toEqual([[5, 0], [6, 0], [7, 0]]);
+  expect(trails.of(0)).toEqual([
+    [5, 0],
+    [6, 0],
+    [7, 0],
+  ]);
   trails.push(8, at(8, 1));
   expect(trails.of(0).at(-1)).toEqual([8, 1]);
 });

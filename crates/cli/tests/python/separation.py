@@ -80,6 +80,15 @@ for legs in ways.values():
 
 names = sorted(ways)
 pairs = [pair(a, b) for k, a in enumerate(names) for b in names[k + 1 :]]
-print(json.dumps({"joints": joints, "pairs": [p for p in pairs if p], "ends": {
-    name: [legs[-1]["x_m"], legs[-1]["y_m"], legs[-1]["until_s"] - legs[-1]["from_s"]]
-    for name, legs in ways.items()}}))
+print(
+    json.dumps(
+        {
+            "joints": joints,
+            "pairs": [p for p in pairs if p],
+            "ends": {
+                name: [legs[-1]["x_m"], legs[-1]["y_m"], legs[-1]["until_s"] - legs[-1]["from_s"]]
+                for name, legs in ways.items()
+            },
+        }
+    )
+)

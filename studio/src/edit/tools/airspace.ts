@@ -31,13 +31,28 @@ export function airplaneItems(model: Table, m_per_px: number): Item[] {
     const round = ([x, y]: Place): number[] => [rounded(x, m_per_px), rounded(y, m_per_px)];
     const route = routeOf(value);
     const own: Item = {
-      path, words: `${words}, its start`, kind: "start", outline_m: [start, ...route.map(({ at }) => at)], isClosed: false, at_m: start,
+      path,
+      words: `${words}, its start`,
+      kind: "start",
+      outline_m: [start, ...route.map(({ at }) => at)],
+      isClosed: false,
+      at_m: start,
       move: (to) => [set([...path, "at_m"], round(to))],
       remove: () => [remove(path)],
-      turn: () => [set([...path, "heading_deg"], ((typeof value["heading_deg"] === "number" ? value["heading_deg"] : 0) + 90) % 360)],
+      turn: () => [
+        set(
+          [...path, "heading_deg"],
+          ((typeof value["heading_deg"] === "number" ? value["heading_deg"] : 0) + 90) % 360,
+        ),
+      ],
     };
     const points = route.map(({ at, index }): Item => ({
-      path: [...path, "way_points_m", index], words: `way-point ${index + 1} of ${words}`, kind: "goal", outline_m: [at], isClosed: false, at_m: at,
+      path: [...path, "way_points_m", index],
+      words: `way-point ${index + 1} of ${words}`,
+      kind: "goal",
+      outline_m: [at],
+      isClosed: false,
+      at_m: at,
       move: (to) => [set([...path, "way_points_m", index], round(to))],
       remove: () => removeFrom(path, "way_points_m", index, value),
     }));

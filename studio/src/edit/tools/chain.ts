@@ -30,15 +30,23 @@ function written(at: Place, { dimensions, m_per_px }: Script): number[] {
 /** A point that is moved alone. */
 function handle(path: Path, words: string, kind: Item["kind"], at: Place, script: Script, removes: () => Edit[]): Item {
   return {
-    path, words, kind, outline_m: [at], isClosed: false, at_m: at,
-    move: (to) => [set(path, written(to, script))], remove: removes,
+    path,
+    words,
+    kind,
+    outline_m: [at],
+    isClosed: false,
+    at_m: at,
+    move: (to) => [set(path, written(to, script))],
+    remove: removes,
   };
 }
 
 /** Everything of a scenario of chains that has a place of its own. */
 export function chainItems(model: Table, m_per_px: number, dimensions: 2 | 3 = 2): Item[] {
   const script = { dimensions, m_per_px };
-  const obstacles = sectionsOf(model, "obstacles").flatMap(({ path, value }, i) => obstacleItems(path, value, i, script));
+  const obstacles = sectionsOf(model, "obstacles").flatMap(({ path, value }, i) =>
+    obstacleItems(path, value, i, script),
+  );
   const chains = sectionsOf(model, "chains").flatMap(({ path, value }, i) => startItems(path, value, i, script));
   return [...obstacles, ...chains];
 }
@@ -47,17 +55,27 @@ function obstacleItems(path: Path, value: Table, number: number, script: Script)
   const words = `obstacle ${number + 1}`;
   const gone = (): Edit[] => [remove(path)];
   const way = pointsOf(value["patrol_m"], script).map((at, i) =>
-    handle([...path, "patrol_m", i], `way-point ${i + 1} of ${words}`, "goal", at, script, () => removeFrom(path, "patrol_m", i, value)),
+    handle([...path, "patrol_m", i], `way-point ${i + 1} of ${words}`, "goal", at, script, () =>
+      removeFrom(path, "patrol_m", i, value),
+    ),
   );
   const at = pointOf(value["at_m"], script);
   if (at) {
-    const own: Item = { ...handle([...path, "at_m"], words, "body", at, script, gone), path, ...outlineOf(value, at, script) };
+    const own: Item = {
+      ...handle([...path, "at_m"], words, "body", at, script, gone),
+      path,
+      ...outlineOf(value, at, script),
+    };
     return [own, ...way];
   }
   const key = value["ends_m"] !== undefined ? "ends_m" : "corners_m";
   const points = pointsOf(value[key], script);
   if (points.length < 2) return way;
-  return [whole(path, key, words, points, key === "corners_m", script), ...corners(path, key, words, points, value, script), ...way];
+  return [
+    whole(path, key, words, points, key === "corners_m", script),
+    ...corners(path, key, words, points, value, script),
+    ...way,
+  ];
 }
 
 /** The outline of a ball or a box: in space, its circles or its edges in one stroke. */
@@ -79,23 +97,38 @@ function cage([x, y, z]: Place, [width, depth, height]: readonly number[], turn_
 /** Three circles of a ball, each from where the one before ends. */
 function globe([x, y, z]: Place, radius_m: number): Place[] {
   const steps = 24;
-  const circle = (u: 0 | 1 | 2, v: 0 | 1 | 2): Place[] => Array.from({ length: steps + steps / 4 + 1 }, (_, i) => {
-    const angle = (2 * Math.PI * i) / steps;
-    const place: Place = [x, y, z];
-    place[u] += radius_m * Math.cos(angle);
-    place[v] += radius_m * Math.sin(angle);
-    return place;
-  });
+  const circle = (u: 0 | 1 | 2, v: 0 | 1 | 2): Place[] =>
+    Array.from({ length: steps + steps / 4 + 1 }, (_, i) => {
+      const angle = (2 * Math.PI * i) / steps;
+      const place: Place = [x, y, z];
+      place[u] += radius_m * Math.cos(angle);
+      place[v] += radius_m * Math.sin(angle);
+      return place;
+    });
   return [...circle(0, 1), ...circle(1, 2), ...circle(2, 0)];
 }
 
 /** A wall or a polygon as a whole: all of its points go the same way. */
 function whole(path: Path, key: string, words: string, points: Place[], isClosed: boolean, script: Script): Item {
   const middle = [0, 1, 2].map((k) => points.reduce((sum, p) => sum + p[k]!, 0) / points.length) as Place;
-  const moved = (p: Place, to: Place): Place => [p[0] + to[0] - middle[0], p[1] + to[1] - middle[1], p[2] + to[2] - middle[2]];
+  const moved = (p: Place, to: Place): Place => [
+    p[0] + to[0] - middle[0],
+    p[1] + to[1] - middle[1],
+    p[2] + to[2] - middle[2],
+  ];
   return {
-    path, words, kind: "body", outline_m: points, isClosed, at_m: middle,
-    move: (to) => [set([...path, key], points.map((p) => written(moved(p, to), script)))],
+    path,
+    words,
+    kind: "body",
+    outline_m: points,
+    isClosed,
+    at_m: middle,
+    move: (to) => [
+      set(
+        [...path, key],
+        points.map((p) => written(moved(p, to), script)),
+      ),
+    ],
     remove: () => [remove(path)],
   };
 }
@@ -118,7 +151,9 @@ function startItems(path: Path, value: Table, number: number, script: Script): I
   const targets = list.flatMap((task, t) => {
     const own = Array.isArray(tasks) ? [...path, "tasks", t] : [...path, "tasks"];
     return pointsOf(valueAt(task, ["targets_m"]), script).map((target, i) =>
-      handle([...own, "targets_m", i], `target ${i + 1} of ${words}`, "goal", target, script, () => removeFrom(own, "targets_m", i, task as Table)),
+      handle([...own, "targets_m", i], `target ${i + 1} of ${words}`, "goal", target, script, () =>
+        removeFrom(own, "targets_m", i, task as Table),
+      ),
     );
   });
   return [...start, ...targets];
@@ -126,7 +161,12 @@ function startItems(path: Path, value: Table, number: number, script: Script): I
 
 /** A ball around a place; from a drag, as large as that. */
 export function putBall(at: Place, radius_m: number, m_per_px: number): Edit[] {
-  return [insert(["obstacles"], { at_m: [rounded(at[0], m_per_px), rounded(at[1], m_per_px)], radius_m: rounded(radius_m, m_per_px) })];
+  return [
+    insert(["obstacles"], {
+      at_m: [rounded(at[0], m_per_px), rounded(at[1], m_per_px)],
+      radius_m: rounded(radius_m, m_per_px),
+    }),
+  ];
 }
 
 /** A box between two corners. */
@@ -182,7 +222,8 @@ export function putPolygon(model: Table, a: Place, b: Place, chosen: Path | null
 /** One more way-point of the chosen obstacle's patrol; the first makes it go there from where it is, and back. */
 export function putPatrol(model: Table, to: Place, chosen: Path | null, m_per_px: number): Edit[] {
   const place = [rounded(to[0], m_per_px), rounded(to[1], m_per_px)];
-  const fits = ({ value }: { value: Table }): boolean => value["at_m"] !== undefined && value["corners_m"] === undefined;
+  const fits = ({ value }: { value: Table }): boolean =>
+    value["at_m"] !== undefined && value["corners_m"] === undefined;
   const own = chosenObstacle(model, chosen);
   const host = own && fits(own) ? own : sectionsOf(model, "obstacles").filter(fits).at(-1);
   const from = host ? numbersOf(host.value["at_m"], 2) : null;
@@ -190,5 +231,9 @@ export function putPatrol(model: Table, to: Place, chosen: Path | null, m_per_px
   if (Array.isArray(host.value["patrol_m"])) return [insert([...host.path, "patrol_m"], place)];
   // A patrol takes the place of a straight way.
   const gone = ["bounces_m", "velocity_m_s"].filter((key) => host.value[key] !== undefined);
-  return [...gone.map((key) => remove([...host.path, key])), set([...host.path, "patrol_m"], [from, place]), set([...host.path, "speed_m_s"], 0.5)];
+  return [
+    ...gone.map((key) => remove([...host.path, key])),
+    set([...host.path, "patrol_m"], [from, place]),
+    set([...host.path, "speed_m_s"], 0.5),
+  ];
 }

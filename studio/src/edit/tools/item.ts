@@ -52,7 +52,12 @@ export function ring([x, y, z]: Place, radius_m: number, corners = 32): Place[] 
 /** Corners of a box around a place. */
 export function box([x, y]: Place, width: number, height: number, turn_rad = 0): Place[] {
   const [c, s] = [Math.cos(turn_rad), Math.sin(turn_rad)];
-  return [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([i, j]) => {
+  return [
+    [-1, -1],
+    [1, -1],
+    [1, 1],
+    [-1, 1],
+  ].map(([i, j]) => {
     const [u, v] = [(i! * width) / 2, (j! * height) / 2];
     return [x + c * u - s * v, y + s * u + c * v, 0];
   });

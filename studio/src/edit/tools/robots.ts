@@ -47,19 +47,26 @@ function bodiesOf(key: string, section: Path, value: Table, ground: Ground): Ite
     const path = [...section, "at", i];
     const [column, row, heading] = at as [number, number, number | undefined];
     const rect = { column, row, width: size[0], height: size[1] };
-    return [{
-      path, words: `${ONE[key]}${name} at column ${column}, row ${row}`, kind: "body",
-      outline_m: outlineOf(ground, rect), isClosed: true, at_m: placeOf(ground, column + size[0] / 2, row + size[1] / 2),
-      move: (to) => [set(path, [...anchor(ground, to, size), ...(heading === undefined ? [] : [heading])])],
-      remove: () => removeFrom(section, "at", i, value),
-      ...(key === "robots" ? { turn: () => [set(path, [column, row, ((heading ?? -1) + 1) % 4])] } : {}),
-    }];
+    return [
+      {
+        path,
+        words: `${ONE[key]}${name} at column ${column}, row ${row}`,
+        kind: "body",
+        outline_m: outlineOf(ground, rect),
+        isClosed: true,
+        at_m: placeOf(ground, column + size[0] / 2, row + size[1] / 2),
+        move: (to) => [set(path, [...anchor(ground, to, size), ...(heading === undefined ? [] : [heading])])],
+        remove: () => removeFrom(section, "at", i, value),
+        ...(key === "robots" ? { turn: () => [set(path, [column, row, ((heading ?? -1) + 1) % 4])] } : {}),
+      },
+    ];
   });
 }
 
 /** Goals, ends of shuttles, and regions in which places are drawn. */
 function aimsOf(section: Path, value: Table, ground: Ground): Item[] {
-  const name = typeof value["name"] === "string" && value["name"] !== "" ? value["name"] : `robots ${Number(section[1] ?? 0) + 1}`;
+  const name =
+    typeof value["name"] === "string" && value["name"] !== "" ? value["name"] : `robots ${Number(section[1] ?? 0) + 1}`;
   const behaviour = [...section, "behaviour"];
   const goals = valueAt(value, ["behaviour", "goals"]);
   const points = (Array.isArray(goals) ? goals : []).flatMap((given, i): Item[] => {
@@ -67,14 +74,22 @@ function aimsOf(section: Path, value: Table, ground: Ground): Item[] {
     if (!at) return [];
     const [column, row] = at as [number, number];
     const path = [...behaviour, "goals", i];
-    return [{
-      path, words: `way-point ${i + 1} of ${name}`, kind: "goal",
-      outline_m: outlineOf(ground, { column, row, width: 1, height: 1 }), isClosed: true, at_m: placeOf(ground, column + 0.5, row + 0.5),
-      move: (to) => [set(path, [...cellOf(ground, to[0], to[1])])],
-      remove: () => (Array.isArray(goals) && goals.length === 1 ? [remove(behaviour)] : [remove(path)]),
-    }];
+    return [
+      {
+        path,
+        words: `way-point ${i + 1} of ${name}`,
+        kind: "goal",
+        outline_m: outlineOf(ground, { column, row, width: 1, height: 1 }),
+        isClosed: true,
+        at_m: placeOf(ground, column + 0.5, row + 0.5),
+        move: (to) => [set(path, [...cellOf(ground, to[0], to[1])])],
+        remove: () => (Array.isArray(goals) && goals.length === 1 ? [remove(behaviour)] : [remove(path)]),
+      },
+    ];
   });
-  const areas = [["behaviour", "a"], ["behaviour", "b"], ["region"]].flatMap((below) => area(section, below, value, name, ground));
+  const areas = [["behaviour", "a"], ["behaviour", "b"], ["region"]].flatMap((below) =>
+    area(section, below, value, name, ground),
+  );
   return [...areas, ...points];
 }
 
@@ -84,12 +99,18 @@ function area(section: Path, below: string[], value: Table, name: string, ground
   const [column, row, width, height] = given as [number, number, number, number];
   const path = [...section, ...below];
   const word = below.at(-1) === "region" ? "region" : `end ${below.at(-1)}`;
-  return [{
-    path, words: `${word} of ${name}`, kind: "area",
-    outline_m: outlineOf(ground, { column, row, width, height }), isClosed: true, at_m: placeOf(ground, column + width / 2, row + height / 2),
-    move: (to) => [set(path, [...anchor(ground, to, [width, height]), width, height])],
-    remove: () => [remove(below.at(-1) === "region" ? path : [...section, "behaviour"])],
-  }];
+  return [
+    {
+      path,
+      words: `${word} of ${name}`,
+      kind: "area",
+      outline_m: outlineOf(ground, { column, row, width, height }),
+      isClosed: true,
+      at_m: placeOf(ground, column + width / 2, row + height / 2),
+      move: (to) => [set(path, [...anchor(ground, to, [width, height]), width, height])],
+      remove: () => [remove(below.at(-1) === "region" ? path : [...section, "behaviour"])],
+    },
+  ];
 }
 
 const FIRST: Record<string, Table> = {
@@ -100,7 +121,9 @@ const FIRST: Record<string, Table> = {
 
 /** A section with places of its own to put one more body into: the chosen one, else the last. */
 export function hostOf(model: Table, key: string, chosen: Path | null): { path: Path; value: Table } | null {
-  const hosts = sectionsOf(model, key).filter(({ value }) => Array.isArray(value["at"]) && value["count"] === undefined);
+  const hosts = sectionsOf(model, key).filter(
+    ({ value }) => Array.isArray(value["at"]) && value["count"] === undefined,
+  );
   return hosts.find(({ path }) => chosen && path.every((part, i) => part === chosen[i])) ?? hosts.at(-1) ?? null;
 }
 
@@ -118,7 +141,9 @@ export function putDoor(model: Table, board: Board | null, { column, row, width,
     const [w, h] = sizeOf("doors", value);
     return Array.isArray(value["at"]) && w === width && h === height;
   });
-  const door = alike ? insert([...alike.path, "at"], [column, row]) : insert(["doors"], { at: [[column, row]], size: [width, height], ...FIRST["doors"]! });
+  const door = alike
+    ? insert([...alike.path, "at"], [column, row])
+    : insert(["doors"], { at: [[column, row]], size: [width, height], ...FIRST["doors"]! });
   return way ? [way, door] : [door];
 }
 

@@ -4,8 +4,23 @@ import type { Scene } from "../../protocol";
 import type { Board } from "../board";
 
 export type ToolId =
-  | "select" | "brush" | "line" | "rectangle" | "fill" | "eraser" | "robot" | "person" | "door" | "goal"
-  | "ball" | "wall" | "box" | "polygon" | "patrol" | "airplane" | "way-point";
+  | "select"
+  | "brush"
+  | "line"
+  | "rectangle"
+  | "fill"
+  | "eraser"
+  | "robot"
+  | "person"
+  | "door"
+  | "goal"
+  | "ball"
+  | "wall"
+  | "box"
+  | "polygon"
+  | "patrol"
+  | "airplane"
+  | "way-point";
 
 export interface Tool {
   id: ToolId;
@@ -44,7 +59,12 @@ const CHAIN: readonly Tool[] = [
 ];
 /** Tools in space, where nothing can be placed anew: existing things are moved. */
 const CHAIN_IN_SPACE: readonly Tool[] = [
-  tool("select", "↖", "Select", "Drag moves in the plane of the view, an arrow of the chosen thing along its axis; Delete takes away"),
+  tool(
+    "select",
+    "↖",
+    "Select",
+    "Drag moves in the plane of the view, an arrow of the chosen thing along its axis; Delete takes away",
+  ),
 ];
 const AIRSPACE: readonly Tool[] = [
   SELECT,
@@ -61,12 +81,19 @@ export function toolsOf(scene: Scene): readonly Tool[] {
 }
 
 /** Returns the reason why a scene, or a part of it, cannot be drawn upon; nothing where all can. */
-export function obstacleTo(scene: Scene, board: Board | null, has: { file: boolean; office: boolean; airplanes: boolean }): string {
+export function obstacleTo(
+  scene: Scene,
+  board: Board | null,
+  has: { file: boolean; office: boolean; airplanes: boolean },
+): string {
   if (scene.is_recording) return "A recording stays as it is: open its scenario to change it.";
-  if (toolsOf(scene).length === 0 && scene.dimensions === 3) return "A scene in space is changed in its forms and its text: there is nothing here to draw on, as a place on the screen is no place in space.";
+  if (toolsOf(scene).length === 0 && scene.dimensions === 3)
+    return "A scene in space is changed in its forms and its text: there is nothing here to draw on, as a place on the screen is no place in space.";
   if (toolsOf(scene).length === 0) return "This world is changed in its forms and its text.";
-  if (scene.world === "robots" && !board && has.office) return "The walls are those of a generated office, which the text only measures.";
+  if (scene.world === "robots" && !board && has.office)
+    return "The walls are those of a generated office, which the text only measures.";
   if (scene.world === "robots" && !board && has.file) return "The walls are those of a file beside the scenario.";
-  if (scene.world === "airspace" && !has.airplanes) return "Generated traffic has no airplanes of its own in the text; those that you put fly beside it.";
+  if (scene.world === "airspace" && !has.airplanes)
+    return "Generated traffic has no airplanes of its own in the text; those that you put fly beside it.";
   return "";
 }

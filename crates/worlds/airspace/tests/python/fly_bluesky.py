@@ -28,8 +28,7 @@ def start():
     from bluesky.tools import geo
     from bluesky.tools.geo import _geo
 
-    for name in ("qdrdist", "qdrdist_matrix", "kwikdist", "kwikdist_matrix", "kwikqdrdist",
-                 "kwikqdrdist_matrix"):
+    for name in ("qdrdist", "qdrdist_matrix", "kwikdist", "kwikdist_matrix", "kwikqdrdist", "kwikqdrdist_matrix"):
         setattr(geo, name, getattr(_geo, name))
     return bs
 
@@ -48,8 +47,14 @@ def created(bs, limits, airplanes):
     zone_m = limits["separation_m"] * limits["margin"]
     bs.sim.reset()
     simtime.setdt(limits["step_s"])
-    do("CDMETHOD STATEBASED", "RESO MVP", "RMETHH HDG", f"ZONER {zone_m / nm!r}",
-       "RFACH 1.05", f"DTLOOK {limits['look_ahead_s']!r}")
+    do(
+        "CDMETHOD STATEBASED",
+        "RESO MVP",
+        "RMETHH HDG",
+        f"ZONER {zone_m / nm!r}",
+        "RFACH 1.05",
+        f"DTLOOK {limits['look_ahead_s']!r}",
+    )
     degrees = lambda m: math.degrees(m / EARTH_M)
     for k, (x, y, heading, _, _) in enumerate(airplanes):
         bs.traf.cre(f"A{k:03d}", "B744", degrees(y), degrees(x), (90.0 - heading) % 360.0, 1000.0, v)
@@ -65,8 +70,7 @@ def created(bs, limits, airplanes):
     bs.traf.gseast[:] = v * np.sin(np.radians(bs.traf.hdg))
     bs.traf.gsnorth[:] = v * np.cos(np.radians(bs.traf.hdg))
     for k, (_, _, _, x, y) in enumerate(airplanes):
-        do(f"ADDWPT A{k:03d} {degrees(y)!r} {degrees(x)!r}", f"BANK A{k:03d} {bank!r}",
-           f"LNAV A{k:03d} ON")
+        do(f"ADDWPT A{k:03d} {degrees(y)!r} {degrees(x)!r}", f"BANK A{k:03d} {bank!r}", f"LNAV A{k:03d} ON")
 
 
 def closest(before, now, ids):
@@ -84,8 +88,7 @@ def fly(bs, limits, airplanes):
     created(bs, limits, airplanes)
     traf, step_s, gap_m = bs.traf, limits["step_s"], limits["separation_m"]
     goals = np.array(airplanes)[:, 3:]
-    places = lambda: {int(name[1:]): np.radians([traf.lon[k], traf.lat[k]]) * EARTH_M
-                      for k, name in enumerate(traf.id)}
+    places = lambda: {int(name[1:]): np.radians([traf.lon[k], traf.lat[k]]) * EARTH_M for k, name in enumerate(traf.id)}
     before, lost, nearest_m, losses, flown_s = places(), set(), math.inf, 0, []
     for step in range(1, int(limits["until_s"] / step_s) + 1):
         bs.sim.step()
@@ -100,16 +103,19 @@ def fly(bs, limits, airplanes):
         lost = {(ids[i], ids[j]) for i, j in zip(*np.where(np.triu(last < gap_m)))}
         near = lambda k, i: math.hypot(*(goals[i] - now[i])) < limits["tolerance_m"]
         # LNAV ends where BlueSky takes the way-point for passed.
-        done = [k for k, name in enumerate(traf.id)
-                if near(k, int(name[1:])) or not traf.swlnav[k]]
+        done = [k for k, name in enumerate(traf.id) if near(k, int(name[1:])) or not traf.swlnav[k]]
         for k in reversed(done):
             flown_s.append(step * step_s)
             traf.delete(k)
         before = places()
         if not before:
             break
-    return {"losses": losses, "nearest_m": round(nearest_m, 3), "arrived": len(flown_s),
-            "mean_flown_s": round(float(np.mean(flown_s)), 2) if flown_s else None}
+    return {
+        "losses": losses,
+        "nearest_m": round(nearest_m, 3),
+        "arrived": len(flown_s),
+        "mean_flown_s": round(float(np.mean(flown_s)), 2) if flown_s else None,
+    }
 
 
 if __name__ == "__main__":
